@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
-from rtshcua.decision.times import Daytime
+from rtshcua.decision.times import LocalTime, Window, daily, weekly
 from rtshcua.decision.values import ABSENT, AND, FALSE, NOT, OR, TRUE, UNKNOWN, Span, Truth, Value
 from rtshcua.decision.zones import Place, PreparedZone, WellKnown, here
 
@@ -52,7 +52,7 @@ class Tables(NamedTuple):
     tables: tuple[tuple[int, ...], ...]
     sets: tuple[frozenset[int], ...]
     known: WellKnown
-    utc_offset_us: int
+    local: LocalTime
 
 
 def within(place: Place, zone: PreparedZone, at: Environment, through: int) -> Truth:
@@ -93,8 +93,10 @@ def build(node: tree.Node, tables: Tables) -> Condition:
             return _in_phase(tables.sets[members])
         case tree.Monitored(monitor):
             return _monitored(monitor)
+        case tree.InWeek(windows):
+            return _in_window(weekly(windows, tables.local))
         case _:
-            return _in_window(Daytime(node.start, node.end, tables.utc_offset_us))
+            return _in_window(daily(node.start, node.end, tables.local))
 
 
 def _known(index: int) -> Condition:
@@ -276,7 +278,7 @@ def _monitored(monitor: int) -> Condition:
     return run
 
 
-def _in_window(window: Daytime) -> Condition:
+def _in_window(window: Window) -> Condition:
     def run(at: Environment) -> Truth:
         return window.truth(at.utc, at.error)
 

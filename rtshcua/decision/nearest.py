@@ -12,6 +12,7 @@ from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import Environment, Tables, build, total
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.safety import ranging
+from rtshcua.decision.times import local_time, time_of_week
 from rtshcua.decision.tree import Node
 from rtshcua.decision.values import FALSE, TRUE, Value, point
 from rtshcua.model.decision import Decision
@@ -78,6 +79,8 @@ class Changes:
                 return (Change(argument, at, 0, 0, chosen),) if goal else None
             case tree.InWindow(start, end) if goal:
                 return (Change(False, None, start, min(end, DAY - 1), None),)
+            case tree.InWeek(windows) if goal:
+                return self._today(windows)
             case _:
                 return None
 
@@ -90,12 +93,28 @@ class Changes:
         slots, arguments, utc, error = list(here.slots), list(here.arguments), here.utc, here.error
         for (argument, at), value in made.items():
             if at is None:
-                first = utc[0][0]
-                utc, error = ((first + (value - first - self._tables.utc_offset_us) % DAY,) * 2,), (0, 0)
+                moment = self._tables.local.next(value, utc[0][0])
+                if moment is None:
+                    return False
+                utc, error = ((moment, moment),), (0, 0)
             else:
                 (arguments if argument else slots)[at] = point(value)
         changed = Environment(slots, arguments, utc, error, here.place, here.monitors, here.phase, here.through)
         return build(node, self._tables)(changed) == (TRUE if goal else FALSE)
+
+    def _today(self, windows: tuple[int, ...]) -> tuple[Change, ...] | None:
+        """The next window of this day of the local week, else the last; None if it has none. Other days are no help."""
+        moment = self._at.utc[0][0]
+        day, now = divmod(time_of_week(moment + self._tables.local.offset(moment)), DAY)
+        found = [
+            (max(start - day * DAY, 0), min(end - day * DAY, DAY) - 1)
+            for start, end in zip(windows[::2], windows[1::2], strict=True)
+            if start < (day + 1) * DAY and end > day * DAY
+        ]
+        if not found:
+            return None
+        low, high = next((each for each in found if each[1] >= now), found[-1])
+        return (Change(False, None, low, high, None),)
 
     def _all(self, left: tree.Node, right: tree.Node, goal: bool) -> tuple[Change, ...] | None:
         first, second = self.find(left, goal), self.find(right, goal)
@@ -174,7 +193,7 @@ class Offer(NamedTuple):
 def offer(change: Change, contract: Contract, policy: Policy, at: Environment) -> Offer:
     """What a change offers; there are no options where the subject has no such value."""
     if change.at is None:
-        local = point(at.utc[0][0] + policy.vehicle.utc_offset_us)
+        local = point(at.utc[0][0] + local_time(policy.vehicle).offset(at.utc[0][0]))
         return Offer(change, LOCAL_TIME, DAYTIME, ((nearest_in(change, local), ""),))
     if change.argument:
         return _argument(change, change.at, contract, policy, at)

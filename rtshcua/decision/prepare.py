@@ -14,6 +14,7 @@ from rtshcua.decision.checks import mission as mission_checks
 from rtshcua.decision.checks.policy import problems
 from rtshcua.decision.contracts import Energy, first_cell, longest, misfit
 from rtshcua.decision.evaluate import NO_PHASE, Condition, Environment, Tables, always, build, within
+from rtshcua.decision.times import local_time
 from rtshcua.decision.tree import Node, monitored, parse, scope_of, slots_read, where
 from rtshcua.decision.values import AND, NOT, TRUE, Sets, Truth, Value, point
 from rtshcua.decision.volume import Planner, flown_at
@@ -135,14 +136,13 @@ class Compiler:
         self._guards: dict[tuple[Clause, ...], Guards | None] = {
             clauses: None for of in policy.contracts for clauses in (of.require, of.assume, of.maintain)
         }
+        local = local_time(policy.vehicle)
         self.tables = Tables(
-            zones=tuple(
-                PreparedZone(number, zone, policy.vehicle.utc_offset_us) for number, zone in enumerate(policy.zones)
-            ),
+            zones=tuple(PreparedZone(number, zone, local) for number, zone in enumerate(policy.zones)),
             tables=policy.tables,
             sets=tuple(frozenset(members) for members in policy.sets),
             known=_well_known(policy),
-            utc_offset_us=policy.vehicle.utc_offset_us,
+            local=local,
         )
 
     def node(self, clause: Clause, *contracts: Contract) -> Node:

@@ -1,19 +1,96 @@
-"""Windows of the local time of day, and when a zone exists, on a clock whose error is bounded.
+"""The local time, windows of its day or week, and when a zone exists, on a clock whose error is bounded.
 
 A moment `t` with error `e` is somewhere in `t - e`..`t + e`: a window or an interval holds when all of that is inside
-it, fails when all of it is outside, and is unknown otherwise. A zone exists in a window of the local day, an interval
-of UTC, or both (Kleene's `and`); outside of them nothing is inside it.
+it, fails when all of it is outside, and is unknown otherwise. A zone exists in windows of the local day or week, an
+interval of UTC, or both (Kleene's `and`); outside of them nothing is inside it.
+
+There are no time zones on board: a policy carries the moments at which the local time's distance from UTC changes.
 """
 
+from bisect import bisect_right
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TypeAlias
+
 from rtshcua.decision.values import AND, FALSE, TRUE, UNKNOWN, Span, Truth
-from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.limits import DAY, WEEK
+from rtshcua.model.flat.policy import Vehicle
 from rtshcua.model.flat.zone import Zone
+
+#: 1970 began on a Thursday; weeks begin with Monday
+_MONDAY = 3 * DAY
+
+
+class LocalTime:
+    """What a clock on the wall shows: UTC and an offset, which is the same at all times, or changes at some moments.
+
+    With `offsets` (`Vehicle` says what they are) nothing is known before the first of their moments, nor from the last
+    of them on.
+    """
+
+    __slots__ = ("_moments", "_offsets", "fixed")
+
+    def __init__(self, offset_us: int, offsets: tuple[int, ...] = ()) -> None:
+        self.fixed = not offsets
+        self._moments = offsets[::2]
+        self._offsets = offsets[1::2] or (offset_us,)
+
+    def offset(self, moment: int) -> int:
+        """How far it is from UTC at a moment; outside of what is known, as at the nearest moment that is."""
+        at = bisect_right(self._moments, moment) - 1
+        return self._offsets[min(max(at, 0), len(self._offsets) - 1)]
+
+    def known(self) -> Span | None:
+        """From when until before when it is known; None: always."""
+        return None if self.fixed else (self._moments[0], self._moments[-1])
+
+    def stretches(self, low: int, high: int) -> Iterator[tuple[int, int, int]]:
+        """The parts of `low`..`high` with one offset: the first moment of each, the first after it, the offset."""
+        if self.fixed:
+            yield low, high + 1, self._offsets[0]
+            return
+        moments = self._moments
+        for at in range(max(bisect_right(moments, low) - 1, 0), len(self._offsets)):
+            start, end = max(low, moments[at]), min(high + 1, moments[at + 1])
+            if start >= end:
+                return
+            yield start, end, self._offsets[at]
+
+    def changes(self) -> tuple[tuple[int, int, int], ...]:
+        """The moments at which its offset changes, with the offset before and the one after."""
+        return tuple(zip(self._moments[1:-1], self._offsets, self._offsets[1:], strict=False))
+
+    def steady(self) -> int:
+        """The beginning of a week of UTC from which on its offset stays the same, for the longest time."""
+        if self.fixed:
+            return 0
+        start, _ = max(pairwise(self._moments), key=lambda part: part[1] - part[0])
+        return -(-start // WEEK) * WEEK
+
+    def next(self, daytime: int, moment: int) -> int | None:
+        """The first moment from one on at which it shows a time of day; None where it never does as far as is known."""
+        for start, end, offset in self.stretches(moment, moment + 2 * DAY):
+            found = start + (daytime - start - offset) % DAY
+            if found < end:
+                return found
+        return None
+
+
+def time_of_week(local: int) -> int:
+    """How far a local time is into its week."""
+    return (local + _MONDAY) % WEEK
+
+
+def local_time(vehicle: Vehicle) -> LocalTime:
+    """The local time of a vehicle."""
+    return LocalTime(vehicle.utc_offset_us, vehicle.offsets)
 
 
 class Daytime:
     """The window from `start` to `end`, both included, in us since local midnight; over midnight when `start > end`."""
 
     __slots__ = ("_length", "_offset", "_start")
+    period = DAY
 
     def __init__(self, start: int, end: int, utc_offset_us: int) -> None:
         self._start, self._offset = start, utc_offset_us
@@ -38,10 +115,111 @@ class Daytime:
                 truth |= UNKNOWN
         return truth
 
+    def changes(self, low: int, high: int) -> Iterator[int]:
+        """The moments after `low` and up to `high` at which it begins, or has just ended."""
+        for edge in (self._start, self._start + self._length):
+            yield from range(low + 1 + (edge - self._offset - low - 1) % DAY, high + 1, DAY)
+
 
 def _meets(start: int, length: int, at: int, width: int) -> bool:
     """Whether the arc of `length` moments from `start` of the day shares one with `at`..`at + width`."""
     return length > 0 and ((at - start) % DAY < length or (start - at) % DAY <= width)
+
+
+class Windows:
+    """Windows of the local day (`period` is DAY) or week (WEEK): each from some us after it began until before another,
+    ascending. They hold whenever a clock on the wall shows a time in one of them: also in both
+    of two hours that it shows twice, and never at times that it skips. Where the local time is not known, nor are they.
+    """
+
+    __slots__ = ("_everything", "_local", "_parts", "period")
+
+    def __init__(self, windows: tuple[int, ...], period: int, local: LocalTime) -> None:
+        self._local, self.period = local, period
+        self._parts = tuple(zip(windows[::2], windows[1::2], strict=True))
+        self._everything = windows == (0, period)
+
+    def truth(self, utc: tuple[Span, ...], error: Span) -> Truth:
+        """Whether the moments of some intervals of UTC, each known to within an error in `error`, are in a window."""
+        (least, most), truth = error, 0
+        any_truth = TRUE | FALSE | (UNKNOWN if most else 0)
+        for low, high in utc:
+            first = low - most
+            for start, end, value in self._stretches(first, high + most):
+                if max(low, start + least) <= min(high, end - 1 - least):
+                    truth |= value
+                if start > first and max(low, start - most) <= min(high, start + most - 1):
+                    truth |= UNKNOWN
+                if truth & any_truth == any_truth:
+                    break  # nothing else can come of it, but where the local time is not known
+            if not self._known(low - most, high + most):
+                truth |= UNKNOWN
+        return truth
+
+    def changes(self, low: int, high: int) -> Iterator[int]:
+        """The moments after `low` and up to `high` at which one begins, or has just ended, or ceases to be known."""
+        return (start for start, _, _ in self._stretches(low, high) if start > low)
+
+    def _known(self, low: int, high: int) -> bool:
+        known = self._local.known()
+        return known is None or (known[0] <= low and high < known[1])
+
+    def _stretches(self, low: int, high: int) -> Iterator[tuple[int, int, Truth]]:
+        """`low`..`high` in parts that are as long as they can be: the first moment, the first after it, the truth."""
+        at, last = low, high + 1
+        known = self._local.known()
+        if known is not None:
+            if at < min(known[0], last):
+                yield at, min(known[0], last), UNKNOWN
+            at, last = min(max(at, known[0]), last), min(last, known[1])
+        begun: Span | None = None  # a window that may go on
+        for start, end in self._inside(at, last - 1):
+            if begun is not None and begun[1] == start:
+                begun = begun[0], end
+                continue
+            if begun is not None:
+                yield *begun, TRUE
+                at = begun[1]
+            if at < start:
+                yield at, start, FALSE
+            begun = start, end
+        if begun is not None:
+            yield *begun, TRUE
+            at = begun[1]
+        if at < last:
+            yield at, last, FALSE
+        if max(low, last) <= high:
+            yield max(low, last), high + 1, UNKNOWN
+
+    def _inside(self, low: int, high: int) -> Iterator[Span]:
+        """The moments of windows, each part by the first and the first after it."""
+        for first, last, offset in self._local.stretches(low, high):
+            if self._everything:
+                yield first, last
+                continue
+            shift, period = offset + _MONDAY, self.period
+            for number in range((first + shift) // period, (last - 1 + shift) // period + 1):
+                for start, end in self._parts:
+                    begin, over = max(first, number * period + start - shift), min(last, number * period + end - shift)
+                    if begin < over:
+                        yield begin, over
+
+
+Window: TypeAlias = Daytime | Windows
+
+
+def daily(start: int, end: int, local: LocalTime) -> Window:
+    """The window from `start` to `end`, both included, in us since local midnight; over midnight when `start > end`."""
+    if local.fixed:
+        return Daytime(start, end, local.offset(0))
+    after = min(end + 1, DAY)
+    windows = (start, after) if start < after else (0, after, start, DAY) if after < start else (0, DAY)
+    return Windows(windows, DAY, local)
+
+
+def weekly(windows: tuple[int, ...], local: LocalTime) -> Window:
+    """Windows of the local week, as `Zone.weekly` has them."""
+    return Windows(windows, WEEK, local)
 
 
 class Dates:
@@ -72,13 +250,8 @@ class Times:
 
     __slots__ = ("_parts",)
 
-    def __init__(self, zone: Zone, utc_offset_us: int) -> None:
-        parts: list[Daytime | Dates] = []
-        if zone.daily:
-            parts.append(Daytime(zone.daily[0], zone.daily[1], utc_offset_us))
-        if zone.dates:
-            parts.append(Dates(zone.dates[0], zone.dates[1]))
-        self._parts = tuple(parts)
+    def __init__(self, zone: Zone, local: LocalTime) -> None:
+        self._parts = (*windows_of(zone, local), *(Dates(*dates) for dates in (zone.dates,) if dates))
 
     def truth(self, utc: tuple[Span, ...], error: Span, through: int) -> Truth:
         """What may be true of the zone's existing at some moment from one of `utc` to `through` us after it."""
@@ -88,3 +261,15 @@ class Times:
         for part in self._parts:
             truth = AND[truth][part.truth(utc, error)]
         return truth
+
+
+def timed(zone: Zone) -> bool:
+    """Whether a zone exists at some times only."""
+    return bool(zone.daily or zone.weekly or zone.dates)
+
+
+def windows_of(zone: Zone, local: LocalTime) -> tuple[Window, ...]:
+    """The times of the day, or of the week, at which a zone exists."""
+    if zone.daily:
+        return (daily(zone.daily[0], zone.daily[1], local),)
+    return (weekly(zone.weekly, local),) if zone.weekly else ()

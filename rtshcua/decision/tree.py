@@ -7,11 +7,12 @@ Every number is a sum of state slots and argument cells times constants, plus a 
 
 from collections.abc import Iterable
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Clause, Op
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract
-from rtshcua.model.flat.limits import DAY, MAX_MAGNITUDE, MAX_VALUE
+from rtshcua.model.flat.limits import DAY, MAX_MAGNITUDE, MAX_VALUE, WEEK
 from rtshcua.model.flat.policy import Monitor, Policy, Vehicle
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 
@@ -64,6 +65,10 @@ class Scope(NamedTuple):
         if not 0 <= index < len(self.members):
             return f"there is no set {index}"
         return None if all(0 <= member < phases for member in self.members[index]) else f"set {index} is none of phases"
+
+    def week(self, index: int) -> str | None:
+        """A set that is windows of a week."""
+        return self.entry("set", index, len(self.members)) or windows_problem(self.members[index])
 
     def about(self, *contracts: Contract) -> "Scope":
         """The same, for code that may name the arguments of these contracts' skills."""
@@ -147,6 +152,12 @@ class InWindow(NamedTuple):
     end: int
 
 
+class InWeek(NamedTuple):
+    """The local time of the week is in one of some windows, as `Zone.weekly` has them."""
+
+    windows: tuple[int, ...]
+
+
 class InPhase(NamedTuple):
     """The invocation's mission phase is in set `members` of the policy."""
 
@@ -180,7 +191,7 @@ class Not(NamedTuple):
 
 
 Atom: TypeAlias = (
-    AtMost | Equal | Member | Known | Inside | InsideArgument | PointInside | InWindow | InPhase | Monitored
+    AtMost | Equal | Member | Known | Inside | InsideArgument | PointInside | InWindow | InWeek | InPhase | Monitored
 )
 Node: TypeAlias = Atom | Both | Either | Not
 
@@ -329,6 +340,9 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
         case Op.TIME_IN:
             within = 0 <= a < DAY and 0 <= b <= DAY
             problem, node = None if within else f"{a}..{b} us is not a time of day", InWindow(a, b)
+        case Op.WEEK_IN:
+            problem = scope.week(a) or _unused(b)
+            node = InWeek(() if problem else scope.members[a])
         case Op.PHASE_IN:
             problem, node = scope.set_of_phases(b) or _unused(a), InPhase(b)
         case Op.MONITOR:
@@ -338,6 +352,13 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
             return f"no instruction has the number {op}"
     stack.append(node)
     return problem
+
+
+def windows_problem(windows: tuple[int, ...]) -> str | None:
+    """What is wrong with windows of a week, or None: they begin and end within it, one after the other."""
+    good = windows and len(windows) % 2 == 0 and windows[0] >= 0 and windows[-1] <= WEEK
+    good = good and all(one < other for one, other in pairwise(windows))
+    return None if good else "these are no windows of a week"
 
 
 def _unused(*operands: int) -> str | None:

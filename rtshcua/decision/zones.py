@@ -14,11 +14,12 @@ from math import isqrt
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision.outline import Bands, Box, Slabs, edges
-from rtshcua.decision.times import Times
+from rtshcua.decision.times import LocalTime, Times, timed
 from rtshcua.decision.values import ABSENT, AND, FALSE, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 NO_BOX: Box = (0, 0, 0, 0)
+_UTC = LocalTime(0)
 
 
 class Circle:
@@ -79,12 +80,12 @@ class PreparedZone:
 
     __slots__ = ("banded", "ceiling", "floor", "number", "shape", "times")
 
-    def __init__(self, number: int, zone: Zone, utc_offset_us: int = 0) -> None:
+    def __init__(self, number: int, zone: Zone, local: LocalTime = _UTC) -> None:
         self.number = number
         self.floor, self.ceiling = zone.floor, zone.ceiling
         self.banded = (zone.floor, zone.ceiling) != (LOWEST, HIGHEST)
         self.shape: Circle | Area = Circle(zone.data) if zone.shape == CIRCLE else Area(zone)
-        self.times = Times(zone, utc_offset_us) if zone.daily or zone.dates else None
+        self.times = Times(zone, local) if timed(zone) else None
 
     def along(self, path: tuple[int, ...], box: Box) -> Truth:
         """Whether the places of a sweep are inside, whatever their height."""

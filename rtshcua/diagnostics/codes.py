@@ -139,6 +139,7 @@ LOITER_OUTSIDE = _code(
 )
 BAD_CORRIDOR = _code("E0516", "bad-corridor", "the places and the width do not make a corridor")
 NO_CLOCK = _code("E0517", "no-clock", "a local time is read, and the vehicle does not say how far that is from UTC")
+UNKNOWN_TIME_ZONE = _code("E0518", "unknown-time-zone", "a clock names a time zone that there is not")
 
 # E06: skills, arguments, fallback chains
 UNKNOWN_ARGUMENT = _code("E0601", "unknown-argument", "an argument has the name of no parameter")

@@ -34,7 +34,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Auditor
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
 from rtshcua.virtual.conduct import Conduct
 from rtshcua.virtual.excuses import Excuses, Failure
@@ -160,7 +160,7 @@ def airspace(policy: Policy, utc_us: int) -> Airspace:
 
     def there(number: int, slack_us: int) -> bool:
         zone = policy.zones[number]
-        return _exists(zone, utc_us, policy.vehicle.utc_offset_us, slack_us)
+        return _exists(zone, utc_us, policy.vehicle, slack_us)
 
     return Airspace(
         tuple(policy.zones[number] for number in stated.inside if there(number, _SLACK_US)),
@@ -172,15 +172,26 @@ _SLACK_US: Final = 1_000_000
 _DAY_US: Final = 86_400_000_000
 
 
-def _exists(zone: Zone, utc_us: int, utc_offset_us: int, slack_us: int) -> bool:
+def _exists(zone: Zone, utc_us: int, vehicle: Vehicle, slack_us: int) -> bool:
     if zone.dates and not zone.dates[0] - slack_us <= utc_us <= zone.dates[1] + slack_us:
         return False
-    if not zone.daily:
+    if not zone.daily and not zone.weekly:
         return True
-    start, end = zone.daily
-    begins_us = start - slack_us
-    lasts_us = (end - start) % _DAY_US + 2 * slack_us
-    return (utc_us + utc_offset_us - begins_us) % _DAY_US <= lasts_us
+    looked = (_shown(zone, utc_us + late_us, vehicle) for late_us in (-slack_us, 0, slack_us))
+    return any(looked) if slack_us > 0 else all(looked)
+
+
+def _shown(zone: Zone, utc_us: int, vehicle: Vehicle) -> bool:
+    """Whether a clock on the wall shows a time at which a zone is there."""
+    known = [
+        offset for since, offset in zip(vehicle.offsets[::2], vehicle.offsets[1::2], strict=False) if since <= utc_us
+    ]
+    local_us = utc_us + (known[-1] if known else vehicle.utc_offset_us)
+    if zone.daily:
+        start, end = zone.daily
+        return (local_us - start) % _DAY_US <= (end - start) % _DAY_US
+    since_monday_us = (local_us + 3 * _DAY_US) % (7 * _DAY_US)  # 1970 began on a Thursday
+    return any(start <= since_monday_us < end for start, end in zip(zone.weekly[::2], zone.weekly[1::2], strict=True))
 
 
 def airspace_mm(there: Airspace, x: float, y: float, up: float) -> float:
@@ -211,7 +222,10 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
     stated = flown.policy.airspace
     if stated is None:
         return [], None
-    timed = any(zone.daily or zone.dates for zone in (flown.policy.zones[n] for n in (*stated.inside, *stated.outside)))
+    timed = any(
+        zone.daily or zone.weekly or zone.dates
+        for zone in (flown.policy.zones[n] for n in (*stated.inside, *stated.outside))
+    )
     there = airspace(flown.policy, flown.utc_us)
     worst, found = inf, list[Failure]()
     x0 = y0 = up0 = 0.0

@@ -22,7 +22,7 @@ class Artefact:
 COMPATIBILITY: Final = "docs/compatibility.md"
 
 ROOT: Final = Artefact("rtshcua/root", 2)  # 2: with policies of mission keys, persons of approval keys
-POLICY: Final = Artefact("rtshcua/policy", 6)  # 6: the speeds that a vehicle keeps
+POLICY: Final = Artefact("rtshcua/policy", 7)  # 7: time zones and days of the week
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1)
 APPROVAL: Final = Artefact("rtshcua/approval", 2)  # 2: names mission and flight

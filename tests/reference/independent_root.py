@@ -113,10 +113,10 @@ def _bundle(bundle: bytes, root: Root, vehicle: str, mission: str, now_us: int) 
     policy_payload, _ = _envelope(first, root, "policy", vehicle, now_us)
     mission_payload, key = _envelope(second, root, "mission", vehicle, now_us)
     match _whole(policy_payload), _whole(mission_payload):
-        case ["rtshcua/policy", 6, [*policy]], ["rtshcua/mission", 1, [*flown]]:
+        case ["rtshcua/policy", 7, [*policy]], ["rtshcua/mission", 1, [*flown]]:
             pass
         case _:
-            raise Untrusted("not a policy, version 5, and a mission, version 1")
+            raise Untrusted("not a policy, version 7, and a mission, version 1")
     name, version, identity, roles = policy[0], policy[1], policy[2][1], policy[4]
     digest = hashlib.sha256(b"rtshcua/policy\0" + policy_payload).digest()
     if flown[3:7] != [vehicle, name, version, digest] or identity != vehicle:

@@ -9,7 +9,7 @@ from itertools import product
 
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 from rtshcua.model.flat.code import Op
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 DAY = 24 * 3600 * 1_000_000
@@ -112,7 +112,12 @@ def atom(op: int, a: int, b: int, world: World) -> Truths:
         case Op.MONITOR:
             return frozenset(world.monitors[a])
         case Op.TIME_IN:
+            if policy.vehicle.offsets:
+                windows = (a, b + 1) if a <= b < DAY else (a, DAY) if b == DAY else (0, b + 1, a, DAY)
+                return on_the_wall(world.utc, world.error, policy.vehicle, windows, DAY)
             return daytime(world.utc, world.error, policy.vehicle.utc_offset_us, a, b)
+        case Op.WEEK_IN:
+            return on_the_wall(world.utc, world.error, policy.vehicle, policy.sets[a], 7 * DAY)
         case _:
             raise AssertionError(op)
 
@@ -218,3 +223,34 @@ def daytime(utc: int, error: int, offset: int, start: int, end: int) -> Truths:
         if next_one <= last:
             looked.add(within(next_one))
     return U if len(looked) == 2 else T if True in looked else F
+
+
+def on_the_wall(utc: int, error: int, vehicle: Vehicle, windows: tuple[int, ...], period: int) -> Truths:
+    """What a clock on the wall shows at both ends of what our clock allows, and wherever something changes between."""
+    edges = {each % period for each in windows}
+
+    def offset(moment: int) -> int | None:
+        if not vehicle.offsets:
+            return vehicle.utc_offset_us
+        if not vehicle.offsets[0] <= moment < vehicle.offsets[-1]:
+            return None
+        return [of for since, of in zip(vehicle.offsets[::2], vehicle.offsets[1::2], strict=False) if since <= moment][
+            -1
+        ]
+
+    def shown(moment: int) -> str:
+        of = offset(moment)
+        if of is None:
+            return "U"
+        time = (moment + of + 3 * DAY) % period
+        pairs = zip(windows[::2], windows[1::2], strict=True)
+        return "T" if any(start <= time < end for start, end in pairs) else "F"
+
+    first, last = utc - error, utc + error
+    looked = {first, last, *(each for each in vehicle.offsets[::2] if first <= each <= last)}
+    for of in {offset(each) for each in looked} - {None}:
+        for edge in edges:
+            at = first + (edge - of - 3 * DAY - first) % period
+            looked |= set(range(at, last + 1, period))
+    answers = {shown(each) for each in looked}
+    return frozenset(answers) if len(answers) == 1 else U

@@ -14,6 +14,7 @@ from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, FenceHabits
 from rtshcua.adapters.vehicle.messages import FENCE, FenceItem, Message
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
+from rtshcua.decision.times import timed
 from rtshcua.mavlink import enums
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, Projection, Zone, unproject
@@ -55,7 +56,7 @@ def fence_of(policy: Policy, habits: FenceHabits) -> Fence:
 def _can_include(zone: Zone, habits: FenceHabits, left_out: list[str]) -> bool:
     if zone.floor > 0 or zone.ceiling < HIGHEST:
         left_out.append(f"`{zone.name}`: its heights")
-    if zone.daily or zone.dates:
+    if timed(zone):
         left_out.append(f"`{zone.name}`: its times")
     parts = sum(_is_outer(ring) for ring in _rings(zone))
     if parts > 1 and habits.all_inclusions:
@@ -69,7 +70,7 @@ def _can_include(zone: Zone, habits: FenceHabits, left_out: list[str]) -> bool:
 def _can_exclude(zone: Zone, left_out: list[str]) -> bool:
     for there, what in (
         (zone.floor > 0 or zone.ceiling < HIGHEST, "one may fly above or below it"),
-        (zone.daily or zone.dates, "it is not always there"),
+        (timed(zone), "it is not always there"),
         (not all(map(_is_outer, _rings(zone))), "it has holes"),
     ):
         if there:

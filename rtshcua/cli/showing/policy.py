@@ -44,7 +44,10 @@ def show_policy(page: Page, policy: Policy) -> None:
     page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")
     if vehicle.without:
         page.row("without", f"{', '.join(vehicle.without)}: not fitted; what reads it `where fitted` is left out")
-    page.row("local time", f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h")
+    if vehicle.time_zone:
+        page.row("local time", f"{vehicle.time_zone}, by the time-zone data {vehicle.time_zone_data}")
+    else:
+        page.row("local time", f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h")
     page.row("roles", ", ".join(policy.roles))
     page.rows("sources", policy.sources)
 

@@ -98,6 +98,7 @@ def _numbers(vehicle: Vehicle) -> Iterator[str]:
     yield from within("offset from UTC", vehicle.utc_offset_us, -limits.DAY, limits.DAY)
     yield from within("braking", vehicle.braking, 0, limits.MAX_SPEED)
     yield from within("reaction", vehicle.reaction_us, 0, MAX_REACTION)
+    yield from _offsets(vehicle)
     if vehicle.braking and -1 in (vehicle.north, vehicle.east, vehicle.down):
         yield "brakes, and has no signal of its velocity"
     if vehicle.speeds is not None:
@@ -110,6 +111,22 @@ def _speeds(speeds: Speeds) -> Iterator[str]:
     yield from within("wind of its speeds", speeds.wind, 0, limits.MAX_SPEED)
     yield from within("height of its landing speed", speeds.landing_below, 0, HIGHEST)
     yield from within("time of flight", speeds.flight_us, 1, limits.MAX_DURATION)
+
+
+def _offsets(vehicle: Vehicle) -> Iterator[str]:
+    """The local time of a time zone is known from its first moment to its last, by the data that is named."""
+    if len({bool(vehicle.time_zone), bool(vehicle.time_zone_data), bool(vehicle.offsets)}) > 1:
+        yield "a time zone has a name, a version of its data, and offsets"
+    moments, offsets = vehicle.offsets[::2], vehicle.offsets[1::2]
+    if vehicle.offsets and (vehicle.utc_offset_us or len(moments) != len(offsets) + 1 or not offsets):
+        yield "the offsets of its local time do not lie between moments"
+    yield from within("number of offsets", len(offsets), 0, limits.MAX_OFFSETS)
+    for one in offsets:
+        yield from within("offset from UTC", one, -limits.DAY, limits.DAY)
+    for moment in moments:
+        yield from within("moment", moment, 0, limits.MAX_VALUE)
+    if any(one >= other for one, other in pairwise(moments)):
+        yield "the moments at which its local time changes are not ascending"
 
 
 def monitors(policy: Policy, scope: Scope) -> Iterator[str]:

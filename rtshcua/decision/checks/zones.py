@@ -12,6 +12,7 @@ from collections.abc import Generator, Iterator, Sequence
 from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.outline import Corner, Leg
 from rtshcua.decision.outline import rings as outline
+from rtshcua.decision.tree import windows_problem
 from rtshcua.model.flat import zone as flat
 from rtshcua.model.flat.limits import DAY, MAX_TABLES, MAX_TOTAL_VERTICES, MAX_VALUE, MAX_ZONES
 from rtshcua.model.flat.policy import Policy
@@ -225,6 +226,11 @@ def _counts(zone: flat.Zone) -> Generator[str, None, int]:
 def _times(zone: flat.Zone) -> Iterator[str]:
     if len(zone.daily) not in (0, 2) or len(zone.dates) not in (0, 2):
         yield "a time has a start and an end"
+    if zone.daily and zone.weekly:
+        yield "it is there at times of the day, or of the week, not both"
+    problem = windows_problem(zone.weekly) if zone.weekly else None
+    if problem is not None:
+        yield problem
     if zone.daily and not (0 <= zone.daily[0] < DAY and 0 <= zone.daily[1] <= DAY):
         yield f"{zone.daily[0]}..{zone.daily[1]} us is no window of a day"
     if zone.dates and not 0 <= zone.dates[0] <= zone.dates[1] <= MAX_VALUE:

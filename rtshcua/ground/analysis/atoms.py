@@ -6,10 +6,10 @@ from math import gcd
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import known
-from rtshcua.decision.times import Daytime
+from rtshcua.decision.times import daily, weekly
 from rtshcua.decision.values import ABSENT, FALSE, MAYBE, TRUE, UNKNOWN, Truth, Value
 from rtshcua.ground.analysis.box import Box, Cell, Form, absent, chosen, clipped, present
-from rtshcua.ground.analysis.moments import cuts, moments_split
+from rtshcua.ground.analysis.moments import moments_split
 from rtshcua.ground.analysis.space import Space
 from rtshcua.model.flat.limits import MAX_MAGNITUDE
 
@@ -141,12 +141,15 @@ class Chosen(Atom):
 
 
 class Local(Atom):
-    """The local time of day is in a window."""
+    """The local time of day, or of the week, is in a window."""
 
-    def __init__(self, window: tree.InWindow, space: Space) -> None:
-        self._window = Daytime(window.start, window.end, space.tables.utc_offset_us)
+    def __init__(self, node: tree.InWindow | tree.InWeek, space: Space) -> None:
+        local = space.tables.local
+        if isinstance(node, tree.InWeek):
+            self._window = weekly(node.windows, local)
+        else:
+            self._window = daily(node.start, node.end, local)
         self._error = space.error
-        self._cuts = cuts(window.start, window.end, space.tables.utc_offset_us)
 
     def enter(self, box: Box, space: Space) -> None:
         """Nothing: every box has its moments."""
@@ -157,7 +160,7 @@ class Local(Atom):
 
     def split(self, box: Box) -> list[Box]:
         """At the ends of the window."""
-        return moments_split(box, self._cuts)
+        return moments_split(box, self._window.changes)
 
 
 class Phase(Atom):

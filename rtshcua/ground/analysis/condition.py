@@ -90,7 +90,7 @@ def _atom(node: tree.Node, space: Space) -> Atom:
             return Phase(space.tables.sets[members])
         case tree.Monitored(monitor):
             return Monitor(monitor)
-        case tree.InWindow():
+        case tree.InWindow() | tree.InWeek():
             return Local(node, space)
         case _:  # a connective, which is no atom
             raise AssertionError(node)

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
-from rtshcua.decision.times import Times
-from rtshcua.decision.values import TRUE, Span, Truth
+from rtshcua.decision.times import Times, timed, windows_of
+from rtshcua.decision.values import TRUE, Truth
 from rtshcua.ground.analysis.box import Box
-from rtshcua.ground.analysis.moments import cuts, moments_split
+from rtshcua.ground.analysis.moments import moments_split
 from rtshcua.ground.analysis.space import Space
 
 
@@ -14,9 +14,9 @@ class Existing:
 
     def __init__(self, zone: int, space: Space) -> None:
         flat = space.plane.zone(zone)
-        self._timed = bool(flat.daily or flat.dates)
-        self._times = Times(flat, space.tables.utc_offset_us)
-        self._daily = cuts(flat.daily[0], flat.daily[1], space.tables.utc_offset_us) if flat.daily else None
+        self._timed = timed(flat)
+        self._times = Times(flat, space.tables.local)
+        self._windows = windows_of(flat, space.tables.local)
         self._dates = (flat.dates[0], flat.dates[1] + 1) if flat.dates else ()
         self._error = space.error
 
@@ -29,7 +29,7 @@ class Existing:
         truth = self.truth(box)
         return moments_split(box, self._cuts) if truth & (truth - 1) else []
 
-    def _cuts(self, span: Span) -> Iterator[int]:
-        yield from (date for date in self._dates if span[0] < date <= span[1])
-        if self._daily is not None:
-            yield from self._daily(span)
+    def _cuts(self, low: int, high: int) -> Iterator[int]:
+        yield from (date for date in self._dates if low < date <= high)
+        for window in self._windows:
+            yield from window.changes(low, high)

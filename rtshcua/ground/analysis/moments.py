@@ -5,23 +5,9 @@ from typing import TypeAlias
 
 from rtshcua.decision.values import Span
 from rtshcua.ground.analysis.box import Box
-from rtshcua.model.flat.limits import DAY
 
-#: the moments within an interval (its first excluded) at which something about the time changes
-Cuts: TypeAlias = Callable[[Span], Iterator[int]]
-
-
-def cuts(start: int, end: int, utc_offset_us: int) -> Cuts:
-    """Where a window of the local day begins, and where it has just ended."""
-
-    def within(span: Span) -> Iterator[int]:
-        low, high = span
-        for edge in (start, min(end, DAY - 1) + 1):
-            moment = low + 1 + (edge - utc_offset_us - low - 1) % DAY
-            if moment <= high:
-                yield moment
-
-    return within
+#: the moments after one and up to another at which something about the time changes
+Cuts: TypeAlias = Callable[[int, int], Iterator[int]]
 
 
 def moments_split(box: Box, where: Cuts) -> list[Box]:
@@ -33,7 +19,7 @@ def moments_split(box: Box, where: Cuts) -> list[Box]:
         half = len(box.utc) // 2
         return [_with(box, box.utc[:half]), _with(box, box.utc[half:])]
     low, high = box.utc[0]
-    at = next(where((low, high)), (low + high + 1) // 2)
+    at = next(where(low, high), (low + high + 1) // 2)
     return [_with(box, ((low, at - 1),)), _with(box, ((at, high),))] if low < at else [box]
 
 

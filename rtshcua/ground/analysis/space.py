@@ -1,15 +1,18 @@
 """What a situation may be: the start of every search."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Tables
 from rtshcua.decision.prepare import PreparedPolicy
+from rtshcua.decision.times import LocalTime
 from rtshcua.decision.values import MISSING, Span, Value, interval, maybe, members
 from rtshcua.ground.analysis.plane import Plane
 from rtshcua.ground.analysis.reported import means_unknown
+from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract
-from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE
+from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE, WEEK
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
 from rtshcua.model.flat.zone import MAX_COORDINATE
@@ -46,7 +49,7 @@ def space_of(prepared: PreparedPolicy, contract: Contract | None, plane: Plane |
     return Space(
         arguments=() if contract is None else arguments_of(contract),
         slots=(*signals(policy), MISSING),
-        utc=_moments(policy),
+        utc=_moments(prepared, contract),
         error=(0, 0),
         phases=frozenset(range(-1, len(policy.phases))),
         monitors=(7,) * len(policy.monitors),
@@ -90,13 +93,44 @@ def _reported(signal: Signal) -> list[int]:
     return [value for value, _ in signal.labels if not means_unknown(signal, value)]
 
 
-def _moments(policy: Policy) -> tuple[Span, ...]:
-    """Moments that show all that the time can do to a condition: a day of each stretch between two dates of zones."""
+def _moments(prepared: PreparedPolicy, contract: Contract | None) -> tuple[Span, ...]:
+    """Moments that show all that the time can do to a condition: of each stretch between two dates of zones a day, or a
+    week where a condition asks for some of its days; and the days in which the clocks are set, once each way.
+    """
+    policy, local = prepared.policy, prepared.tables.local
+    period = WEEK if reads_days(policy, contract) else DAY
     dates = sorted(
         {moment for zone in policy.zones for moment in (zone.dates[:1] + tuple(d + 1 for d in zone.dates[1:]))}
     )
-    if not dates:
-        return ((0, DAY - 1),)
-    starts = [max(dates[0] - DAY, 0), *dates]
-    ends = [*(date - 1 for date in dates), dates[-1] + DAY - 1]
-    return tuple((low, min(high, low + DAY - 1)) for low, high in zip(starts, ends, strict=True) if low <= high)
+    known = local.known()
+    if dates:
+        starts = [max(dates[0] - period, 0), *dates]
+        ends = [*(date - 1 for date in dates), dates[-1] + period - 1]
+    elif known is None:
+        return ((0, period - 1),)
+    else:
+        starts, ends = [local.steady()], [known[1] - 1]
+    found: list[Span] = []
+    for low, high in zip(starts, ends, strict=True):
+        if low <= high:
+            found.append((low, min(high, low + period - 1)))
+            found += _set_clocks(local, low, high)
+    return tuple(found)
+
+
+def _set_clocks(local: LocalTime, low: int, high: int) -> Iterator[Span]:
+    """A day before and a day after the clocks are set in a time, once for each way in which that is done."""
+    seen: set[tuple[int, int]] = set()
+    for moment, before, after in local.changes():
+        if low <= moment <= high and (before, after) not in seen:
+            seen.add((before, after))
+            yield max(low, moment - DAY), min(high, moment + DAY - 1)
+
+
+def reads_days(policy: Policy, contract: Contract | None = None) -> bool:
+    """Whether some condition, or a zone, asks for days of the week."""
+    contracts = policy.contracts if contract is None else (contract, *policy.contracts)
+    clauses = (clause for one in contracts for clause in (*one.require, *one.assume, *one.maintain))
+    whens = (rule.when for rule in policy.rules if rule.when is not None)
+    code = (clause.code[::3] for clause in chain(clauses, whens, (monitor.when for monitor in policy.monitors)))
+    return any(zone.weekly for zone in policy.zones) or any(Op.WEEK_IN in ops for ops in code)

@@ -1,5 +1,6 @@
 """A witness in words: `battery = 20 % and wind.speed = 7 m/s`."""
 
+from rtshcua.decision.times import LocalTime, time_of_week
 from rtshcua.ground.analysis.box import VEHICLE
 from rtshcua.ground.analysis.witness import Witness
 from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Contract
@@ -74,7 +75,11 @@ def _degrees(value: int) -> str:
     return f"{'-' if value < 0 else ''}{whole}.{rest // 100:05d}"
 
 
-def clock(moment_us: int, utc_offset_us: int) -> str:
-    """The local time of day of a moment of UTC, to the minute."""
-    minutes = (moment_us + utc_offset_us) % DAY // 60_000_000
-    return f"{minutes // 60:02d}:{minutes % 60:02d}"
+_DAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+
+
+def clock(moment_us: int, local: LocalTime, *, day: bool = False) -> str:
+    """The local time of day of a moment of UTC, to the minute; with `day`, that of the week too."""
+    time_us = moment_us + local.offset(moment_us)
+    minutes = time_us % DAY // 60_000_000
+    return f"{_DAYS[time_of_week(time_us) // DAY] + ' ' if day else ''}{minutes // 60:02d}:{minutes % 60:02d}"

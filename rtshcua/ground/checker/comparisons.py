@@ -149,6 +149,16 @@ def check_within(scope: Scope, node: Within) -> None:
     if subject is None:
         return
     kind = subject.type.kind
+    if node.days and kind is not Kind.TIME_OF_DAY:
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.span,
+            f"only `local time` is on days of the week, and `{scope.report.text(node.subject.span)}` is "
+            f"{subject.type.describe()}",
+            help="write `local time in 08:00 .. 18:00 on monday .. friday`",
+            labels=declaration_labels(scope, node.subject),
+        )
+        return
     if kind in (Kind.ZONE, Kind.POSITION):
         scope.report.add(
             codes.NOT_COMPARABLE,

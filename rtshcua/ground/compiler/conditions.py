@@ -23,7 +23,6 @@ from rtshcua.ground.compiler.sets import Sets
 from rtshcua.ground.compiler.slots import Slots
 from rtshcua.ground.compiler.zones import ZoneTable
 from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Clause, Op
-from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.policy import MonitorKind
 from rtshcua.model.ir.expression import (
     Comparison,
@@ -134,7 +133,7 @@ class Conditions:
                     numbers.compare(code, node)
             case Within(range=limits):
                 if isinstance(limits.low, TimeOfDay) and isinstance(limits.high, TimeOfDay):
-                    code.add(Op.TIME_IN, limits.low.value % DAY, limits.high.value)
+                    clock.window(code, self.sets, limits.low.value, limits.high.value, node.days)
                 elif not members.between(code, node):
                     numbers.between(code, node)
             case OneOf():
@@ -180,7 +179,7 @@ class Conditions:
             which = self._zones.disjoint if node.negated else self._zones.within
             members = self.sets.of(which(region.name, margin, smaller=smaller, span=node.region.span))
             code.add(Op.ARGUMENT_IN, place.cells[node.subject.name], members)
-            for exists in self._zones.times(region.name):
+            for exists in self._zones.times(region.name, self.sets):
                 code.add(*exists)
                 if node.negated:
                     code.add(Op.NOT)

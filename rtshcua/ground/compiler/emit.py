@@ -14,6 +14,7 @@ _PUSHES = frozenset(
         Op.POSITION_IN_ARGUMENT,
         Op.ARGUMENT_POINT_IN,
         Op.TIME_IN,
+        Op.WEEK_IN,
         Op.PHASE_IN,
         Op.MONITOR,
     }

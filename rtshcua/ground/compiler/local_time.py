@@ -21,7 +21,7 @@ def check_policy(
     context: Context, policy: PolicyDecl, vehicle: VehicleDecl, skills: Iterable[SkillDecl], zones: Iterable[ZoneDecl]
 ) -> None:
     """Report the conditions of a policy, and its zones, that read a local time that nothing is known of."""
-    if vehicle.utc_offset is not None:
+    if _has_clock(vehicle):
         return
     for rule in policy.rules:
         if rule.when is not None:
@@ -38,8 +38,12 @@ def check_policy(
 def check_step(context: Context, vehicle: VehicleDecl, step: Step) -> None:
     """Report the same of a step's own clauses."""
     own = step.overrides
-    if own is not None and vehicle.utc_offset is None:
+    if own is not None and not _has_clock(vehicle):
         _clauses(context, vehicle, (*own.require, *own.assume, *own.maintain))
+
+
+def _has_clock(vehicle: VehicleDecl) -> bool:
+    return vehicle.utc_offset is not None or vehicle.time_zone is not None
 
 
 def _clauses(context: Context, vehicle: VehicleDecl, clauses: Iterable[Clause]) -> None:
@@ -60,6 +64,6 @@ def _report(context: Context, vehicle: VehicleDecl, spans: Iterable[Span], words
             codes.NO_CLOCK,
             span,
             f"{words}, and `{vehicle.name.text}` does not say how far that is from UTC",
-            help="say so in the vehicle, as in `clock utc +02:00`",
+            help='say so in the vehicle, as in `clock "Europe/Berlin"` or `clock utc +02:00`',
             labels=[(vehicle.name.span, "the vehicle, without `clock`")],
         )

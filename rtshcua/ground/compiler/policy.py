@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rtshcua.diagnostics import codes
+from rtshcua.ground.checker import time_zones
 from rtshcua.ground.checker.checks.vehicles import deceleration
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import signal_type
@@ -201,7 +202,7 @@ def _airspace(policy: PolicyDecl, zones: ZoneTable, files: Files) -> Airspace | 
 def _vehicle(
     vehicle: VehicleDecl, position: int, height: int, battery: int, north: int = -1, east: int = -1, down: int = -1
 ) -> Vehicle:
-    braking = vehicle.braking
+    braking, zone = vehicle.braking, vehicle.time_zone
     return Vehicle(
         name=vehicle.name.text,
         identity=vehicle.identity,
@@ -223,4 +224,7 @@ def _vehicle(
         down=down,
         without=tuple(sorted({name.text for name in vehicle.without})),
         speeds=speeds_of(vehicle),
+        time_zone="" if zone is None else zone.text,
+        time_zone_data="" if zone is None else time_zones.VERSION,
+        offsets=() if zone is None else time_zones.offsets(zone.text),
     )

@@ -60,11 +60,12 @@ class Region:
     ceiling_within: int = 0
     daily: tuple[int, ...] = ()
     dates: tuple[int, ...] = ()
+    weekly: tuple[int, ...] = ()
 
     def flat(self, name: str) -> Zone:
         """The region as it is carried on board."""
         kind, data = _flat(self.shape)
-        return Zone(name, kind, self.floor, self.ceiling, data, self.daily, self.dates)
+        return Zone(name, kind, self.floor, self.ceiling, data, self.daily, self.dates, self.weekly)
 
     def sure(self) -> bool:
         """Whether its floor and ceiling are known exactly."""
@@ -78,7 +79,7 @@ class Region:
         floor, ceiling = max(floor, LOWEST), min(ceiling, HIGHEST)
         if floor >= ceiling:
             return None
-        return Region(self.shape, floor, ceiling, daily=self.daily, dates=self.dates)
+        return Region(self.shape, floor, ceiling, daily=self.daily, dates=self.dates, weekly=self.weekly)
 
 
 def _flat(shape: Shape) -> tuple[int, tuple[int, ...]]:

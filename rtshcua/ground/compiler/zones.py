@@ -16,14 +16,16 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.zones import entry_outside
 from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.report import Report
+from rtshcua.ground.compiler.clock import week
 from rtshcua.ground.compiler.ground_plan import GroundPlans
 from rtshcua.ground.compiler.heights import Heights
 from rtshcua.ground.compiler.offset import Unshapely, inner, outer
 from rtshcua.ground.compiler.relations import have_nothing_in_common, lies_within
+from rtshcua.ground.compiler.sets import Sets
 from rtshcua.ground.compiler.shapes import Disc, Point, Region, Shape, bounds, contains
 from rtshcua.ground.compiler.vectors import square
 from rtshcua.model.flat.code import Op
-from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.limits import DAY, WEEK
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Projection, Zone
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
@@ -121,12 +123,14 @@ class ZoneTable:
             self._unshapely(unshapely, number, margin, span)
             return None
 
-    def times(self, name: str) -> Iterator[tuple[Op, int, int]]:
+    def times(self, name: str, sets: Sets) -> Iterator[tuple[Op, int, int]]:
         """Instructions that are true while a declared zone exists; none for one that always does."""
         region = self.regions[self.index[name]]
         if region.daily:
             start, end = region.daily
             yield Op.TIME_IN, start, end
+        if region.weekly:
+            yield Op.WEEK_IN, sets.of(region.weekly), 0
         if region.dates:
             found = self._dated.get(region.dates)
             if found is None:
@@ -146,9 +150,9 @@ class ZoneTable:
             entry = self.place(zone.entry)
             if entry is not None and not _contains(shape, entry):
                 entry_outside(self._report, zone)
-        daily = () if zone.daily is None else (zone.daily.start.value % DAY, zone.daily.end.value)
+        daily, weekly = _hours(zone)
         dates = () if zone.dates is None else (zone.dates.start_us, zone.dates.end_us)
-        return Region(shape, *self._heights.band(zone), daily=daily, dates=dates)
+        return Region(shape, *self._heights.band(zone), daily=daily, dates=dates, weekly=weekly)
 
     def _derive(self, number: int, margin: int, *, smaller: bool, span: Span) -> Zone:
         name = self._declarations[number].name.text
@@ -204,6 +208,17 @@ def derived_name(name: str, margin: int, *, smaller: bool) -> str:
     if margin == 0:
         return f"{'surely' if smaller else 'possibly'}({name})"
     return f"grow({name}, {display(margin, Dimension.LENGTH)})"
+
+
+def _hours(zone: ZoneDecl) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Its times of the day, or those of the week."""
+    hours = zone.daily
+    if hours is None:
+        return (), ()
+    if not hours.days:
+        return (hours.start.value % DAY, hours.end.value), ()
+    windows = week(hours.start.value, hours.end.value, hours.days)
+    return (), () if windows == (0, WEEK) else windows
 
 
 def _contains(shape: Shape, point: Point) -> bool:

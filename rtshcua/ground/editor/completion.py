@@ -17,6 +17,7 @@ from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.places import Asked, Call, Wanted, asked, before, call_of, wanted
 from rtshcua.ground.editor.syntax import Token, inside_comment_or_text
 from rtshcua.ground.editor.targets import Sort
+from rtshcua.ground.language.build.literals import DAYS
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.faults import Parameter as FaultParameter
 from rtshcua.model.faults import parameters
@@ -116,6 +117,7 @@ class _Proposals:
             Wanted.ROLE: (OPERATOR, *symbols.roles), Wanted.PHASE: self._all(Sort.PHASE), Wanted.MESSAGE:
             self.dialect.messages, Wanted.DIALECT_ENUM: self.dialect.enums, Wanted.TYPE: (*TYPES, *symbols.enums),
             Wanted.MISSION: symbols.missions, Wanted.AUTOPILOT: FLAVOURS, Wanted.ENDING: ENDS,
+            Wanted.DAY: DAYS,
             Wanted.NOMINAL: [each.name.text for unit in self.view.units.values() for each in unit.nominals],
         }  # fmt: skip
         match what:

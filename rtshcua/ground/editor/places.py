@@ -46,6 +46,7 @@ class Wanted(Enum):
     MISSION = "mission"
     AUTOPILOT = "autopilot"
     ENDING = "ending"
+    DAY = "day of the week"
 
 
 class Asked(NamedTuple):
@@ -146,6 +147,9 @@ def wanted(written: list[Token]) -> Wanted:
 def _behind(written: list[Token], at: int) -> Wanted:
     """What stands behind a word, which may depend on the word before it."""
     word, before_it = written[at].text, written[at - 1].text if at else ""
+    if word == "on":
+        header = written[0].text == "mission" and all(token.text != "{" for token in written)
+        return Wanted.VEHICLE if header or written[0].text == "nominal" else Wanted.DAY
     if word == "flies" and before_it == "expect":
         return Wanted.SKILL
     return Wanted.ZONE if word == "to" and before_it == "distance" else _BEHIND[word]

@@ -67,6 +67,7 @@ ITEMS = {
     "ceiling": _PART,
     "entry": _PART,
     "daily": _PART,
+    "on_days": _PART,
     "dates": _PART,
     # of vehicles
     "identity": _PART,
@@ -77,6 +78,7 @@ ITEMS = {
     "endurance": _PART,
     "reserve": _PART,
     "clock": _PART,
+    "time_zone": _PART,
     "elevation": _PART,
     "return_at": _PART,
     "brakes": _PART,

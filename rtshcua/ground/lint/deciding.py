@@ -9,6 +9,7 @@ language's doing, and no policy's.
 
 from collections.abc import Iterator, Sequence
 
+from rtshcua.decision.times import LocalTime
 from rtshcua.decision.values import FALSE, MAYBE, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.values import Span as Between
 from rtshcua.ground.analysis.box import clipped, present
@@ -97,7 +98,7 @@ def _narrowed(space: Space, policy: Policy, contract: Contract) -> Space:
     if vehicle.battery >= 0:
         _clip(slots, vehicle.battery, max(1, vehicle.reserve), MAX_VALUE)
     slots = [present(value) if value[2] == MAYBE else value for value in slots]
-    utc = tuple(_days(space.utc, vehicle.utc_offset_us)) or space.utc
+    utc = tuple(_days(space.utc, space.tables.local)) or space.utc
     return space._replace(arguments=tuple(arguments), slots=tuple(slots), utc=utc)
 
 
@@ -110,9 +111,10 @@ def _clip(values: list[Value], at: int, low: int, high: int) -> None:
     values[at] = clipped(values[at], low, high) or values[at]
 
 
-def _days(utc: Sequence[Between], offset: int) -> Iterator[Between]:
-    """Moments without the last minute of each local day."""
-    for low, high in utc:
+def _days(utc: Sequence[Between], local: LocalTime) -> Iterator[Between]:
+    """Moments without the last minute of each local day, where the local time is known."""
+    stretches = ((low, after - 1, offset) for span in utc for low, after, offset in local.stretches(*span))
+    for low, high, offset in stretches:
         for day in range((low + offset) // DAY, (high + offset) // DAY + 1):
             first, last = max(low, day * DAY - offset), min(high, (day + 1) * DAY - offset - _MINUTE - 1)
             if first <= last:

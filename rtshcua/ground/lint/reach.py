@@ -9,6 +9,7 @@ that something is restricted. Lengths in mm.
 from math import isqrt
 from typing import NamedTuple
 
+from rtshcua.decision.times import timed
 from rtshcua.ground.analysis.plane import rings_of
 from rtshcua.ground.compiler.relations import lies_within
 from rtshcua.ground.compiler.shapes import Disc, Region, cornered
@@ -29,7 +30,7 @@ class Reach(NamedTuple):
 
     def belongs_to(self, zone: Zone) -> bool:
         """Whether it is proved that a zone holds all of it, at all times."""
-        if zone.daily or zone.dates or zone.floor > self.down or zone.ceiling < self.up:
+        if timed(zone) or zone.floor > self.down or zone.ceiling < self.up:
             return False
         if zone.shape == CIRCLE:
             x, y, squared = zone.data

@@ -53,7 +53,7 @@ class Meaning:
             "position error": vehicle.position_error,
             "energy": vehicle.endurance_us,
             "reserve": vehicle.reserve,
-            "local time": vehicle.utc_offset_us,
+            "local time": vehicle.time_zone or vehicle.utc_offset_us,
             "brakes": (vehicle.braking, vehicle.reaction_us),
             "return": vehicle.return_altitude,
             "speeds": vehicle.speeds,
@@ -66,7 +66,7 @@ class Meaning:
                 "shape": (zone.shape, () if self._moved else zone.data),
                 "floor": zone.floor,
                 "ceiling": zone.ceiling,
-                "active": (zone.daily, zone.dates),
+                "active": (zone.daily, zone.weekly, zone.dates),
             }
             for zone in self._policy.zones[: self._policy.declared]
         }
@@ -193,6 +193,8 @@ class Meaning:
                 )
             case Op.ARGUMENT_POINT_IN:
                 return a, self._zone(b)
+            case Op.WEEK_IN:
+                return (policy.sets[a],)
             case Op.PHASE_IN:
                 return (frozenset(policy.phases[number] for number in policy.sets[b]),)
             case Op.MONITOR:

@@ -34,6 +34,7 @@ class Op(IntEnum):
     POSITION_IN_ARGUMENT = 29  # ... inside the zone that table b gives for the zone in argument cell a
     ARGUMENT_POINT_IN = 30  # the point in argument cells a, a + 1 (x, y in mm) is inside zone b, at any height
     TIME_IN = 32  # the local time of day is in a .. b us since midnight; a > b wraps over midnight
+    WEEK_IN = 33  # the local time of the week is in one of the windows of set a, as `Zone.weekly` has them
     PHASE_IN = 34  # the invocation's mission phase is one of set b (indexes into the policy's `phases`)
     MONITOR = 36  # push truth of temporal monitor a, as the state has it
     AND = 40  # truth truth -> truth, Kleene

@@ -11,7 +11,9 @@ MAX_SPEED = 1 << 20  # mm/s, about 1,000 m/s
 MAX_DURATION = 1 << 42  # us, about 50 days
 FULL = 10_000  # 1/10000: a full charge
 DAY = 86_400_000_000  # us
+WEEK = 7 * DAY
 
+MAX_OFFSETS = 256  # of the local time, in one policy
 MAX_SLOTS = 72  # with which no request is larger than 1 KiB
 MAX_SILENCE = 3_600_000_000  # us: after which silence of the vehicle a policy may decide at the latest
 MAX_STALE = (1 << 32) - 2  # us, about 71 minutes: the ages of a request saturate just above

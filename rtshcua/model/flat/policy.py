@@ -119,6 +119,10 @@ class Vehicle(Flat, frozen=True):
     with `braking` 0 that is not declared. `north`, `east`, `down` are the slots of the signals of its velocity over
     ground, -1 each without `braking`. `without` are the names of the signals whose sensors are not fitted, ascending.
     Without `speeds`, the way home is counted at the greatest `speed`; the compiler always writes them.
+
+    The local time is `utc_offset_us` from UTC. Where it is that of a time zone, by its IANA name, `time_zone_data` is
+    the version of the time-zone data that it was worked out by, and `offsets` are a moment (UTC, us) and the offset
+    from it on, again and again, and last the moment from which on nothing is known; `utc_offset_us` is 0.
     """
 
     name: str
@@ -141,6 +145,9 @@ class Vehicle(Flat, frozen=True):
     down: int = -1
     without: tuple[str, ...] = ()
     speeds: Speeds | None = None
+    time_zone: str = ""
+    time_zone_data: str = ""
+    offsets: tuple[int, ...] = ()
 
 
 class LeftOut(Flat, frozen=True):

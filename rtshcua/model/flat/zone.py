@@ -79,3 +79,6 @@ class Zone(Flat, frozen=True):
     data: tuple[int, ...]
     daily: tuple[int, ...] = ()  # (start, end): only between these us since local midnight, over midnight if reversed
     dates: tuple[int, ...] = ()  # (start, end): only between these us of UTC since the epoch, both included
+    #: in place of `daily`: (start, end, start, end, ...), strictly ascending: only from each of these us since the
+    #: local Monday 00:00 until before the one after it
+    weekly: tuple[int, ...] = ()

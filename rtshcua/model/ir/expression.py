@@ -86,11 +86,16 @@ class Comparison(Node, kw_only=True):
 
 
 class Within(Node, kw_only=True):
-    """`subject in low .. high`, or `local time in 22:00 .. 06:00` (wraps over midnight)."""
+    """`subject in low .. high`, or `local time in 22:00 .. 06:00` (wraps over midnight).
+
+    `days` are those of the week on which such a window begins (`on monday .. friday`), as of `Daily`; none stands for
+    all. `local time on saturday` is from the first to the last us of the day.
+    """
 
     kind: Literal["within"] = "within"
     subject: Value
     range: Range
+    days: tuple[int, ...] = ()
 
 
 class OneOf(Node, kw_only=True):

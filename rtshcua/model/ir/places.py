@@ -55,10 +55,15 @@ Shape = Circle | Polygon | Corridor | GeoJson | Combination | Reference
 
 
 class Daily(Node):
-    """`active 08:00 .. 18:00`: the zone exists between these local times of every day, over midnight if reversed."""
+    """`active 08:00 .. 18:00`: the zone exists between these local times of every day, over midnight if reversed.
+
+    `days` are those of the week on which these begin (`active 22:00 .. 06:00 on friday`), from 0, a Monday, on,
+    ascending; none stands for all. `active on saturday, sunday` is from the first to the last us of the days.
+    """
 
     start: TimeOfDay
     end: TimeOfDay
+    days: tuple[int, ...] = ()
 
 
 class Dates(Node):
@@ -109,7 +114,8 @@ class VehicleDecl(Node):
     """What the checks, the simulation and "wrong vehicle" need to know of one aircraft; signed with the policy.
 
     `endurance` is the hover time of a full battery, `reserve` the charge that must remain after landing at home,
-    `within` how far the real home may lie from the declared one, `utc_offset` the local time's distance from UTC.
+    `within` how far the real home may lie from the declared one, `utc_offset` the local time's distance from UTC, or
+    `time_zone` the IANA name of its time zone.
     `elevation` (`elevation 408 m above sea within 5 m`) is what altitudes above sea are converted by. `without` are the
     signals of sensors that are not fitted on it. `speeds`, `acceleration`, `wind` and `flight` are what durations and
     charges are proved by; what is not written of them has a default (`rtshcua.ground.compiler.speeds`).
@@ -134,3 +140,4 @@ class VehicleDecl(Node):
     acceleration: Acceleration | None = None
     wind: Quantity | None = None  # the most that it is flown in
     flight: Quantity | None = None  # how long a full battery flies, whatever it flies
+    time_zone: Name | None = None  # `clock "Europe/Berlin"`

@@ -241,6 +241,14 @@ def _shown(policy: Policy) -> list[str]:
     return [row.strip() for row in str(page).splitlines()]
 
 
+def test_the_local_time_and_by_which_data() -> None:
+    policy = case.policy()
+    assert any(row.split() == ["local", "time", "UTC", "+2", "h"] for row in _shown(policy))
+    zoned = replace(policy.vehicle, time_zone="Asia/Kolkata", time_zone_data="2026f", utc_offset_us=0)
+    (row,) = [row for row in _shown(replace(policy, vehicle=zoned)) if row.startswith("local time")]
+    assert row.endswith("Asia/Kolkata, by the time-zone data 2026f")
+
+
 def test_a_bundle_that_makes_no_sense(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     policy = case.policy()
     broken = replace(policy, contingency=tuple(replace(link, skill=99) for link in policy.contingency))

@@ -13,7 +13,7 @@ from rtshcua.decision.contracts import longest
 from rtshcua.decision.links import choose_fallback
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedPolicy
-from rtshcua.decision.times import Dates, Times
+from rtshcua.decision.times import Dates, LocalTime, Times
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.decision.watch import holding, watch
 from rtshcua.model.flat.code import Op
@@ -61,12 +61,12 @@ def test_dates_over_sets(start: int, length: int, spans: list[tuple[int, int]], 
 )
 def test_at_moment_15(daily: tuple[int, ...], dates: tuple[int, ...], through: int, answer: int) -> None:
     zone = Zone("z", CIRCLE, LOWEST, HIGHEST, (0, 0, 1), daily, dates)
-    assert Times(zone, 0).truth(((15, 15),), (0, 0), through) == answer
+    assert Times(zone, LocalTime(0)).truth(((15, 15),), (0, 0), through) == answer
 
 
 def test_a_clock_that_errs() -> None:
     zone = Zone("z", CIRCLE, LOWEST, HIGHEST, (0, 0, 1), (10, 20), (12, 18))
-    answers = [Times(zone, 0).truth(((15, 15),), (error, error), 0) for error in (3, 4)]
+    answers = [Times(zone, LocalTime(0)).truth(((15, 15),), (error, error), 0) for error in (3, 4)]
     assert answers == [T, U]
 
 

@@ -135,6 +135,10 @@ def _with_times(good: ScenarioFlown, number: int, **times: tuple[int, int]) -> A
         ({"daily": (15 * HOUR, 13 * HOUR)}, False),
         ({"daily": (14 * HOUR + 11 * S, 15 * HOUR)}, False),  # a second from now
         ({"daily": (14 * HOUR + 8 * S, 15 * HOUR)}, True),
+        ({"weekly": (13 * HOUR, 15 * HOUR)}, True),  # a Monday
+        ({"weekly": (24 * HOUR, 168 * HOUR)}, False),
+        ({"weekly": (14 * HOUR + 11 * S, 15 * HOUR)}, False),
+        ({"weekly": (1 * HOUR, 2 * HOUR, 13 * HOUR, 15 * HOUR), "dates": (NOON + HOUR, NOON + 2 * HOUR)}, False),
         ({"dates": (NOON, NOON + HOUR)}, True),
         ({"dates": (NOON + HOUR, NOON + 2 * HOUR)}, False),
         ({"dates": (NOON, NOON + HOUR), "daily": (13 * HOUR, 15 * HOUR)}, True),
@@ -144,6 +148,15 @@ def _with_times(good: ScenarioFlown, number: int, **times: tuple[int, int]) -> A
 def test_a_zone_is_kept_out_of_while_it_is_there(good: ScenarioFlown, times: Any, there: bool) -> None:
     policy = _with_times(good, case.flat.SCHOOL, **times)
     found = slugs(judged(good, [sample(10, north_m=250)], policy=policy, utc_us=NOON))
+    assert found == ["outside-fence"] * there
+
+
+@pytest.mark.parametrize(("hours", "there"), [((13, 15), True), ((15, 16), False), ((12, 13), False)])
+def test_a_zone_is_there_by_the_clock_on_the_wall(good: ScenarioFlown, hours: tuple[int, int], there: bool) -> None:
+    policy = _with_times(good, case.flat.SCHOOL, daily=(hours[0] * HOUR, hours[1] * HOUR))
+    offsets = (0, HOUR, NOON - HOUR, 2 * HOUR, NOON + HOUR, HOUR, NOON + 2 * HOUR)
+    zoned = with_fields(policy.vehicle, utc_offset_us=0, time_zone="A/B", time_zone_data="1", offsets=offsets)
+    found = slugs(judged(good, [sample(10, north_m=250)], policy=with_fields(policy, vehicle=zoned), utc_us=NOON))
     assert found == ["outside-fence"] * there
 
 

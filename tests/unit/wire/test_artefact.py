@@ -9,7 +9,7 @@ from virtual.rows import rows
 
 def test_bytes_begin_with_name_and_version():
     data = wrap(names.POLICY, {"a": 1})
-    assert data == b"\x83\x6ertshcua/policy\x06\xa1\x61a\x01"
+    assert data == b"\x83\x6ertshcua/policy\x07\xa1\x61a\x01"
     assert unwrap(names.POLICY, data) == {"a": 1}
 
 
@@ -30,14 +30,14 @@ def test_bytes_begin_with_name_and_version():
         ),
         (wrap(names.MISSION, 1), "unknown-format", "this is `rtshcua/mission`, not `rtshcua/policy`"),
         (
-            cbor.encode(("rtshcua/policy", 7, 1)),
+            cbor.encode(("rtshcua/policy", 8, 1)),
             "unknown-version",
-            "`rtshcua/policy` version 7 is unknown here; only version 6 is read",
+            "`rtshcua/policy` version 8 is unknown here; only version 7 is read",
         ),
         (
             cbor.encode(("rtshcua/policy", 5, 1)),
             "unknown-version",
-            "`rtshcua/policy` version 5 is unknown here; only version 6 is read; "
+            "`rtshcua/policy` version 5 is unknown here; only version 7 is read; "
             "docs/compatibility.md says what reads earlier ones",
         ),
     ],

@@ -1,15 +1,17 @@
-"""E0101, E0106, E0201, E0204, E0310, E0319, E0414, E0502, E1003: what a vehicle declares of itself."""
+"""E0101, E0106, E0201, E0204, E0310, E0319, E0414, E0502, E0518, E1003: what a vehicle declares of itself."""
 
 from rtshcua.decision.checks.policy import MAX_POSITION_ERROR, MAX_REACTION
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
+from rtshcua.ground.checker import time_zones
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import elevation, on_globe, quantity
 from rtshcua.ground.checker.lookup import find_signal
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.well_known import WELL_KNOWN, read_by_all
 from rtshcua.model.flat.limits import FULL, MAX_SPEED
+from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import Acceleration, Braking, VehicleDecl
 from rtshcua.model.quantity import Dimension, display
 
@@ -42,6 +44,19 @@ def check(context: Context) -> None:
         offset = vehicle.utc_offset
         if offset is not None and abs(offset.value) > MAX_OFFSET_US:
             context.report.add(codes.NUMBER_SIZE, offset.span, "local times are at most 14 h before or after UTC")
+        if vehicle.time_zone is not None:
+            _time_zone(context, vehicle.time_zone)
+
+
+def _time_zone(context: Context, name: Name) -> None:
+    known = time_zones.names()
+    if name.text not in known:
+        context.report.add(
+            codes.UNKNOWN_TIME_ZONE,
+            name.span,
+            f"there is no time zone `{name.text}`",
+            help=suggestion(name.text, known) or 'write its IANA name, as in `clock "Europe/Berlin"`',
+        )
 
 
 def _without(context: Context, vehicle: VehicleDecl) -> None:

@@ -31,5 +31,5 @@ def hopeful(node: tree.Node, hope: bool, fixed: frozenset[int] | None = None) ->
         case tree.Inside() | tree.InsideArgument():
             known = fixed is not None
         case _:
-            known = isinstance(node, tree.PointInside | tree.InWindow | tree.InPhase)
+            known = isinstance(node, tree.PointInside | tree.InWindow | tree.InWeek | tree.InPhase)
     return node if known else ALWAYS if hope else NEVER

@@ -74,7 +74,7 @@ class Time(NamedTuple):
 
     def leaves_open(self, zone: Zone) -> bool:
         """Whether a zone may exist, or not, for all that is known."""
-        return self.span is None and bool(zone.dates or (zone.daily and self.known is Known.NOTHING))
+        return self.span is None and bool(zone.dates or ((zone.daily or zone.weekly) and self.known is Known.NOTHING))
 
 
 def _between_dates(ground: Ground, utc: tuple[Span, ...]) -> Iterator[Span]:
@@ -107,7 +107,7 @@ def _at_time(ground: Ground, node: tree.Node, hope: bool, time: Time) -> tree.No
             return tree.Either(_at_time(ground, left, hope, time), _at_time(ground, right, hope, time))
         case tree.Not(operand):
             return tree.Not(_at_time(ground, operand, not hope, time))
-        case tree.InWindow() if time.known is Known.NOTHING:
+        case tree.InWindow() | tree.InWeek() if time.known is Known.NOTHING:
             return ALWAYS if hope else NEVER
         case tree.Inside(number) if time.span is not None and _only_dates(policy.zones[number]):
             zone = policy.zones[number]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
+from rtshcua.ground.analysis.space import reads_days
 from rtshcua.ground.analysis.words import clock, words
 from rtshcua.ground.compiler.proofs.hopeful import Known, refused, refusing
 from rtshcua.ground.compiler.proofs.line import Line
@@ -41,8 +42,8 @@ def _refused(ground: Ground, step: Step, invocation: PreparedInvocation, line: L
         arguments=line.values, utc=(window,), phases=frozenset((invocation.phase,))
     )
     for witness, rule in refused(ground, invocation, space, Known.ALL, line.given):
-        offset = ground.prepared.policy.vehicle.utc_offset_us
-        at, first, last = (clock(moment, offset) for moment in (witness.at.utc[0][0], *window))
+        local, day = ground.prepared.tables.local, reads_days(ground.prepared.policy)
+        at, first, last = (clock(moment, local, day=day) for moment in (witness.at.utc[0][0], *window))
         told = [each.rule for each in invocation.candidates.permits] if rule is None else [rule]
         does = "forbids it"
         if rule is None:

@@ -228,7 +228,7 @@ def _never(ground: Ground, step: Step, broken: Broken, labels: list[tuple[Span, 
     clause, policy = broken.clause, ground.prepared.policy
     at = where = ""
     if broken.moment is not None:
-        at = f" at {clock(broken.moment, policy.vehicle.utc_offset_us)}, local time, when it may begin"
+        at = f" at {clock(broken.moment, ground.prepared.tables.local)}, local time, when it may begin"
     if broken.place is not None:
         where = f": it fails near {position(policy, broken.place)}"
     ground.context.report.add(

@@ -13,10 +13,12 @@ from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
+from rtshcua.decision.times import Window, daily, weekly, windows_of
 from rtshcua.decision.values import AND, FALSE, NOT, TRUE, Span, Truth
 from rtshcua.decision.zones import Place, PreparedZone
 from rtshcua.diagnostics.span import Span as Where
-from rtshcua.ground.analysis.daytime import Arc, Asked, arcs_where
+from rtshcua.ground.analysis.daytime import Asked, arcs_where
+from rtshcua.ground.analysis.space import reads_days
 from rtshcua.ground.analysis.words import clock
 from rtshcua.ground.compiler.proofs.line import Line
 from rtshcua.ground.compiler.proofs.situation import EVER, Ground
@@ -87,13 +89,17 @@ class Period:
 
     def _ask_zone(self, zone: PreparedZone, further: int, *, exists: bool) -> None:
         flat = self.ground.prepared.policy.zones[zone.number]
-        if not flat.daily or flat.dates or self.issued_at_us:
+        if not (flat.daily or flat.weekly) or flat.dates or self.issued_at_us:
             return
-        start, end = day_edges(self.ground, *flat.daily)
-        length = (end - start) % DAY or DAY
-        arc = Arc(start, length) if exists else Arc(end, DAY - length)
-        label = (zone_span(self.ground, zone), f"`{flat.name}` exists at some times of the day only")
-        self._ask(Asked((arc,), self.low, self.high + further, (label,)))
+        windows = windows_of(flat, self.ground.prepared.tables.local)
+        cycle = Cycle.of(self.ground, windows)
+        wanted, (window,) = TRUE if exists else FALSE, windows
+        arcs = arcs_where(
+            cycle.edges(windows), lambda at: window.truth((cycle.at(at),), _EXACT) == wanted, cycle.period
+        )
+        sometimes = "at some times of the day" if flat.daily else "at some times of the week"
+        label = (zone_span(self.ground, zone), f"`{flat.name}` exists {sometimes} only")
+        self._ask(Asked(arcs, self.low, self.high + further, cycle.period, (label,)))
 
     def missing(self, airspace: PreparedAirspace, further: int) -> PreparedZone | None:
         """A zone to stay inside of that may not exist all that time; for a time of issue that is known."""
@@ -105,9 +111,9 @@ class Period:
 
     def from_to(self, further: int) -> str:
         """That time in words; it is known."""
-        offset = self.ground.prepared.policy.vehicle.utc_offset_us
+        local, day = self.ground.prepared.tables.local, reads_days(self.ground.prepared.policy)
         ((low, high),) = self.utc(further)
-        return f"from {clock(low, offset)} to {clock(high, offset)}, local time"
+        return f"from {clock(low, local, day=day)} to {clock(high, local, day=day)}, local time"
 
     def fails(
         self,
@@ -120,23 +126,30 @@ class Period:
         `holds` says of a moment. `through` is how far after it the zones count. What it asks of a time of issue that
         is not known is collected.
         """
-        daily, dates = changes(self.ground, clause, arguments)
+        windows, dates = changes(self.ground, clause, arguments)
         if self.issued_at_us:
             ((low, high),) = self.utc(0)
-            for moment in sorted({low, high, *_moments(daily, dates, low, high, through)}):
+            for moment in sorted({low, high, *_moments(windows, dates, low, high, through)}):
                 if not holds((moment, moment)):
                     return Found(True, moment)
             return Found(False)
-        if not daily and not dates:
+        if not windows and not dates:
             return Found(not holds((0, EVER)))
         if dates:  # on some date it must hold, at some time of the day
-            days = {day for date in dates for day in (date - DAY, date, date + DAY)}
-            moments = {moment for day in days for moment in _moments(daily, dates, day, day + DAY, through)}
+            period = max((window.period for window in windows), default=DAY)
+            starts = {self.ground.prepared.tables.local.steady(), *(date - period for date in dates)}
+            moments = {
+                moment
+                for start in starts
+                for moment in (start, *_moments(windows, dates, start, start + 2 * period + DAY, through))
+            }
             return Found(not any(holds((moment, moment)) for moment in sorted({0, EVER, *dates, *moments})))
-        arcs = arcs_where({each - back for each in daily for back in (0, through)}, lambda at: holds((at, at)))
-        if arcs and arcs[0].length < DAY:
+        cycle = Cycle.of(self.ground, windows)
+        edges = {each - back for each in cycle.edges(windows) for back in (0, through)}
+        arcs = arcs_where(edges, lambda at: holds(cycle.at(at)), cycle.period)
+        if arcs and arcs[0].length < cycle.period:
             label = (self.ground.span(clause), "the contract asks for this")
-            self._ask(Asked(arcs, self.low, self.high, (label,)))
+            self._ask(Asked(arcs, self.low, self.high, cycle.period, (label,)))
         return Found(not arcs)
 
     def timed(self, clause: Clause, arguments: Sequence[int]) -> bool:
@@ -196,10 +209,26 @@ def at_moment(at: Environment, utc: Span) -> Environment:
     return Environment(at.slots, at.arguments, (utc,), (0, 0), at.place, at.monitors, at.phase, at.through)
 
 
-def day_edges(ground: Ground, start: int, end: int) -> tuple[int, int]:
-    """Where a window of the local day begins, and where it has just ended, in us of UTC."""
-    offset = ground.prepared.policy.vehicle.utc_offset_us
-    return (start - offset) % DAY, (min(end, DAY - 1) + 1 - offset) % DAY
+class Cycle(NamedTuple):
+    """What stands for all times: a day or a week, `period` us from `base` on, in which local time has one offset. The
+    nights in which clocks are set are left for the time of issue.
+    """
+
+    base: int
+    period: int
+
+    @classmethod
+    def of(cls, ground: Ground, windows: Sequence[Window]) -> "Cycle":
+        """The one that shows all that some windows do: a week where one of them is of some days of the week."""
+        return cls(ground.prepared.tables.local.steady(), max((each.period for each in windows), default=DAY))
+
+    def at(self, moment: int) -> Span:
+        """A moment of it, in us since it began."""
+        return (self.base + moment, self.base + moment)
+
+    def edges(self, windows: Sequence[Window]) -> list[int]:
+        """When in it something changes of the windows."""
+        return [at - self.base for each in windows for at in each.changes(self.base - 1, self.base + self.period - 1)]
 
 
 def zones_read(ground: Ground, clause: Clause, arguments: Sequence[int]) -> Iterator[int]:
@@ -215,22 +244,23 @@ def zones_read(ground: Ground, clause: Clause, arguments: Sequence[int]) -> Iter
                 yield tables[b][arguments[a]]
 
 
-def changes(ground: Ground, clause: Clause, arguments: Sequence[int]) -> tuple[list[int], list[int]]:
-    """The moments of the day, in us of UTC, and the dates at which something changes that a condition reads."""
-    zones = ground.prepared.policy.zones
-    read = [zones[number] for number in zones_read(ground, clause, arguments)]
-    code = clause.code
-    windows = [
-        *((a, b) for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True) if op == Op.TIME_IN),
-        *((zone.daily[0], zone.daily[1]) for zone in read if zone.daily),
-    ]
-    daily = [edge for window in windows for edge in day_edges(ground, *window)]
-    return daily, [date for zone in read if zone.dates for date in (zone.dates[0], zone.dates[1] + 1)]
+def changes(ground: Ground, clause: Clause, arguments: Sequence[int]) -> tuple[list[Window], list[int]]:
+    """The windows of the local day or week, and the dates, by which something changes that a condition reads."""
+    policy, local = ground.prepared.policy, ground.prepared.tables.local
+    read = [policy.zones[number] for number in zones_read(ground, clause, arguments)]
+    windows: list[Window] = []
+    for op, a, b in zip(clause.code[::3], clause.code[1::3], clause.code[2::3], strict=True):
+        if op == Op.TIME_IN:
+            windows.append(daily(a, b, local))
+        elif op == Op.WEEK_IN:
+            windows.append(weekly(policy.sets[a], local))
+    windows += [window for zone in read for window in windows_of(zone, local)]
+    return windows, [date for zone in read if zone.dates for date in (zone.dates[0], zone.dates[1] + 1)]
 
 
-def _moments(daily: Sequence[int], dates: Sequence[int], low: int, high: int, through: int) -> Iterator[int]:
+def _moments(windows: Sequence[Window], dates: Sequence[int], low: int, high: int, through: int) -> Iterator[int]:
     """The moments of a time at which something changes, for zones count until `through` us after it."""
     for back in {0, through}:
-        for edge in daily:
-            yield from range(low + (edge - back - low) % DAY, high + 1, DAY)
+        for window in windows:
+            yield from (moment - back for moment in window.changes(low + back - 1, high + back))
         yield from (date - back for date in dates if low <= date - back <= high)

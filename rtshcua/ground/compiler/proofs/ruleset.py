@@ -13,6 +13,7 @@ from typing import NamedTuple, TypeAlias
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import ANY
+from rtshcua.decision.times import timed as at_times
 from rtshcua.decision.values import TRUE, UNKNOWN, Truth, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
@@ -234,8 +235,8 @@ class Ruleset:
         found = self._within.get(pair)
         if found is None:
             zones = self.policy.zones
-            timed = any(zones[each].daily or zones[each].dates for each in pair)
-            found = self._within[pair] = not timed and self.space(0).plane.within(*pair)
+            sometimes = any(at_times(zones[each]) for each in pair)
+            found = self._within[pair] = not sometimes and self.space(0).plane.within(*pair)
         return found
 
     def overlaps(self, kind: int) -> Overlaps:
@@ -356,13 +357,9 @@ def _corners(space: Space, exact: Conjunction, cells: Sequence[Cell]) -> Iterabl
 
 
 def timed(code: Code, zones: Sequence[Zone]) -> bool:
-    """Whether code reads the time of day, by itself or through a zone."""
-
-    def at_times(zone: Zone) -> bool:
-        return bool(zone.daily or zone.dates)
-
+    """Whether code reads the time of day or of the week, by itself or through a zone."""
     return any(
-        op == Op.TIME_IN
+        op in (Op.TIME_IN, Op.WEEK_IN)
         or (op == Op.POSITION_IN and at_times(zones[a]))
         or (op == Op.ARGUMENT_POINT_IN and at_times(zones[b]))
         or (op == Op.POSITION_IN_ARGUMENT and any(map(at_times, zones)))

@@ -17,7 +17,7 @@ from rtshcua.ground.compiler.proofs.best import ALWAYS as ALWAYS
 from rtshcua.ground.compiler.proofs.best import hopeful
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, Link
-from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.limits import WEEK
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context as Standing
@@ -78,8 +78,8 @@ class Ground:
         return found
 
     def sets(self, at_us: int = 0) -> Sets:
-        """Any state, at any time within a day from a UTC time; at any time at all where that is not known (0)."""
-        return Sets(self.anything, (0, 0), ((at_us, at_us + DAY - 1 if at_us else EVER),), (0, 0))
+        """Any state, at any time within a week from a UTC time; at any time at all where that is not known (0)."""
+        return Sets(self.anything, (0, 0), ((at_us, at_us + WEEK - 1 if at_us else EVER),), (0, 0))
 
     def prepare(self, invocation: Invocation, phases: tuple[str, ...]) -> PreparedInvocation | Refusal:
         """A step of a mission with these phases, prepared as on board, or what is wrong with it."""

@@ -15,7 +15,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.daytime import Arc, Asked, arcs_where, met_by_some
 from rtshcua.ground.compiler.proofs.hopeful import Known, refused, refusing
 from rtshcua.ground.compiler.proofs.line import Line
-from rtshcua.ground.compiler.proofs.period import Period, along, changes
+from rtshcua.ground.compiler.proofs.period import Cycle, Period, along, changes
 from rtshcua.ground.compiler.proofs.places import may_be_skipped
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.model.ir.missions import Step
@@ -78,24 +78,28 @@ def _asked(ground: Ground, invocation: PreparedInvocation, line: Line, period: P
     arguments = invocation.invocation.arguments
     rules = (*(each.rule for each in invocation.candidates.permits), *refusing(invocation))
     read = [(rule, changes(ground, rule.when, arguments)) for rule in rules if rule.when is not None]
-    clocked = [rule for rule, (daily, _) in read if daily]
+    clocked = [rule for rule, (windows, _) in read if windows]
     if clocked:
         labels = tuple((ground.span(rule), "this reads the time") for rule in clocked)
-        edges = [edge for _, (daily, _) in read for edge in daily]
-        yield Asked(_permitted(ground, invocation, line, edges), period.low, period.high, labels)
+        windows = [window for _, (windows, _) in read for window in windows]
+        cycle = Cycle.of(ground, windows)
+        arcs = _permitted(ground, invocation, line, cycle, cycle.edges(windows))
+        yield Asked(arcs, period.low, period.high, cycle.period, labels)
 
 
-def _permitted(ground: Ground, invocation: PreparedInvocation, line: Line, edges: Sequence[int]) -> tuple[Arc, ...]:
+def _permitted(
+    ground: Ground, invocation: PreparedInvocation, line: Line, cycle: Cycle, edges: Sequence[int]
+) -> tuple[Arc, ...]:
     """When a step is surely permitted with all arguments on its line, as far as these and the time say."""
     space = ground.questions.space(invocation.invocation.skill)._replace(
         arguments=line.values, phases=frozenset((invocation.phase,))
     )
 
     def permitted(moment: int) -> bool:
-        then = space._replace(utc=((moment, moment),))
+        then = space._replace(utc=(cycle.at(moment),))
         return not any(True for _ in refused(ground, invocation, then, Known.DAYTIME, line.given))
 
-    return arcs_where(edges, permitted)
+    return arcs_where(edges, permitted, cycle.period)
 
 
 def _report(

@@ -2,7 +2,7 @@
 
 from typing import Final, assert_never
 
-from rtshcua.ground.handbook.words.values import LOCAL_TIME, between, reference, region, told_value
+from rtshcua.ground.handbook.words.values import LOCAL_TIME, between, on_days, reference, region, told_value, whole_day
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary, bracketed, listed, name, named
 from rtshcua.model.ir.expression import (
     Comparison,
@@ -108,8 +108,11 @@ def _comparison(one: Comparison, names: Vocabulary) -> str:
 def _range(one: Within, names: Vocabulary) -> str:
     low, high = one.range.low, one.range.high
     if isinstance(low, TimeOfDay) and isinstance(high, TimeOfDay):
+        if one.days and whole_day(low.value, high.value):
+            return on_days(one.days)
         over = ", over midnight" if low.value > high.value else ""
-        return f"between {between(one.range, names)}{over}"
+        begins = f", beginning {on_days(one.days)}" if over else f" {on_days(one.days)}"
+        return f"between {between(one.range, names)}{over}{begins if one.days else ''}"
     return f"from {told_value(low, names)} up to {told_value(high, names)}"
 
 

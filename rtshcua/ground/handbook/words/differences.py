@@ -11,7 +11,7 @@ from rtshcua.decision.outline import rings
 from rtshcua.ground.handbook.words.missions import told_cells
 from rtshcua.ground.handbook.words.places import told_fitted, utc
 from rtshcua.ground.handbook.words.rules import told_evidence, told_limits, told_silence
-from rtshcua.ground.handbook.words.values import degrees, time_of_day
+from rtshcua.ground.handbook.words.values import degrees, time_of_day, time_of_week
 from rtshcua.ground.handbook.words.vocabulary import listed, name, named
 from rtshcua.ground.versions.differences import Difference
 from rtshcua.model.flat.code import Clause
@@ -99,7 +99,7 @@ def _vehicle(policy: Policy) -> Mapping[str, Callable[[], str]]:
         "position error": lambda: f"at most {_length(vehicle.position_error)}",
         "energy": lambda: f"{_time(vehicle.endurance_us)} of hovering",
         "reserve": lambda: display(vehicle.reserve, Dimension.RATIO),
-        "local time": lambda: f"UTC {'-' if offset < 0 else '+'}{time_of_day(abs(offset))}",
+        "local time": lambda: vehicle.time_zone or f"UTC {'-' if offset < 0 else '+'}{time_of_day(abs(offset))}",
         "brakes": lambda: (
             f"{display(vehicle.braking, Dimension.SPEED)} less in each second, after a delay of "
             f"{_time(vehicle.reaction_us)}"
@@ -149,8 +149,12 @@ def _shape(zone: Zone, policy: Policy) -> str:
 
 def _active(zone: Zone) -> str:
     daily = f"every day from {' to '.join(map(time_of_day, zone.daily))} local time" if zone.daily else ""
+    weekly = zip(map(time_of_week, zone.weekly[::2]), (time_of_week(end - 1) for end in zone.weekly[1::2]), strict=True)
+    hours = (
+        f"every week from {listed([f'{start} to {end}' for start, end in weekly])} local time" if zone.weekly else ""
+    )
     dates = f"from {' to '.join(map(utc, zone.dates))}" if zone.dates else ""
-    return listed([each for each in (daily, dates) if each]) or "at all times"
+    return listed([each for each in (daily, hours, dates) if each]) or "at all times"
 
 
 def _skill(contract: Contract, policy: Policy) -> Mapping[str, Callable[[], str]]:

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
-from rtshcua.ground.handbook.words.values import coordinates, quantity, time_of_day
+from rtshcua.ground.checker import time_zones
+from rtshcua.ground.handbook.words.values import coordinates, on_days, quantity, time_of_day, whole_day
 from rtshcua.ground.handbook.words.vocabulary import listed, name, named
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import (
@@ -85,7 +86,12 @@ def told_times(zone: ZoneDecl) -> str:
     if zone.daily is not None:
         start, end = zone.daily.start.value, zone.daily.end.value
         over = ", over midnight" if start > end else ""
-        parts.append(f"every day from {time_of_day(start)} to {time_of_day(end)} local time{over}")
+        begins = f"{', beginning' if over else ''} {on_days(zone.daily.days)}" if zone.daily.days else ""
+        if begins and whole_day(start, end):
+            parts.append(f"{on_days(zone.daily.days)}, local time")
+        else:
+            every = "" if begins else "every day "
+            parts.append(f"{every}from {time_of_day(start)} to {time_of_day(end)} local time{over}{begins}")
     if zone.dates is not None:
         parts.append(f"from {utc(zone.dates.start_us)} to {utc(zone.dates.end_us)}")
     return listed(parts) or "at all times"
@@ -141,6 +147,8 @@ def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     if vehicle.utc_offset is not None:
         offset = vehicle.utc_offset.value
         yield "Local time", f"UTC {'-' if offset < 0 else '+'}{time_of_day(abs(offset))}"
+    if vehicle.time_zone is not None:
+        yield "Local time", f"that of {vehicle.time_zone.text}, by the time-zone data {time_zones.VERSION}"
     if vehicle.without:
         signals = named([each.text for each in vehicle.without])
         yield "Not fitted", f"sensors for {signals}; clauses that count only where they are fitted are left out"

@@ -1,5 +1,6 @@
 """Values in words."""
 
+from collections.abc import Sequence
 from typing import Final, assert_never
 
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary, listed, name
@@ -71,6 +72,36 @@ def time_of_day(us: int) -> str:
     """A local time of day."""
     hours, minutes = divmod(us // _MINUTE, 60)
     return f"{hours:02d}:{minutes:02d}"
+
+
+_LAST_US = 24 * 60 * _MINUTE - 1
+_DAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+
+
+def whole_day(start: int, end: int) -> bool:
+    """Whether these are the first and the last moment of a day."""
+    return (start, end) == (0, _LAST_US)
+
+
+def on_days(days: Sequence[int]) -> str:
+    """Days of the week: `on Monday to Friday and Sunday`."""
+    runs: list[list[int]] = []
+    for day in days:
+        if runs and runs[-1][-1] == day - 1:
+            runs[-1].append(day)
+        else:
+            runs.append([day])
+    told: list[str] = []
+    for run in runs:
+        names = [_DAYS[day] for day in run]
+        told += [f"{names[0]} to {names[-1]}"] if len(run) > 2 else names
+    return f"on {listed(told)}"
+
+
+def time_of_week(us: int) -> str:
+    """A local time of the week."""
+    day, time = divmod(us, 24 * 60 * _MINUTE)
+    return f"{_DAYS[day]} {time_of_day(time)}"
 
 
 def reference(text: str, names: Vocabulary) -> str:

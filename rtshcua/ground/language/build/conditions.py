@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.language.build.literals import Literals
+from rtshcua.ground.language.build.literals import Literals, whole_day
 from rtshcua.model.ir.expression import (
     Arithmetic,
     Comparison,
@@ -71,9 +71,14 @@ class Conditions(Literals):
         """`left < right` and the like."""
         return Comparison(span=span, operator=operator, left=left, right=right)
 
-    def within(self, span: Span, subject: Value, range: Range) -> Within:
-        """`subject in low .. high`."""
-        return Within(span=span, subject=subject, range=range)
+    def within(self, span: Span, subject: Value, range: Range, days: tuple[int, ...] | None) -> Within:
+        """`subject in low .. high`, `local time in 08:00 .. 18:00 on monday .. friday`."""
+        return Within(span=span, subject=subject, range=range, days=days or ())
+
+    def within_days(self, span: Span, subject: Value, days: tuple[int, ...]) -> Within:
+        """`local time on saturday, sunday`."""
+        start, end = whole_day(span)
+        return Within(span=span, subject=subject, range=Range(span=span, low=start, high=end), days=days)
 
     def one_of_names(self, span: Span, subject: Value, names: tuple[Name, ...]) -> OneOf:
         """`subject in {a, b}`."""

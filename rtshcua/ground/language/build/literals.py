@@ -35,6 +35,7 @@ MEANT = {
 }  # fmt: skip
 
 DAY = 24 * 60  # minutes
+DAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 
 #: The largest number of each dimension that is kept on board, where it is not `MAX_VALUE`.
 LARGEST = {
@@ -63,6 +64,12 @@ POINTS = {"N": "S", "S": "N", "E": "W", "W": "E"}
 _EXPONENT = re.compile(r"[eE][0-9]*")
 
 LOOK_BACK = 120  # characters before a number in which such a word is looked for
+
+
+def whole_day(span: Span) -> tuple[TimeOfDay, TimeOfDay]:
+    """The first and the last us of a day."""
+    last = DAY * UNITS["min"].numerator - 1
+    return TimeOfDay(span=span, value=0), TimeOfDay(span=span, value=last)
 
 
 class Literals(Base):
@@ -133,6 +140,23 @@ class Literals(Base):
         if value >= DAY or int(minutes) >= 60:
             self.report(OUT_OF_BOUNDS, f"`{text}` is not a time of day", span, "times go from `00:00` to `23:59`")
         return TimeOfDay(span=span, value=value * UNITS["min"].numerator)
+
+    def day(self, span: Span, first: Name, last: Name | None) -> tuple[int, ...]:
+        """`monday`, `monday .. friday`, `friday .. monday`, from 0 on."""
+        start = self._day(first)
+        return (start,) if last is None else tuple((start + n) % 7 for n in range((self._day(last) - start) % 7 + 1))
+
+    def days(self, span: Span, *given: tuple[int, ...]) -> tuple[int, ...]:
+        """`monday .. wednesday, saturday`."""
+        return tuple(sorted({day for days in given for day in days}))
+
+    def _day(self, name: Name) -> int:
+        if name.text in DAYS:
+            return DAYS.index(name.text)
+        near = nearest(name.text, DAYS)
+        help = f"did you mean `{near}`?" if near else f"they are {', '.join(f'`{day}`' for day in DAYS)}"
+        self.report(SYNTAX, f"`{short(name.text)}` is no day of the week", name.span, help)
+        return 0
 
     def moment(self, span: Span, raw: str) -> int:
         """A moment, `"2026-05-01T08:00Z"`, in us since the epoch."""

@@ -62,6 +62,10 @@ class Vehicles(Zones):
         value = -offset.value if sign == "-" else offset.value
         return Part("clock", span, Quantity(span=span, value=value, dimension=Dimension.DURATION))
 
+    def time_zone(self, span: Span, name: str) -> Part:
+        """`clock "Europe/Berlin"`."""
+        return Part("clock", span, Name(span=span, text=name))
+
     def elevation(self, span: Span, altitude: Quantity, within: Quantity | None) -> Part:
         """`elevation 408 m above sea within 5 m`."""
         return Part("elevation", span, (altitude, within))
@@ -107,6 +111,7 @@ class Vehicles(Zones):
         home, within = found["home"].value
         hover, flight = found["energy"].value
         elevation, elevation_within = found["elevation"].value if "elevation" in found else (None, None)
+        clock = found["clock"].value if "clock" in found else None
         self.declare(
             VehicleDecl(
                 span=span,
@@ -119,7 +124,8 @@ class Vehicles(Zones):
                 position_error=found["position error"].value,
                 endurance=hover,
                 reserve=found["reserve"].value,
-                utc_offset=found["clock"].value if "clock" in found else None,
+                utc_offset=clock if isinstance(clock, Quantity) else None,
+                time_zone=clock if isinstance(clock, Name) else None,
                 elevation=elevation,
                 elevation_within=elevation_within,
                 return_altitude=found["return"].value if "return" in found else None,

@@ -5,6 +5,7 @@ from typing import Any, Literal
 from rtshcua.diagnostics.codes import BAD_PERIOD
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.base import Part
+from rtshcua.ground.language.build.literals import DAYS, whole_day
 from rtshcua.ground.language.build.signals import Signals
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name, Node
@@ -68,12 +69,20 @@ class Zones(Signals):
         """`entry 47.3982 N, 8.5466 E`."""
         return Part("entry", span, place)
 
-    def daily(self, span: Span, start: TimeOfDay, end: TimeOfDay) -> Part:
-        """`active 08:00 .. 18:00`."""
+    def daily(self, span: Span, start: TimeOfDay, end: TimeOfDay, days: tuple[int, ...] | None) -> Part:
+        """`active 08:00 .. 18:00`, `active 08:00 .. 18:00 on monday .. friday`."""
         if start.value == end.value:
             help = "leave `active` out if the zone is there all day"
             self.report(BAD_PERIOD, "the zone would be active for no time at all", span, help)
-        return Part(DAILY, span, Daily(span=span, start=start, end=end))
+        return Part(DAILY, span, Daily(span=span, start=start, end=end, days=days or ()))
+
+    def on_days(self, span: Span, days: tuple[int, ...]) -> Part:
+        """`active on saturday, sunday`."""
+        start, end = whole_day(span)
+        if len(days) == len(DAYS):
+            help = "leave `active` out if the zone is always there"
+            self.report(BAD_PERIOD, "the zone would be active on all days of the week", span, help)
+        return Part(DAILY, span, Daily(span=span, start=start, end=end, days=days))
 
     def dates(self, span: Span, start: int, end: int) -> Part:
         """`active "2026-05-01T08:00Z" .. "2026-05-02T18:00Z"`."""

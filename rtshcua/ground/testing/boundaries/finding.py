@@ -144,7 +144,7 @@ def _told(asked: _Asked, scene: Scene) -> str:
             return "the condition over time"
         case tree.InPhase():
             return "the phase"
-        case tree.InWindow():
+        case tree.InWindow() | tree.InWeek():
             return "the time"
         case _:
             return " and ".join(f"`{zone.name}`" for zone in zones_of(asked.question, scene.invocation)) or "the charge"

@@ -1,15 +1,16 @@
-"""Where a condition turns in the course of time: windows of the day, and zones that exist at times."""
+"""Where a condition turns in the course of time: windows of the day or the week, and zones that exist at times."""
 
 from collections.abc import Iterator
 from itertools import pairwise
 
 from rtshcua.decision import tree
+from rtshcua.decision.times import time_of_week
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.ground.testing.boundaries.limits import Limit, tried
 from rtshcua.ground.testing.boundaries.parts import Part, atoms, truth
 from rtshcua.ground.testing.boundaries.places import zones_of
 from rtshcua.ground.testing.boundaries.scene import TIME, Scene
-from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.limits import DAY, WEEK
 
 
 def moments(question: Part, part: Part, scene: Scene) -> Iterator[tuple[str, Limit]]:
@@ -32,8 +33,8 @@ def moments(question: Part, part: Part, scene: Scene) -> Iterator[tuple[str, Lim
 
 def in_time(question: Part, scene: Scene) -> Iterator[str]:
     """The limits that a question should have in the course of time, in words."""
-    windows = isinstance(question.node, tree.InWindow) or any(
-        len(set(zone.daily)) == 2 for zone in zones_of(question, scene.invocation)
+    windows = isinstance(question.node, tree.InWindow | tree.InWeek) or any(
+        len(set(zone.daily)) == 2 or zone.weekly for zone in zones_of(question, scene.invocation)
     )
     if windows:
         yield from ("the start of its hours", "the end of its hours")
@@ -53,14 +54,20 @@ def _words(question: Part, scene: Scene, moment: int, *, opens: bool) -> str:
 
 def _times(part: Part, scene: Scene) -> Iterator[int]:
     """Moments between which nothing turns but for what a step takes: those are found between two of these."""
-    offset = scene.invocation.policy.policy.vehicle.utc_offset_us
-    midnight = scene.now.utc_us - (scene.now.utc_us + offset) % DAY
+    local = scene.now.utc_us + scene.invocation.policy.tables.local.offset(scene.now.utc_us)
+    midnight, monday = scene.now.utc_us - local % DAY, scene.now.utc_us - time_of_week(local)
     daily: list[int] = []
+    weekly: list[int] = []
     for atom in () if part.node is None else atoms(part.node):
         if isinstance(atom, tree.InWindow):
             daily += (atom.start, atom.end)
+        elif isinstance(atom, tree.InWeek):
+            weekly += atom.windows
     for zone in zones_of(part, scene.invocation):
         daily += zone.daily
+        weekly += zone.weekly
         yield from (date + late for date in zone.dates for late in (-DAY // 2, -1, 0, 1, DAY // 2))
     if daily:
         yield from (midnight + time + late for time in (0, *daily, DAY - 1) for late in (-1, 0, 1))
+    if weekly:
+        yield from (monday + time + late for time in (0, *weekly, WEEK - 1) for late in (-1, 0, 1))

@@ -11,7 +11,7 @@ from rtshcua.decision import tree
 from rtshcua.decision.evaluate import build
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import Space, reads_days
 from rtshcua.ground.analysis.witness import Witness
 from rtshcua.ground.testing.boundaries.parts import Part
 from rtshcua.ground.testing.boundaries.scene import Made, Scene, Variable
@@ -181,13 +181,15 @@ def _narrowed(space: Space, kept: dict[Variable, Value | tuple[Value, Value]], s
 
 
 def _of(witness: Witness, variable: Variable, scene: Scene) -> int | tuple[int, int] | None:
-    """The value that a witness has for a variable; None where it is missing. Where no zone has dates, any day will do,
-    so that it is the scene's.
+    """The value that a witness has for a variable; None where it is missing. Where nothing asks for dates or for days
+    of the week, and all days have one offset, any day will do, so that it is the scene's.
     """
     invocation, policy = scene.invocation, scene.invocation.policy.policy
     if variable.at is None:
         moment, now = witness.at.utc[0][0], scene.now.utc_us
-        return moment if any(zone.dates for zone in policy.zones) else now - now % DAY + moment % DAY
+        contract, local = invocation.invocation.contract, invocation.policy.tables.local
+        bound = any(zone.dates for zone in policy.zones) or reads_days(policy, contract) or not local.fixed
+        return moment if bound else now - now % DAY + moment % DAY
     cells = witness.at.arguments if variable.argument else witness.at.slots
     one = cells[variable.at]
     if one == MISSING:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
+from rtshcua.decision.times import local_time
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.testing.boundaries import written
 from rtshcua.ground.testing.boundaries.base import Asker, askers, others, starts, wish
@@ -140,7 +141,7 @@ def _beginning(policy: Policy) -> tuple[State, Now]:
             values[signal.slot : signal.slot + 2] = (0, 0)
     if policy.vehicle.battery != -1:
         values[policy.vehicle.battery] = FULL
-    noon = _THE_DAY + (DAY // 2 - policy.vehicle.utc_offset_us) % DAY
+    noon = _THE_DAY + (DAY // 2 - local_time(policy.vehicle).offset(_THE_DAY)) % DAY
     return State(tuple(values), (0,) * policy.slots), Now(0, noon, 0)
 
 

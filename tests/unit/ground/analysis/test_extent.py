@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, Tables, build
+from rtshcua.decision.times import LocalTime
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Truth, Value, point
 from rtshcua.decision.zones import PreparedZone, WellKnown
 from rtshcua.ground.analysis.enclosing import Enclosing
@@ -21,7 +22,7 @@ TABLES = Tables(
     (),
     (frozenset((1, 3)), frozenset()),
     WellKnown(2, 3, 4, 4, 4, 4, 4),
-    0,
+    LocalTime(0),
 )
 SMALL = st.integers(-3, 9)
 TERMS = st.lists(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, Tables, build
+from rtshcua.decision.times import LocalTime
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interval, maybe, members, point
 from rtshcua.decision.zones import PreparedZone, WellKnown
 from rtshcua.ground.analysis.plane import Plane
@@ -25,13 +26,13 @@ ZONES = (
     Zone("far", POLYGON, LOWEST, HIGHEST, (3, -3, 6, -3, 6, 3, 3, 3), daily=(6 * HOUR, 12 * HOUR)),
     Zone("bar", POLYGON, LOWEST, HIGHEST, (-4, -1, 5, -1, 5, 1, -4, 1)),
 )
-PREPARED = tuple(PreparedZone(number, zone, 0) for number, zone in enumerate(ZONES))
+PREPARED = tuple(PreparedZone(number, zone) for number, zone in enumerate(ZONES))
 TABLES = Tables(
     zones=PREPARED,
     tables=((0, 1, 2, 3), (1, 1, 3, 3)),
     sets=(frozenset({0, 2}), frozenset({1, 7}), frozenset({0})),
     known=WellKnown(2, 3, 1, 4),
-    utc_offset_us=HOUR,
+    local=LocalTime(HOUR),
 )
 #: cells: a number, a number, a choice of zones, a place (two)
 ARGUMENTS: tuple[Value, ...] = (

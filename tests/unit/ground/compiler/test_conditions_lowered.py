@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.decision.prepare import PreparedPolicy, prepare
+from rtshcua.ground.compiler.emit import Code
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
@@ -77,6 +78,8 @@ def shown(code: tuple[int, ...], policy: Policy) -> str:
                 words.append("phase{" + ",".join(policy.phases[member] for member in policy.sets[b]) + "}")
             case Op.TIME_IN:
                 words.append(f"local[{a},{b}]")
+            case Op.WEEK_IN:
+                words.append(f"week{policy.sets[a]}")
             case Op.MONITOR:
                 words.append(f"monitor{a}")
             case Op.POSITION_IN:
@@ -87,8 +90,17 @@ def shown(code: tuple[int, ...], policy: Policy) -> str:
 
 
 H = 3_600_000_000  # us
+NOONS = tuple(24 * H * day + time for day in (0, 4, 5, 6) for time in (12 * H, 13 * H + 1))
 
 CODE = [
+    ("local time in 08:00 .. 18:00 on monday, tuesday", f"week{(8 * H, 18 * H + 1, 32 * H, 42 * H + 1)}"),
+    ("local time on saturday, sunday", f"week{(120 * H, 168 * H)}"),
+    ("local time in 22:00 .. 06:00 on sunday", f"week{(0, 6 * H + 1, 166 * H, 168 * H)}"),
+    (
+        "local time in 12:00 .. 13:00 on friday .. monday",
+        f"week{NOONS}",
+    ),
+    ("local time on monday .. sunday", f"local[0,{24 * H}]"),
     ("height < 20 m", "height 20000 LT"),
     ("height <= up + 5 m", "height up 5000 ADD LE"),
     ("height < 10 m / 3", "height *3 10000 LT"),
@@ -232,3 +244,10 @@ def test_factors_that_are_too_fine_are_counted() -> None:
     (found,) = compiled("obstacle.distance < wind.speed * 333 ms").diagnostics
     assert found.code.id == "E1003"
     assert found.help == "made whole together, its factors add up to 1,333, and at most 512 fit: use rounder ones"
+
+
+def test_how_deep_the_stack_gets_counts_every_atom() -> None:
+    code = Code()
+    for op in (Op.WEEK_IN, Op.TIME_IN, Op.PHASE_IN, Op.MONITOR, Op.KNOWN):
+        code.add(op)
+    assert code.deepest == 5

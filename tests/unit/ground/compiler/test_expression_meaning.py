@@ -17,6 +17,7 @@ from reference.random_expressions import ENUMERATIONS, PHASES, STEP, ZONES, Make
 from rtshcua.decision.evaluate import NO_PHASE, Environment, Tables, build
 from rtshcua.decision.prepare import Limit, PreparedMonitor
 from rtshcua.decision.temporal import initial, observe
+from rtshcua.decision.times import LocalTime
 from rtshcua.decision.tree import Scope as CodeScope
 from rtshcua.decision.tree import parse as parse_code
 from rtshcua.decision.tree import scope_of
@@ -133,7 +134,7 @@ def lowered(node: Condition) -> Lowered | None:
         tables=(),
         sets=tuple(map(frozenset, flat.sets)),
         known=where,
-        utc_offset_us=0,
+        local=LocalTime(0),
     )
     code_scope = scope_of(flat)
 

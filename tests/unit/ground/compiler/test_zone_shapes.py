@@ -16,6 +16,7 @@ from rtshcua.diagnostics.render import render
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.compiler.projection import projection_at
+from rtshcua.ground.compiler.sets import Sets
 from rtshcua.ground.compiler.zones import ZoneTable
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
@@ -186,7 +187,12 @@ def test_arguments_stand_for_zones_of_unsure_height_too() -> None:
 def test_what_lies_within_a_timed_zone_does_while_it_exists() -> None:
     others = "zone part = circle(47.3985 N, 8.5470 E, 30 m)\nzone gone = circle(47.40 N, 8.54 E, 30 m)\n"
     hours, dates = "active 08:00 .. 18:00", 'active "2026-05-01T08:00Z" .. "2026-05-02T18:00Z"'
-    for times, ops in (("", []), (hours, [Op.TIME_IN]), (f"{hours} {dates}", [Op.TIME_IN, Op.POSITION_IN])):
+    for times, ops in (
+        ("", []),
+        (hours, [Op.TIME_IN]),
+        (f"{hours} {dates}", [Op.TIME_IN, Op.POSITION_IN]),
+        (f"{hours} on monday", [Op.WEEK_IN]),
+    ):
         text = f"{YARD} {times}\n{others}".encode()
         loaded = load(["probe.rts"], lambda _, text=text: text, LIBRARY)
         declared = loaded.units[0].zones
@@ -195,8 +201,8 @@ def test_what_lies_within_a_timed_zone_does_while_it_exists() -> None:
         for smaller in (True, False):
             assert table.within("yard", 0, smaller=smaller, span=span) == (0, 1)
             assert table.disjoint("yard", 0, smaller=smaller, span=span) == (2,)
-        assert [op for op, _, _ in table.times("yard")] == ops
-        assert list(table.times("yard")) == list(table.times("yard"))
+        assert [op for op, _, _ in table.times("yard", Sets())] == ops
+        assert list(table.times("yard", Sets())) == list(table.times("yard", Sets()))
 
 
 def test_a_rule_about_a_timed_zone_asks_whether_it_exists() -> None:

@@ -44,6 +44,12 @@ def test_blanks_within_a_line(written: str, meant: str) -> None:
         ("signal a : b = C.d unknown at - 1,x", "signal a : b = C.d  unknown at -1, x"),
         ("zone z=circle(1 N,2 E,3 m)active 08:00..09:00", "zone z = circle(1 N, 2 E, 3 m)  active 08:00 .. 09:00"),
         ("vehicle v { clock utc+02:00 }", "vehicle v { clock utc +02:00 }"),
+        ("vehicle v{clock\"A/B\"}", 'vehicle v { clock "A/B" }'),
+        ("zone z=circle(1 N,2 E,3 m)active on a,b..c", "zone z = circle(1 N, 2 E, 3 m)  active on a, b .. c"),
+        (
+            "zone z=circle(1 N,2 E,3 m)active 8:00..9:00 on a..b",
+            "zone z = circle(1 N, 2 E, 3 m)  active 8:00 .. 9:00 on a .. b",
+        ),
         ("skill s(a:b in 1 m..2 m=1 m,c:one\nof d,e,){}", "skill s(a: b in 1 m .. 2 m = 1 m, c: one of d, e) { }"),
         ("mission m ( ) under p @ 7 on v{}", "mission m() under p@7 on v { }"),
         ("enum e{a=1,b=2,}", "enum e { a = 1, b = 2 }"),

@@ -38,7 +38,9 @@ NAMES = Vocabulary(
 )
 ATOMS = [
     "battery > 35 %", "battery < 20 %", "gps.fix in {fix_3d, dgps, rtk_fixed}", "landed == in_air", "landed != in_air",
-    "local time in 22:00 .. 06:00", "local time in 08:00 .. 18:00", "max(wind.speed, 3 m/s) <= 8 m/s",
+    "local time in 22:00 .. 06:00", "local time in 08:00 .. 18:00", "local time on monday, friday .. sunday",
+    "local time in 22:00 .. 06:00 on friday", "local time in 08:00 .. 18:00 on monday .. friday",
+    "max(wind.speed, 3 m/s) <= 8 m/s",
     "wind.speed in 0 m/s .. 8 m/s", "min(wind.speed, 3 m/s) + 1 m/s < 5 m/s", "target inside yard",
     "target outside grow(pond, 20 m)", "position inside pond", "altitude <= 30 m",
     "battery < 30 % within 5 s of wind.speed > 9 m/s",

@@ -114,6 +114,12 @@ def test_figures_zones_and_skills_are_told_before_and_now(part: Callable[[Path],
     assert told.before == ("speed: at most 5 m/s", "brakes: nothing", "return: nothing")
     assert told.after[0] == "speed: at most 12 m/s"
     assert told.after[2] == "return: at 30 m above home"
+    zoned = replaced(policy.vehicle, time_zone="Asia/Kolkata", utc_offset_us=0)
+    (told,) = changes(everything, vehicle=zoned).values()
+    assert (told.before, told.after) == (("local time: Asia/Kolkata",), ("local time: UTC +02:00",))
+    weekly = replaced(policy.zones[0], daily=(), dates=(), weekly=(8 * 3_600_000_000, 90_000_000_000))
+    (told,) = changes(everything, zones=(weekly, *policy.zones[1:])).values()
+    assert told.before == ("active: every week from Monday 08:00 to Tuesday 00:59 local time",)
     zones = (replaced(policy.zones[0], ceiling=60_000), *policy.zones[1:])
     (told,) = changes(everything, zones=zones).values()
     assert (told.before, told.after) == (("ceiling: 60 m above home",), ("ceiling: 120 m above home",))

@@ -7,6 +7,7 @@ from typing import Any, get_args, get_type_hints
 
 import rtshcua.model.ir as ir
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.checker import time_zones
 from rtshcua.ground.handbook.cases import told_test
 from rtshcua.ground.handbook.subject import within
 from rtshcua.ground.handbook.words.cases import told_nominal
@@ -67,6 +68,17 @@ def condition(text: str) -> Condition:
         ("local time in 08:00 .. 18:00", "the local time is between 08:00 and 18:00"),
         ("local time in 22:00 .. 06:00", "the local time is between 22:00 and 06:00, over midnight"),
         ("local time < 19:00", "the local time is before 19:00"),
+        (
+            "local time in 08:00 .. 18:00 on monday .. friday",
+            "the local time is between 08:00 and 18:00 on Monday to Friday",
+        ),
+        (
+            "local time in 22:00 .. 06:00 on friday",
+            "the local time is between 22:00 and 06:00, over midnight, beginning on Friday",
+        ),
+        ("local time on friday .. monday", "the local time is on Monday and Friday to Sunday"),
+        ("local time on sunday, saturday", "the local time is on Saturday and Sunday"),
+        ("local time on monday .. wednesday, friday", "the local time is on Monday to Wednesday and Friday"),
         ("phase == inspection", "the phase of the mission is `inspection`"),
         (
             "target inside bridge_a",
@@ -229,3 +241,28 @@ def test_whatever_is_changed_in_a_declaration_changes_what_is_told_of_it(everyth
                     silent.append(where)
     assert not silent
     assert tried > 300
+
+
+@rows(
+    ("active", "words"),
+    [
+        ("active 08:00 .. 18:00 on monday", "from 08:00 to 18:00 local time on Monday"),
+        ("active 22:00 .. 06:00 on friday", "from 22:00 to 06:00 local time, over midnight, beginning on Friday"),
+        ("active on saturday, sunday", "on Saturday and Sunday, local time"),
+    ],
+)
+def test_a_zone_on_days_of_the_week(active: str, words: str) -> None:
+    parsed = parse(Source("x.rts", f"zone z = circle(47.1 N, 8.1 E, 9 m) {active}"))
+    assert parsed.diagnostics == ()
+    assert told_times(parsed.unit.zones[0]) == words
+
+
+def test_a_clock_by_the_name_of_a_time_zone() -> None:
+    text = (
+        'vehicle v { identity "v" home 47.1 N, 8.1 E within 1 m speed at most 1 m/s climb at most 1 m/s '
+        'position error 1 m energy 100 % = 9 min hover reserve 9 % clock "Asia/Kolkata" }'
+    )
+    parsed = parse(Source("x.rts", text))
+    assert parsed.diagnostics == ()
+    told = dict(told_vehicle(parsed.unit.vehicles[0]))
+    assert told["Local time"] == f"that of Asia/Kolkata, by the time-zone data {time_zones.VERSION}"

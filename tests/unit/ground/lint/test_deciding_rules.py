@@ -58,6 +58,9 @@ ALL = "permit takeoff by any when altitude <= 40 m permit takeoff by any when al
         ("permit takeoff by any when height <= 1 km", True),
         ("permit takeoff by any when local time in 00:00 .. 23:59", False),
         ("permit takeoff by any when local time in 00:01 .. 23:59", True),
+        ("permit takeoff by any when local time on monday .. sunday", False),
+        ("permit takeoff by any when local time in 00:00 .. 23:59 on monday .. saturday", True),
+        ("permit takeoff by any when local time on monday .. friday or local time on saturday, sunday", False),
         ("permit takeoff by any when battery > 0 %", False),
         ("permit takeoff by any when battery > 15 %", True),
         ("permit takeoff by any when battery > 0 % degrade any when battery < 5 % to return_home", True),
@@ -75,6 +78,12 @@ ALL = "permit takeoff by any when altitude <= 40 m permit takeoff by any when al
 def test_a_policy_that_gates_nothing(rules: str, gates: bool) -> None:
     found = codes(rules, WORLD)
     assert ("E1306" not in found) == gates, found
+
+
+def test_the_last_minute_of_a_day_counts_as_its_own_by_no_clock() -> None:
+    world = WORLD.replace("clock utc +02:00", 'clock "Europe/Zurich"')
+    for times, gates in (("in 00:00 .. 23:59", False), ("in 00:01 .. 23:59", True), ("on monday .. sunday", False)):
+        assert ("E1306" not in codes(f"permit takeoff by any when local time {times}", world)) == gates, times
 
 
 # ---------------------------------------------------------------------------------------------------- E1307

@@ -110,6 +110,22 @@ policy arms version 3 {
     assert Unreached("goto", "forbid", "forbid goto by role pilot when altitude > 13 m", "") in made.unreached
 
 
+def test_hours_on_days_of_the_week_of_a_time_zone_are_reached() -> None:
+    text = (
+        HEAD.replace("clock utc +02:00", 'clock "Europe/Zurich"')
+        + """policy arms version 3 {
+  permit goto by role operator through operator when local time in 12:30 .. 14:30 on monday .. wednesday
+  permit return_home, emergency_land, hover by any
+  contingency return_home, emergency_land
+}
+"""
+    )
+    made = generated(text, "arms.rts", "arms.rts", ("goto",))
+    assert not [about for role, about in named(made) if role == "permit"]
+    for written, moved in (("12:30", "12:31"), ("14:30", "14:31")):
+        assert noticed(made, {"arms.rts": text.replace(written, moved)})
+
+
 def test_hours_and_dates_of_an_airspace_are_reached() -> None:
     shut = "zone shut = circle(47.3990 N, 8.5470 E, 30 m) active 12:30 .. 14:30\n"
     text = (

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.decision.times import time_of_week
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
@@ -87,6 +88,21 @@ def test_a_window_of_the_day_turns_to_the_microsecond() -> None:
         if variable == TIME and isinstance(holds, int) and isinstance(fails, int)
     }
     assert times == {(8 * flat.H, 8 * flat.H - 1), (18 * flat.H, 18 * flat.H + 1)}
+
+
+def test_a_window_of_the_week_turns_to_the_microsecond() -> None:
+    code = flat.clause("times", (Op.WEEK_IN, len(flat.POLICY.sets), 0))
+    offset = flat.POLICY.vehicle.utc_offset_us
+    today = time_of_week(NOW.utc_us + offset) // DAY * DAY
+    week = (today + 8 * flat.H, today + 18 * flat.H)
+    rules = tuple(replace(rule, when=code) if rule.kind == RuleKind.PERMIT else rule for rule in flat.POLICY.rules)
+    here = scene(replace(flat.POLICY, sets=(*flat.POLICY.sets, week), rules=rules))
+    times = {
+        (time_of_week(holds + offset), time_of_week(fails + offset))
+        for variable, holds, fails in turning(here, "permit")
+        if variable == TIME and isinstance(holds, int) and isinstance(fails, int)
+    }
+    assert times == {(week[0], week[0] - 1), (week[1] - 1, week[1])}
 
 
 def test_each_zone_of_an_airspace_has_an_edge_within_what_can_be_written() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
@@ -17,6 +17,7 @@ from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.reading import open_regular, read_regular
+from rtshcua.adapters.store.writing import PRIVATE_FOLDER, make_folder
 from rtshcua.adapters.utc import UtcWatch
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
@@ -240,7 +241,9 @@ def _run_folder(order: Launch, bundle: bytes, clock: LinkClock, *, resumed: bool
     except OSError as error:
         if not resumed:
             raise
-        other = RunFolder(Path(mkdtemp(prefix="rtshcua-runs-")), name=name, bundle=bundle, utc_us=utc_us)
+        fresh = Path(gettempdir(), f"rtshcua-runs-{secrets.token_hex(8)}")
+        make_folder(fresh, mode=PRIVATE_FOLDER)
+        other = RunFolder(fresh, name=name, bundle=bundle, utc_us=utc_us)
         return other, f"`{order.runs}` takes no run ({error.strerror or error}): the log is in `{other.path}`"
 
 

@@ -245,7 +245,7 @@ def invocation(of: Random, policy: Policy) -> Invocation:
     skill = of.choice(SKILLS)
     contract, values = policy.contracts[skill], arguments(of, skill)
     motion = contract.motion
-    path: tuple[int, ...] = {flat.GOTO: values[:2], flat.HOME: of.choice([(), (0, 0)])}.get(skill, ())
+    path: tuple[int, ...] = {flat.GOTO: values[:2], flat.HOME: (0, 0)}.get(skill, ())
     if skill == flat.INSPECT:
         path = survey(of, policy.zones[values[0]]) if values[0] < policy.declared else flat.PATH
     altitude = 0 if motion.altitude == -1 else values[motion.altitude]

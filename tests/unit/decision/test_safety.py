@@ -216,7 +216,7 @@ def test_the_farthest_place_counts_even_if_it_is_the_start() -> None:
 @pytest.mark.parametrize("skill", [HOME, LAND])
 def test_what_ends_on_the_ground_needs_no_way_home_and_no_reserve(skill: int) -> None:
     motion = flat.CONTRACTS[skill].motion
-    step = flat.invocation(3, 2, skill, Plan(motion.kind, (), 0, 0))
+    step = flat.invocation(3, 2, skill, Plan(motion.kind, (0, 0) if skill == HOME else (), 0, 0))
     assert ask(step, values={BATTERY: 800}).reason is (Reason.ADMITTED if skill == HOME else Reason.DEGRADED)
     assert ask(step, values={BATTERY: 799, POSITION_X: 400 * M}).reason is (
         Reason.ENERGY if skill == HOME else Reason.DEGRADED

@@ -204,7 +204,7 @@ TOO_LARGE = [
     ("max(" + ", ".join(["height"] * 129) + ") < 3 m", "E1002"),
     ("obstacle.distance < wind.speed * 333333 us", "E1003"),
     ("max(height, up) < up + gps.accuracy * 512", "E1003"),
-    ("height < 9100000000000 * 1 m", "E1003"),
+    ("height * 2 < 9100000000000 * 1 m + up", "E1003"),
     ("(wind.speed < 513 * wind.speed + 1 m/s) for the last 3 s", "E1003"),
 ]
 
@@ -227,7 +227,7 @@ AUTHORITY = [
     ("phase == a", []),
     ("phase in {b, c}", ["E0703"]),
     ("phase != a", ["E0703"]),
-    ("battery > 50 % for the last 3 s and rising height > 3 m", []),
+    ("battery > 50 % for the last 3 s and rising height > 3 m", ["E0717"]),  # a first step, and none waits
     ("battery > 50 % within 3 s of height > 3 m and up < 20 m", ["E0703"]),
 ]
 

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 from rtshcua.adapters.store.checkout import checkout_of, lies_in
+from rtshcua.adapters.store.reading import walk
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.language.paths import shown
 
@@ -53,6 +54,6 @@ def roots(names: Sequence[str], members: Sequence[Collection[str]]) -> tuple[int
 
 
 def _below(folder: Path) -> Iterable[Path]:
-    for place, folders, files in os.walk(folder):
+    for place, folders, files in walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
         yield from (Path(place, name) for name in files if name.endswith(SOURCE) and not name.startswith("."))

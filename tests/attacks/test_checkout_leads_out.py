@@ -10,6 +10,8 @@ import pytest
 from lsprotocol import types as lsp
 
 from rtshcua import library
+from rtshcua.adapters.files.runs import logs_of
+from rtshcua.adapters.files.witness import logs_in
 from rtshcua.adapters.language_server.session import Session
 from rtshcua.adapters.store import writing
 from rtshcua.adapters.store.checkout import checkout_of, expect_inside
@@ -208,3 +210,23 @@ def test_which_folder_is_a_checkout(here: Path, tmp_path: Path) -> None:
     assert checkout_of(here / "sub") == str(here / "sub")
     assert checkout_of(here / "a.rts") is None
     assert checkout_of("/") is None
+
+
+def test_folders_in_folders_are_gone_into_however_deep(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in (".env", "mine.rts", "mine.geojson"):
+        (here / name).unlink()
+    (here / "a").symlink_to("a")  # where the walk must not end
+    for _ in range(1_100):
+        os.mkdir("d")  # noqa: PTH102
+        os.chdir("d")
+    for name in ("a.rts", "log.jsonl"):
+        Path(name).write_text("zone a = b\n")
+    monkeypatch.chdir(here)
+    for command in (["check"], ["fmt", "--check"], ["test"], ["lint", "--no-cache"]):
+        code, text = said([*command, "."], capsys)
+        assert (code, "E0101" in text) == (ExitCode.DIAGNOSTICS, True), text[-500:]
+    code, text = said(["archive", "add", "."], capsys)
+    assert (code, "log of this program" in text) == (ExitCode.INPUT, True), text[-500:]
+    assert [each.name for each in (*logs_of(Path()), *logs_in(Path()))] == ["log.jsonl"] * 2

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from reference.lint_project import MISSION, POLICY, put
+from rtshcua.adapters.files import git as asking
 from rtshcua.adapters.files.git import NoChanges, changed_files
 from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
@@ -111,3 +112,12 @@ def test_a_repository_of_somebody_else_is_not_looked_into(here: Path, monkeypatc
         with pytest.raises(NoChanges, match="belongs to somebody else") as caught:
             changed_files([Path()])
         assert "safe.directory" in str(caught.value.help)
+
+
+@pytest.mark.parametrize("name", ["index", "HEAD"])
+def test_a_pipe_in_a_repository_is_not_waited_for(here: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(asking, "PATIENCE", 0.5)
+    (here / ".git" / name).unlink()
+    os.mkfifo(here / ".git" / name)
+    with pytest.raises(NoChanges, match=r"git says nothing about .* in 0\.5 s"):
+        changed_files([here], None)

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+#: seconds for one question: the index may be a pipe, for which git waits
+PATIENCE = 120.0
 #: what of git's environment serves whoever runs the command, and starts nothing; the rest says which repository is
 #: meant, whatever the folder, or names programs
 _KEPT = frozenset(
@@ -194,7 +196,11 @@ def _git(*words: str, folder: str, around: _Around) -> bytes:
     command = ["git", *settings, "-C", folder, *words]
     env = {**dict(around), **_QUIET}
     try:
-        done = subprocess.run(command, capture_output=True, check=False, stdin=subprocess.DEVNULL, env=env)
+        done = subprocess.run(
+            command, capture_output=True, check=False, stdin=subprocess.DEVNULL, env=env, timeout=PATIENCE
+        )
+    except subprocess.TimeoutExpired:
+        raise NoChanges(f"git says nothing about `{folder}` in {PATIENCE:g} s", "name the files instead") from None
     except FileNotFoundError:
         raise NoChanges("there is no `git` here to ask what has changed", "install it, or name the files") from None
     except OSError as error:

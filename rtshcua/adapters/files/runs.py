@@ -7,6 +7,7 @@ import msgspec
 
 from rtshcua.adapters.files.evidence import SYSTEM, Disk, EvidenceFile
 from rtshcua.adapters.files.telemetry import TelemetryFile
+from rtshcua.adapters.store.reading import walk
 from rtshcua.adapters.store.writing import make_folder, naming, replace, sync_folder, write_new
 
 BUNDLE, LOG, TELEMETRY, SUMMARY = "mission.bundle", "log.jsonl", "telemetry.tlog", "summary.json"
@@ -19,7 +20,9 @@ def logs_of(given: Path) -> list[Path]:
     if not given.is_dir():
         return [given]
     own = given / LOG
-    return [own] if own.is_file() else sorted(given.rglob(LOG))
+    return (
+        [own] if own.is_file() else sorted(Path(place, LOG) for place, _, _ in walk(given) if Path(place, LOG).exists())
+    )
 
 
 class RunFolder:

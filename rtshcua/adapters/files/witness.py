@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import msgspec
 
 from rtshcua.adapters.files.logs import add_anchors, anchors_path, lines, read_notes
-from rtshcua.adapters.store.reading import open_regular, read_if_there
+from rtshcua.adapters.store.reading import open_regular, read_if_there, walk
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, lock, make_folder, replace, write_new
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.note import parse, split
@@ -168,7 +168,9 @@ class NotCosigned(NamedTuple):
 
 def logs_in(path: Path) -> list[Path]:
     """The logs in a folder and those below it, whatever can be read of them; a file is one itself."""
-    return sorted(log for log in path.rglob("*.jsonl") if not log.is_dir()) if path.is_dir() else [path]
+    if not path.is_dir():
+        return [path]
+    return sorted(Path(place, name) for place, _, files in walk(path) for name in files if name.endswith(".jsonl"))
 
 
 def drop(log: Path, witness: FileWitness, root: Path | None = None) -> Cosigned | NotCosigned:

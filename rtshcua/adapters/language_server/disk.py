@@ -1,12 +1,12 @@
 """Files as the server has them: their URIs and names, and what it reads of the disk. It writes nothing."""
 
-import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
 from rtshcua.adapters.files.readable import Readable
+from rtshcua.adapters.store.reading import walk
 from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.language.paths import shown
 
@@ -25,7 +25,7 @@ def sources(folders: Iterable[str]) -> Iterator[str]:
     """The sources below folders, but for hidden ones, as far as they are not too many."""
     found = 0
     for top in folders:
-        for place, below, files in os.walk(top):
+        for place, below, files in walk(top):
             below[:] = sorted(name for name in below if not name.startswith(".") and name != "node_modules")
             for name in sorted(files):
                 if name.endswith(SOURCE) and not name.startswith("."):

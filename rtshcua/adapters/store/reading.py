@@ -103,3 +103,26 @@ def opened_folder(folder: Path, root: Path | None = None, *, make: int | None = 
         yield handle
     finally:
         os.close(handle)
+
+
+def walk(folder: str | Path) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Each folder from this one down, with the names of the folders and of all else in it, as of `os.walk`: what is
+    taken out of the first is not gone into, no link is, nor what cannot be read. However deep they are: that one goes
+    as deep into itself as they do, and a stranger's may be deeper.
+    """
+    waiting = [os.fspath(folder)]
+    while waiting:
+        place = waiting.pop()
+        folders, files = list[str](), list[str]()
+        with suppress(OSError), os.scandir(place) as entries:
+            for entry in entries:
+                (folders if _is_folder(entry) else files).append(entry.name)
+        yield place, folders, files
+        below = [os.path.join(place, name) for name in folders]  # noqa: PTH118  of each folder of a run
+        waiting += [each for each in reversed(below) if not os.path.islink(each)]  # noqa: PTH114
+
+
+def _is_folder(entry: "os.DirEntry[str]") -> bool:
+    with suppress(OSError):  # a link to itself
+        return entry.is_dir()
+    return False

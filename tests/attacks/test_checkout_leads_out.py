@@ -4,6 +4,7 @@ What they read they would quote in their findings, which a stranger may read in 
 """
 
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -213,8 +214,10 @@ def test_which_folder_is_a_checkout(here: Path, tmp_path: Path) -> None:
 
 
 def test_folders_in_folders_are_gone_into_however_deep(
-    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
+    # pytest would go into itself as often, and leave them
+    request.addfinalizer(lambda: subprocess.run(["rm", "-rf", here / "d"], check=True))
     for name in (".env", "mine.rts", "mine.geojson"):
         (here / name).unlink()
     (here / "a").symlink_to("a")  # where the walk must not end

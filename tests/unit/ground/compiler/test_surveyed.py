@@ -23,7 +23,15 @@ AREAS = {
     "  hole (47.3986 N, 8.5460 E, 47.3986 N, 8.5462 E, 47.3985 N, 8.5462 E, 47.3985 N, 8.5460 E)\n"
     "  ceiling 60 m above home  entry 47.3983 N, 8.5457 E",
 }
-SHIPPED = {name: (CHECKOUT / name).read_text(encoding="utf-8") for name in
+
+
+def shipped(name: str) -> str:
+    """A source that ships; its survey may last so long, and take so much, that each of these can be flown."""
+    text = Path(name).read_text(encoding="utf-8")
+    return text.replace("lasts    at most 2 min", "lasts    at most 8 min").replace("at most 13 %", "at most 40 %")
+
+
+SHIPPED = {name: shipped(str(CHECKOUT / name)) for name in
            ("skills/inspect_area.rts", "policies/bridge_inspection.rts")}  # fmt: skip
 #: the skill that ships with more time and charge, as the areas here are large; and one without a choice of pattern
 LOOK = (
@@ -71,7 +79,7 @@ mission m under bridge_inspection@7 on quad {{
     files = {"/nowhere/m.rts": "\n".join([LOOK, SWEEP, rules, zones, mission])}
     program = load(
         ["/nowhere/m.rts"],
-        lambda name: files[name].encode() if name in files else Path(name).read_bytes(),
+        lambda name: (files[name] if name in files else shipped(name)).encode(),
         str(CHECKOUT),
     )
     found = compile_program(program, dialect.load(), mission=None, issued_at_us=1_700_000_000_000_000)

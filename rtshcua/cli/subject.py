@@ -35,14 +35,20 @@ def unpacked(data: bytes, name: str) -> Subject | ExitCode:
 
 
 def prepared(policy: Policy, mission: Mission) -> Subject | ExitCode:
-    """Both made ready, as on board."""
+    """A policy and a mission, made ready as on board."""
     ready = prepare(policy)
-    invocations = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
-    if isinstance(ready, Refusal) or isinstance(invocations, Refusal):
-        wrong = ready if isinstance(ready, Refusal) else invocations
-        assert isinstance(wrong, Refusal)
-        return fail(ExitCode.INPUT, f"this would be refused on board: {wrong.text}")
-    return Subject(ready, mission, invocations)
+    if isinstance(ready, Refusal):
+        return _refused(ready)
+    return _under(ready, mission)
+
+
+def _under(ready: PreparedPolicy, mission: Mission) -> Subject | ExitCode:
+    invocations = prepare_mission(mission, ready)
+    return _refused(invocations) if isinstance(invocations, Refusal) else Subject(ready, mission, invocations)
+
+
+def _refused(refusal: Refusal) -> ExitCode:
+    return fail(ExitCode.INPUT, f"this would be refused on board: {refusal.text}")
 
 
 def after(subject: Subject, detail: str) -> Subject | ExitCode:
@@ -53,7 +59,7 @@ def after(subject: Subject, detail: str) -> Subject | ExitCode:
         said = recorded_replacement(detail)
     except Untrusted as error:
         return fail(ExitCode.INPUT, f"a replacement in the log: {error}")
-    newer = prepared(subject.policy.policy, said.mission)
+    newer = _under(subject.policy, said.mission)
     if isinstance(newer, ExitCode):
         return newer
     steps = (*subject.invocations[: said.kept], *newer.invocations[said.kept :])

@@ -12,6 +12,7 @@ from rtshcua.decision import tree
 from rtshcua.decision.authority import CLASSES
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
 from rtshcua.decision.values import FALSE, TRUE
+from rtshcua.decision.volume import HOME
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.solve import Goal
@@ -169,6 +170,8 @@ def _sketch(
         path = place
     elif motion.kind == MotionKind.COVER:
         path = asked.space(asker.skill).plane.place({zone: True}, lambda _: True) or (0, 0)
+    elif motion.kind == MotionKind.HOME:
+        path = HOME
     altitude = 0 if motion.altitude == -1 else arguments[motion.altitude]
     speed = 0 if motion.speed == -1 else arguments[motion.speed]
     flat = Invocation(

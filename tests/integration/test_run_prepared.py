@@ -73,6 +73,7 @@ def test_what_a_run_that_died_on_the_ground_left_is_put_back_though_the_next_is_
 
 def test_ctrl_c_on_the_ground_puts_back_what_was_set(ground: Any, port: int) -> None:
     ground.vehicle(port, SPEED, *OWNERS)
+    ground.command = ground.afresh  # as above: else it flies already
     words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
     run = ground.run(ground.bundle(), *words, *SET, speed=SPEED)
     run.until("prepared")

@@ -49,8 +49,8 @@ def agent_bundle(
     It names BUNDLE, SOCKET, the sources and the key by whole paths, and holds no key, no passphrase and no bundle.
     docs/agents.md says how a host takes it up. The sources must make the very policy that BUNDLE has.
 
-    Ends with 0 where it was made, 3 where a file cannot be read, the policy is another one, or files of the same
-    names are there, 4 where BUNDLE is damaged, 74 where it cannot be written.
+    Ends with 0 where it was made, 3 where a file cannot be read or is damaged, the policy is another one, or files of
+    the same names are there, 74 where it cannot be written.
     """
     from rtshcua.adapters.mcp_server.missions import Missions, NoPolicy
 

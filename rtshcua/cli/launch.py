@@ -197,7 +197,7 @@ def launch(order: Launch) -> ExitCode:
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
             told = trust.settle(resumed=resumed)
-            run, elsewhere = _run_folder(order, bundle, clock, resumed=resumed)
+            run, elsewhere = _run_folder(order, loaded, bundle, clock, resumed=resumed)
             feed = view.enter_context(Feed(order.style))
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
@@ -231,11 +231,14 @@ def launch(order: Launch) -> ExitCode:
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
 
 
-def _run_folder(order: Launch, bundle: bytes, clock: LinkClock, *, resumed: bool) -> tuple[RunFolder, str]:
+def _run_folder(
+    order: Launch, loaded: Loaded, bundle: bytes, clock: LinkClock, *, resumed: bool
+) -> tuple[RunFolder, str]:
     """Where the evidence of this run lies, and what there is to tell of it. What comes down keeps it in a temporary
     folder where it cannot lie among the others. Raises OSError.
     """
-    name, utc_us = order.bundle.stem, clock.now().utc_us
+    handed_in = order.wait_s is not None  # under no name of a file
+    name, utc_us = loaded.bundle.mission.name if handed_in else order.bundle.stem, clock.now().utc_us
     try:
         return RunFolder(order.runs, name=name, bundle=bundle, utc_us=utc_us), ""
     except OSError as error:
@@ -328,14 +331,17 @@ def _broken_off(
     order: Launch, past: Past, base: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]
 ) -> tuple[Admitted, Trusted] | None:
     """The bundle of the flight before this run, and under what it is trusted, if that did not end, and the vehicle is
-    in the air still: a restart brings it down, as `run` does that is given the same bundle again. Raises `Refused`, and
-    OSError for a bundle that cannot be read.
+    in the air still: a restart brings it down, as `run` does that is given the same bundle again. No charge lasts
+    longer than `endurance_us` after the last moment at which it could take off: what flies then is somebody else's.
+
+    Raises `Refused`, and OSError for a bundle that cannot be read.
     """
     if past.broken_off is None or not still_flies(vehicle, clock, events):
         return None
     data = read_regular(past.broken_off / BUNDLE, MAX_BUNDLE)
     trusted, _, loaded = _trusting(replace(order, wait_s=None), data, clock, base.in_force.flight)
-    return None if not_opened(order.state, loaded) is None else (Admitted(data, loaded), trusted)
+    landed = clock.now().utc_us > loaded.expires_us + loaded.bundle.policy.vehicle.endurance_us
+    return None if landed or not_opened(order.state, loaded) is None else (Admitted(data, loaded), trusted)
 
 
 def _admit(

@@ -9,7 +9,7 @@ from dataclasses import replace as altered
 from pathlib import Path
 from shutil import rmtree
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import pytest
 from msgspec.structs import replace
@@ -333,6 +333,28 @@ def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, d
         trusted.settle(resumed=False)
     with pytest.raises(Refused):
         launch._trusting(order(dry_run=True), bundle, Late())
+
+
+def test_a_wait_brings_down_its_own_flight_and_none_of_somebody_else_long_after(
+    fleet: KeyStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run died, the vehicle came home otherwise, and later somebody flies it in a mode that is ours too."""
+    monkeypatch.setattr(launch, "BUNDLE", "old.bundle")
+    base = launched(order())
+    past: Any = SimpleNamespace(broken_off=Path.cwd())
+    seen = SimpleNamespace(landed_state=2, airborne=True, armed=True)
+    vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen))
+
+    def found(clock: SystemClock) -> bool:
+        return launch._broken_off(order(), past, base, vehicle, clock, []) is not None
+
+    assert not found(SystemClock()), "nothing of that bundle flew"
+    store = FileReplayStore(state_folder(), QUAD)
+    store.open_once(base.bundle.mission_digest, base.expires_us, 0, base.bundle.policy.name, base.bundle.policy.version)
+    assert found(SystemClock())
+    assert not found(Late())
+    seen.airborne = seen.armed = False
+    assert not found(SystemClock())
 
 
 def replace_mission(base: Loaded) -> Loaded:

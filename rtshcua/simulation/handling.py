@@ -85,8 +85,20 @@ class Handling:
     cruise: float = 5.0
     max_speed: float = 12.0
     descent: float = 1.5
+    return_height: Callable[["Handling", float, float], float] = lambda handling, _away, _up: handling.return_up
+    """How high above home a return flies that begins so far from home, and so high, where the fence lets it."""
     return_up: float = 30.0
-    """The height of the way home."""
+    """The height of the way home, but for one that begins near home."""
+    near_m: float = 10.0
+    """PX4 (RTL_MIN_DIST): from no further away than this the way home is flown inside of the cone."""
+    cone_deg: float = 45.0
+    """PX4 (RTL_CONE_ANG): half the angle at the tip of that cone, which stands on it over home; 0: there is none."""
+    acceptance_m: float = 2.0
+    """PX4 (NAV_ACC_RAD): nearer than this, it counts as there."""
+    cone_slope: float = 3.0
+    """ArduCopter (RTL_CONE_SLOPE): how many metres higher the way home may be for each metre to fly; 0: any."""
+    climb_least: float = 0.0
+    """ArduCopter (RTL_CLIMB_MIN): how much higher than before the way home is at least."""
     return_speed: float = 0.0
     """The speed of the way home; 0: as it flies else."""
     acceleration: float = 3.0

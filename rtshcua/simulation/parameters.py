@@ -16,9 +16,9 @@ INT32 = mavlink.MAV_PARAM_TYPE_INT32
 REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
 _UNNUMBERED = 65_535
 _LEAST = 0.1
-"""No speed or height is set lower than this: the model has no vehicle that stands still in the air or dives. Nothing at
-all may mean something else (`return_speed`).
-"""
+"""No speed or height is set lower than this: the model has no vehicle that stands still in the air or dives."""
+_MAY_BE_ZERO = frozenset({"return_speed", "near_m", "cone_deg", "cone_slope", "climb_least"})
+"""Of these, nothing at all means something."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +94,8 @@ class Parameters:
     def _store(self, parameter: Parameter, value: float) -> None:
         stored = self._values[parameter.name] = value if parameter.type == REAL32 else float(round(value))
         if parameter.attribute is not None:
-            means_else = stored == 0 and parameter.attribute == "return_speed"
-            setattr(self._handling, parameter.attribute, 0.0 if means_else else max(_LEAST, stored / parameter.scale))
+            least = 0.0 if parameter.attribute in _MAY_BE_ZERO else _LEAST
+            setattr(self._handling, parameter.attribute, max(least, stored / parameter.scale))
 
     def _decode(self, raw: float, type_: int) -> float:
         if self._bytewise and type_ == mavlink.MAV_PARAM_TYPE_INT32:

@@ -268,13 +268,20 @@ class Vehicle:
             self.landed = Landed.LANDING
 
     def return_home(self) -> None:
-        """Climbs to the height of the way home, flies home and lands, whatever the mode."""
+        """Climbs to the height of the way home, flies home and lands, whatever the mode. Both autopilots count that
+        height once, from the place above which they climb.
+        """
         if self.flies:
             body = self.body
-            self._hold(_RETURN_CLIMB, max(body.up, min(self.handling.return_up, self.return_under)))
+            self._hold(_RETURN_CLIMB, body.up)
             if self.handling.comes_back:
-                self.target = self.destination = self._believed(body.north, body.east, self.target.up)
+                self.target = self.destination = self._believed(body.north, body.east, body.up)
                 self._steer_to_target()
+            height = self.handling.return_height(self.handling, hypot(self.target.north, self.target.east), body.up)
+            up = max(body.up, min(height, self.return_under))
+            self.target = replace(self.target, up=up)
+            if self.destination is not None:
+                self.destination = replace(self.destination, up=up)
 
     def wait(self, seconds: float) -> None:
         """Keeps its height for so long before it goes on landing."""

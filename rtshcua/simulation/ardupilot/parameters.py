@@ -31,6 +31,9 @@ PARAMETERS = (
     Parameter("MIS_TOTAL", INT16, value=1),
     Parameter("RALLY_TOTAL", INT8),
     Parameter("RTL_ALT", INT32, attribute="return_up", scale=100),
+    Parameter("RTL_ALT_TYPE", INT8),
+    Parameter("RTL_CLIMB_MIN", INT16, attribute="climb_least", scale=100),
+    Parameter("RTL_CONE_SLOPE", attribute="cone_slope"),
     Parameter("RTL_SPEED", INT16, attribute="return_speed", scale=100),
     Parameter("SYSID_MYGCS", INT16, value=255),
     Parameter("SYSID_THISMAV", INT16, value=1),
@@ -83,8 +86,22 @@ _AGILITY = Agility(
 """As measured on recorded flights of ArduCopter 4.7."""
 
 
+_FLATTEST = 0.5
+"""RTL_MIN_CONE_SLOPE: a flatter cone is none."""
+
+
+def _return_height(handling: Handling, away: float, up: float) -> float:
+    """`ModeRTL::compute_return_target` of mode_rtl.cpp, over home, without terrain or rally points."""
+    least = max(0.3, up + handling.climb_least)
+    height = max(handling.return_up, least)
+    if handling.cone_slope >= _FLATTEST:
+        height = min(height, max(away * handling.cone_slope, least))
+    return height
+
+
 HANDLING = Handling(
     agility=_AGILITY,
+    return_height=_return_height,
     climb=2.5,
     takeoff_climb=2.5,
     land_speed=0.5,

@@ -1,5 +1,7 @@
 """PX4's parameters, as far as this vehicle has them, and how it flies."""
 
+from math import radians, tan
+
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.handling import Agility, Handling, Stopping
 from rtshcua.simulation.kinematics import Approach
@@ -32,10 +34,14 @@ PARAMETERS = (
     Parameter("MPC_XY_CRUISE", attribute="cruise"),
     Parameter("MPC_Z_VEL_MAX_DN", attribute="descent"),
     Parameter("MPC_Z_VEL_MAX_UP", attribute="climb"),
-    Parameter("NAV_ACC_RAD", value=2),
+    Parameter("NAV_ACC_RAD", attribute="acceptance_m"),
     Parameter("NAV_DLL_ACT", INT32),
+    Parameter("NAV_MC_ALT_RAD", value=0.8),
     Parameter("NAV_RCL_ACT", INT32, value=2),
+    Parameter("RTL_CONE_ANG", INT32, attribute="cone_deg"),
+    Parameter("RTL_MIN_DIST", attribute="near_m"),
     Parameter("RTL_RETURN_ALT", attribute="return_up"),
+    Parameter("RTL_TYPE", INT32),
     Parameter("SYS_AUTOSTART", INT32, value=4001),
 )
 """In the order of their indices."""
@@ -78,8 +84,21 @@ _AGILITY = Agility(
 """As measured on recorded flights of PX4 v1.16."""
 
 
+def _return_height(handling: Handling, away: float, _up: float) -> float:
+    """`RTL::calculate_return_alt_from_cone_half_angle` and its caller, of rtl.cpp (1.16)."""
+    if not handling.cone_deg:
+        return handling.return_up
+    if away <= handling.acceptance_m:
+        return min(2 * away, handling.return_up)
+    height = handling.return_up
+    if away <= handling.near_m:
+        height = min(height, away / tan(radians(min(max(handling.cone_deg, 1.0), 89.0))))
+    return max(height, 2 * handling.acceptance_m)
+
+
 HANDLING = Handling(
     agility=_AGILITY,
+    return_height=_return_height,
     climb=3.0,
     takeoff_climb=1.5,
     land_speed=0.6,

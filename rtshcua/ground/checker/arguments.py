@@ -7,6 +7,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.scope import Argument, Entry, Scope
+from rtshcua.ground.checker.sizes import named_at
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.checker.values import typed
@@ -149,6 +150,17 @@ def _place(scope: Scope, value: Value) -> Bound | None:
     return None
 
 
+def _wider(scope: Scope, argument: Argument, value: Value, low: bool) -> str:
+    """That a size of the skill would let it have the value, where the end of its range is one."""
+    parameter = argument.declaration
+    owner = next((each for each in scope.symbols.skills.values() if parameter in each.parameters), None)
+    if owner is None or parameter.range is None or value.span.file.endswith(".json"):  # an agent sizes no skill
+        return ""
+    size = named_at(scope.report, owner, (parameter.range.low if low else parameter.range.high).span)
+    written = scope.report.text(value.span)
+    return "" if size is None else f"; with `sizes {owner.name.text}({size} = {written})` it would be inside"
+
+
 def in_range(scope: Scope, argument: Argument, value: Value, constant: int) -> None:
     """Report a number outside of its parameter's range, and the nearest one inside."""
     low, high = argument.low, argument.high
@@ -164,7 +176,7 @@ def in_range(scope: Scope, argument: Argument, value: Value, constant: int) -> N
         value.span,
         f"`{display(constant, dimension)}` is outside of `{parameter.name.text}`'s range "
         f"{display(low, dimension)} .. {display(high, dimension)}",
-        help=f"the nearest value inside is `{nearest}`",
+        help=f"the nearest value inside is `{nearest}`" + _wider(scope, argument, value, constant < low),
         labels=[(parameter.range.span, "the range is declared here")],
         fix=(value.span, nearest, f"write `{nearest}`"),
     )

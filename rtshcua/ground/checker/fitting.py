@@ -5,11 +5,11 @@ from math import floor
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.scope import ENTRY, Argument, Scope
+from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.types import COUNT, EXAMPLES, LENGTH, POSITION, Kind, Type, Typed
 from rtshcua.ground.language.exact import CANONICAL
 from rtshcua.model.ir.expression import Quantity, Reference, Value
-from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.places import ENTRY, ZoneDecl
 from rtshcua.model.ir.signals import SignalDecl
 from rtshcua.model.quantity import UNITS, Datum, Dimension, display
 

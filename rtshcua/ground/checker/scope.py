@@ -11,7 +11,7 @@ from rtshcua.ground.checker.symbols import Symbols, correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, ZONE, Enumeration, Kind, Type, number
 from rtshcua.mavlink.dialect import DATUM
 from rtshcua.model.ir.expression import Coordinates
-from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.places import ENTRY, ZoneDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import Parameter
 from rtshcua.model.quantity import Dimension
@@ -19,7 +19,6 @@ from rtshcua.model.quantity import Dimension
 LOCAL_TIME = "local time"
 #: the mission's phase, as a condition names it
 PHASE = "phase"
-ENTRY = ".entry"
 
 
 @dataclass(frozen=True, slots=True)

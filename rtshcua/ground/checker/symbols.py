@@ -8,6 +8,7 @@ from typing import NamedTuple
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.report import Report
+from rtshcua.ground.checker.sizes import sized
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
@@ -15,7 +16,7 @@ from rtshcua.model.ir.policies import PolicyDecl, TemplateDecl
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.skills import SizesDecl, SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 Declaration = (
@@ -59,6 +60,7 @@ class Symbols:
     `tests` and `scenarios` are those of the file that was asked for, which has them run; they are called by texts, not
     by names.
     `broken` are the names whose declarations have a syntax error: nothing is known of them, and nothing is said.
+    `skills` have the values of their sizes in the places of these; `sizes` is what the program says of them, by skill.
     `ranges` has, of each signal of a number that was found well declared, what it can report.
     """
 
@@ -75,6 +77,8 @@ class Symbols:
     nominals: dict[str, NominalDecl] = field(default_factory=dict)
     roles: dict[str, Name] = field(default_factory=dict)
     roles_again: list[tuple[Name, Name]] = field(default_factory=list)
+    sizes: dict[str, SizesDecl] = field(default_factory=dict)
+    sizes_again: list[tuple[SizesDecl, SizesDecl]] = field(default_factory=list)
     tests: tuple[TestDecl, ...] = ()
     scenarios: tuple[ScenarioDecl, ...] = ()
     broken: frozenset[str] = frozenset()
@@ -96,7 +100,8 @@ class Symbols:
 
 
 def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symbols:
-    """The symbol table of a program; of two declarations of one name the first counts, the second is a duplicate.
+    """The symbol table of a program; of two declarations of one name, or of the sizes of one skill, the first counts,
+    the second is a duplicate.
 
     Units come in the order in which files are reached, those that were asked for first.
     """
@@ -120,6 +125,12 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
             first = symbols.roles.setdefault(role.text, role)
             if first is not role and first.span.file == role.span.file:
                 symbols.roles_again.append((first, role))
+        for sizes in unit.sizes:
+            former = symbols.sizes.setdefault(sizes.skill.text, sizes)
+            if former is not sizes:
+                symbols.sizes_again.append((former, sizes))
+    for name, skill in symbols.skills.items():
+        symbols.declared[name] = symbols.skills[name] = sized(skill, symbols.sizes.get(name))
     return symbols
 
 

@@ -3,23 +3,22 @@
 Otherwise a mission could bring a zone, a signal or a skill of its own under a name that the policy relies on.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.made_of import named
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.scope import ENTRY
 from rtshcua.ground.checker.symbols import WORDS
 from rtshcua.model.ir.expression import Condition, Reference
-from rtshcua.model.ir.places import VehicleDecl
+from rtshcua.model.ir.places import ENTRY, VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
 
 def belongs(
-    context: Context, policy: PolicyDecl, skills: Iterable[SkillDecl], vehicle: VehicleDecl, files: frozenset[str]
+    context: Context, policy: PolicyDecl, skills: Sequence[SkillDecl], vehicle: VehicleDecl, files: frozenset[str]
 ) -> bool:
     """Whether everything that a policy and its skills name is declared in its files; reports what is not, once each."""
     foreign: dict[str, Span] = {}
@@ -47,7 +46,22 @@ def belongs(
             help="import its file in the policy's: a policy is signed with all that it relies on",
             labels=[(declared.name.span, "declared here")],
         )
-    return not foreign
+    return not [each for each in skills if not _own_sizes(context, policy, each, files)] and not foreign
+
+
+def _own_sizes(context: Context, policy: PolicyDecl, skill: SkillDecl, files: frozenset[str]) -> bool:
+    """Whether what is said of a skill's sizes stands in the policy's files; reports what does not."""
+    sizes = context.symbols.sizes.get(skill.name.text)
+    if sizes is None or sizes.span.file in files:
+        return True
+    context.report.add(
+        codes.NOT_IN_POLICY,
+        sizes.skill.span,
+        f"the policy `{policy.name.text}` does not import these sizes of `{skill.name.text}`",
+        help="import this file in the policy's: a policy is signed once for all its missions",
+        labels=[(policy.name.span, "the policy is declared here")],
+    )
+    return False
 
 
 def _of_policy(policy: PolicyDecl) -> Iterator[tuple[str, Span]]:

@@ -71,7 +71,8 @@ def lower_policy(
     table = Files(context.report, names)
     slots = Slots(context)
     well_known = [slots.of(name) for name in read]
-    for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in read), *skills):
+    sizes = [context.symbols.sizes[each.name.text] for each in skills if each.name.text in context.symbols.sizes]
+    for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in read), *skills, *sizes):
         table.index(part.span.file)  # all that the policy rests on is named, quoted or not
     for zone in declared:
         data = context.data.name(zone.shape) if isinstance(zone.shape, GeoJson) else None

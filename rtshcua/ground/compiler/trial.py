@@ -12,7 +12,6 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.scope import ENTRY
 from rtshcua.ground.compiler.conditions import Conditions, Place
 from rtshcua.ground.compiler.files import Files
 from rtshcua.ground.compiler.policy import LoweredPolicy
@@ -22,6 +21,7 @@ from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
 from rtshcua.model.ir.expression import Condition
 from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.quantity import Dimension, display
 
 

@@ -14,7 +14,7 @@ from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.imports import import_paths, quoted
 from rtshcua.ground.editor.meanings import KEYWORDS, REASONS, TYPES
 from rtshcua.ground.editor.pieces import Cut
-from rtshcua.ground.editor.places import Asked, Call, Wanted, asked, before, call_of, wanted
+from rtshcua.ground.editor.places import Asked, Call, Wanted, asked, before, call_of, sizing, wanted
 from rtshcua.ground.editor.syntax import Token, inside_comment_or_text
 from rtshcua.ground.editor.targets import Sort
 from rtshcua.ground.language.build.literals import DAYS
@@ -177,14 +177,17 @@ class _Proposals:
             return
         owner = None if call is None else symbols.skills.get(call.name) or symbols.templates.get(call.name)
         if owner is not None and call is not None:
+            parameters = owner.parameters
+            if isinstance(owner, SkillDecl) and sizing(self.written):
+                parameters = owner.sizes
             if self.written[-1].text in ("(", ","):
-                for each in owner.parameters:
+                for each in parameters:
                     if each.name.text not in call.named:
                         yield Item(f"{each.name.text} = ", "parameter", each.type.text)
-            by_name = {each.name.text: each for each in owner.parameters}
+            by_name = {each.name.text: each for each in parameters}
             place = by_name.get(call.argument or "")
-            if place is None and call.position < len(owner.parameters):
-                place = owner.parameters[call.position]
+            if place is None and call.position < len(parameters):
+                place = parameters[call.position]
             if place is not None:
                 yield from self._fitting(place)
                 return
@@ -240,7 +243,10 @@ class _Proposals:
         symbols = self.symbols
         if names[0] in ("skill", "template", "mission") and len(names) > 1:
             declared = symbols.skills.get(names[1]) or symbols.templates.get(names[1]) or symbols.missions.get(names[1])
-            return tuple(self._written_own()) if declared is None else tuple(map(_Own.of, declared.parameters))
+            if declared is None:
+                return tuple(self._written_own())
+            sizes = declared.sizes if isinstance(declared, SkillDecl) else ()
+            return tuple(map(_Own.of, (*declared.parameters, *sizes)))
         rules = ("permit", "forbid", "confirm", "degrade", "delegate")
         last = max((at for at, name in enumerate(names) if name in rules), default=None)
         skills = [] if last is None else [symbols.skills[each] for each in names[last:] if each in symbols.skills]

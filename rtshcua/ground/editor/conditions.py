@@ -5,13 +5,14 @@ from typing import Any
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.scenarios import OBSTACLE
-from rtshcua.ground.checker.scope import ENTRY, LOCAL_TIME, PHASE
+from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE
 from rtshcua.ground.checker.symbols import Symbols
 from rtshcua.ground.editor.moved import parts
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
 from rtshcua.model.ir.expression import Comparison, OneOf, Reference
 from rtshcua.model.ir.missions import Overrides
 from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.scenarios import AfterStep, Decides, FaultCall, Flies, Keeps, Lands, OnCondition, ScenarioDecl
 from rtshcua.model.ir.skills import ArgumentValue, Parameter, SkillDecl

@@ -101,6 +101,8 @@ def parameter_of(view: View, owner: str, name: str) -> Parameter | None:
     symbols = view.symbols
     declared = symbols.skills.get(owner) or symbols.templates.get(owner) or symbols.missions.get(owner)
     parameters = () if declared is None else declared.parameters
+    if isinstance(declared, SkillDecl):
+        parameters += declared.sizes
     return next((each for each in parameters if each.name.text == name), None)
 
 
@@ -148,7 +150,7 @@ def _signal(signal: SignalDecl, dialect: Dialect | None) -> Iterator[str]:
 def _skill(view: View, skill: SkillDecl) -> Iterator[str]:
     def shown(what: str, quantity: Quantity | None) -> Iterator[str]:
         if quantity is not None:
-            yield f"{what} {view.slice(quantity.span)}"
+            yield f"{what} {display(quantity.value, quantity.dimension)}"
 
     times = [*shown("deadline", skill.deadline), *shown("valid for", skill.validity),
              *shown("lasts at most", skill.duration), *shown("energy at most", skill.energy)]  # fmt: skip

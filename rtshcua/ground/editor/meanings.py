@@ -49,6 +49,7 @@ KEYWORDS: Mapping[str, str] = {
     " link for 30 s contingency` or `continue`: what follows when the vehicle was silent for longer. In a vehicle:"
     " signals whose sensors are not fitted.",
     "fitted": "`where fitted`: the clause, or the rule, is left out for a vehicle without a sensor for what it reads.",
+    "sizes": "Numbers of a skill that a program may set, as in `sizes goto(highest = 120 m)`.",
     "template": "Rules with parameters, which policies `use`.",
     "use": "Puts the rules of a template into the policy, with these arguments.",
     "any": "Every skill, or after `by` every role.",

@@ -15,7 +15,7 @@ from rtshcua.model.ir.policies import Delegation, PolicyDecl, RoleDecl, Rule, Te
 from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import LinkDecl, Parameter, SkillDecl
+from rtshcua.model.ir.skills import LinkDecl, Parameter, SizesDecl, SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 
@@ -26,11 +26,14 @@ def occurrences(symbols: Symbols, unit: Unit) -> tuple[Occurrence, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda each: (each.span.start, each.span.end)))
 
 
-def declarations(unit: Unit) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl | RoleDecl, ...]:
+def declarations(
+    unit: Unit,
+) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl | RoleDecl | SizesDecl, ...]:
     """All declarations of a file, in the order of the text."""
     every: tuple[Any, ...] = (
         *unit.imports, *unit.enums, *unit.signals, *unit.zones, *unit.vehicles, *unit.skills, *unit.templates,
         *unit.policies, *unit.missions, *unit.nominals, *unit.tests, *unit.scenarios, *unit.roles,
+        *unit.sizes,
     )  # fmt: skip
     return tuple(sorted(every, key=lambda each: each.span.start))
 
@@ -55,11 +58,10 @@ class _Walk(Conditions):
                 yield from self.within(node.shape, {})
             case SkillDecl():
                 yield from self._skill(node)
+            case SizesDecl():
+                yield from self._sizes(node)
             case TemplateDecl():
-                scope = self._parameters(node.parameters, node.name.text)
-                yield from self._declared(node.parameters, node.name.text)
-                for rule in node.rules:
-                    yield from self._rule(rule, scope)
+                yield from self._template(node)
             case PolicyDecl():
                 yield from self._policy(node)
             case RoleDecl():
@@ -93,8 +95,11 @@ class _Walk(Conditions):
 
     def _skill(self, skill: SkillDecl) -> Iterator[Occurrence]:
         owner = skill.name.text
-        scope = self._parameters(skill.parameters, owner)
-        yield from self._declared(skill.parameters, owner)
+        sizes = self._parameters(skill.sizes, owner)
+        scope = sizes | self._parameters(skill.parameters, owner)
+        yield from self._declared(skill.parameters, owner, sizes)
+        yield from self._declared(skill.sizes, owner)
+        yield from self.within(tuple(each.size for each in skill.sized), sizes)
         if skill.motion is not None:
             motion = skill.motion
             for name in (motion.target, motion.altitude, motion.speed, motion.pattern, motion.time):
@@ -105,6 +110,17 @@ class _Walk(Conditions):
             yield Occurrence(skill.timing_class.span, Target(Sort.CLASS, skill.timing_class.text))
         for link in skill.fallback:
             yield from self._link(link, scope)
+
+    def _sizes(self, sizes: SizesDecl) -> Iterator[Occurrence]:
+        yield from self.names((sizes.skill,), Sort.DECLARED)
+        for each in sizes.given:
+            yield Occurrence(each.name.span, Target(Sort.PARAMETER, each.name.text, sizes.skill.text))
+
+    def _template(self, template: TemplateDecl) -> Iterator[Occurrence]:
+        scope = self._parameters(template.parameters, template.name.text)
+        yield from self._declared(template.parameters, template.name.text)
+        for rule in template.rules:
+            yield from self._rule(rule, scope)
 
     def _policy(self, policy: PolicyDecl) -> Iterator[Occurrence]:
         for rule in policy.rules:
@@ -170,7 +186,10 @@ class _Walk(Conditions):
             for each in item.items:
                 yield from self._item(each, scope)
 
-    def _declared(self, parameters: Sequence[Parameter], owner: str) -> Iterator[Occurrence]:
+    def _declared(
+        self, parameters: Sequence[Parameter], owner: str, sizes: Scope | None = None
+    ) -> Iterator[Occurrence]:
+        """Parameters; the `sizes` of their skill may be the ends of their ranges, and their defaults."""
         for parameter in parameters:
             name = parameter.name.text
             yield Occurrence(parameter.name.span, Target(Sort.PARAMETER, name, owner), True)
@@ -180,9 +199,9 @@ class _Walk(Conditions):
             elif parameter.type.span.start < parameter.type.span.end:
                 yield Occurrence(parameter.type.span, Target(Sort.TYPE, parameter.type.text))
             if parameter.range is not None:
-                yield from self.within(parameter.range, {})
+                yield from self.within(parameter.range, sizes or {})
             if parameter.default is not None:
-                yield from self.argument(parameter.default, parameter, owner, {})
+                yield from self.argument(parameter.default, parameter, owner, sizes or {})
 
     def _of_skills(self, names: Iterable[Name]) -> dict[str, tuple[Target, ...]]:
         """The parameters of the skills that a rule names; of all skills where it names none."""

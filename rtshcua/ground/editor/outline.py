@@ -14,6 +14,7 @@ from rtshcua.model.ir.policies import RoleDecl
 from rtshcua.model.ir.program import Import
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl
+from rtshcua.model.ir.skills import SizesDecl
 from rtshcua.model.ir.tests import TestDecl
 
 #: what a declaration is, by its first word
@@ -43,12 +44,15 @@ def outline(cut: Cut) -> tuple[Symbol, ...]:
     return tuple(symbol for each in declarations(cut.parsed.unit) for symbol in _symbols(cut, each))
 
 
-def _symbols(cut: Cut, node: Declaration | Import | TestDecl | ScenarioDecl | RoleDecl) -> Iterator[Symbol]:
+def _symbols(cut: Cut, node: Declaration | Import | TestDecl | ScenarioDecl | RoleDecl | SizesDecl) -> Iterator[Symbol]:
     match node:
         case Import():
             return
         case RoleDecl():
             yield from (Symbol(name.text, "role", name.span, name.span) for name in node.names)
+        case SizesDecl(skill=skill):
+            given = tuple(Symbol(each.name.text, "parameter", each.span, each.name.span) for each in node.given)
+            yield Symbol(f"sizes of {skill.text}", "skill", node.span, skill.span, given)
         case _:
             yield _symbol(cut, node)
 

@@ -74,7 +74,7 @@ _BEHIND = {
     "during": Wanted.PHASE, "inside": Wanted.ZONE, "outside": Wanted.ZONE, "airspace": Wanted.ZONE,
     "when": Wanted.VALUE, "require": Wanted.VALUE, "assume": Wanted.VALUE, "maintain": Wanted.VALUE,
     "and": Wanted.VALUE, "or": Wanted.VALUE, "not": Wanted.VALUE, "rising": Wanted.VALUE, "falling": Wanted.VALUE,
-    "without": Wanted.SIGNAL,
+    "without": Wanted.SIGNAL, "sizes": Wanted.SKILL,
     "given": Wanted.SIGNAL, "table": Wanted.SIGNAL, "because": Wanted.REASON, "motion": Wanted.PARAMETER,
     "by": Wanted.SOURCE, "union": Wanted.ZONE, "difference": Wanted.ZONE, "grow": Wanted.ZONE,
     "policy": Wanted.NOTHING, "mission": Wanted.NOTHING, "skill": Wanted.NOTHING, "zone": Wanted.NOTHING,
@@ -181,6 +181,11 @@ def _in_block(outer: list[Token], last: str) -> Wanted:
     if "phase" in said[:1] or "repeat" in said:
         return Wanted.STEP
     return Wanted.COMPARED if "in" in said else Wanted.VALUE
+
+
+def sizing(written: list[Token]) -> bool:
+    """Whether a place is among the sizes that a program gives to a skill."""
+    return bool(written) and written[0].text == "sizes"
 
 
 def call_of(written: list[Token]) -> Call | None:

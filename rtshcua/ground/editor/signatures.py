@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.pieces import Cut
-from rtshcua.ground.editor.places import before, call_of
+from rtshcua.ground.editor.places import before, call_of, sizing
 from rtshcua.ground.editor.syntax import note_before
+from rtshcua.model.ir.skills import SkillDecl
 
 
 class Signature(NamedTuple):
@@ -26,8 +27,11 @@ def signature(view: View, cut: Cut, offset: int) -> Signature | None:
     declared = view.symbols.skills.get(call.name) or view.symbols.templates.get(call.name)
     if declared is None:
         return None
-    parameters = tuple(" ".join(view.slice(each.span).split()) for each in declared.parameters)
-    names = [each.name.text for each in declared.parameters]
+    wanted = declared.parameters
+    if isinstance(declared, SkillDecl) and sizing(before(cut.source.text, offset, since)):
+        wanted = declared.sizes
+    parameters = tuple(" ".join(view.slice(each.span).split()) for each in wanted)
+    names = [each.name.text for each in wanted]
     active = names.index(call.argument) if call.argument in names else call.position
     note = note_before(view.text(declared.span.file), declared.span.start)
     return Signature(f"{call.name}({', '.join(parameters)})", parameters, min(active, len(names)), note)

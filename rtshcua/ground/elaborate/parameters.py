@@ -13,7 +13,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context, Instance
-from rtshcua.ground.checker.scope import ENTRY, Argument
+from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.elaborate.settings import Settings
@@ -21,6 +21,7 @@ from rtshcua.ground.elaborate.substitute import names_in, substitute
 from rtshcua.ground.elaborate.values import bound_value, value_of
 from rtshcua.model.ir.expression import Coordinates, Quantity, Reference, Value
 from rtshcua.model.ir.missions import MissionDecl, Phase
+from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.quantity import display
 
 #: for how many combinations of values a mission is checked

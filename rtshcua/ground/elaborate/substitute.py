@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 
-from rtshcua.ground.checker.scope import ENTRY
 from rtshcua.model.ir.expression import Reference, Value
 from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.ir.policies import Rule
 
 N = TypeVar("N", bound=Node)

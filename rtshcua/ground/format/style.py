@@ -53,6 +53,7 @@ ITEMS = {
     "zone": _style("feature", "hole", cuts=("=", "from")),
     "vehicle": _PART,
     "skill": _PART,
+    "sizes": _PART,
     "role": _PART,
     "template": _PART,
     "policy": _PART,
@@ -103,6 +104,7 @@ ITEMS = {
     "fallback": _PART,
     "energy": _PART,
     "record": _PART,
+    "sized": _style("during"),
     # of policies and templates
     "permit": _RULE,
     "forbid": _RULE,
@@ -159,7 +161,7 @@ CALLS = frozenset(
     {"<NAME>", "<LINK_NAME>", "<FAULT>", "<FUNCTION>", "<COMBINE>", "<_GROW>", "<_CIRCLE>", "<_POLYGON>", "<_CORRIDOR>"}
 )
 #: other words before an opening bracket of a list
-LISTS = CALLS | {"hole"}
+LISTS = CALLS | {"hole", "sizes"}
 #: what a number may follow as its sum's or product's left side; after anything else a sign is the number's own
 OPERANDS = frozenset(
     {"<NAME>", "<NUMBER>", "<UNIT>", "<TIME_OF_DAY>", "<LOCAL_TIME>", "<LINK_NAME>", ")", "home", "sea", "E", "W"}

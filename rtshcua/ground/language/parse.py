@@ -24,7 +24,7 @@ from rtshcua.model.ir.policies import PolicyDecl, RoleDecl, TemplateDecl
 from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.skills import SizesDecl, SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 T = TypeVar("T", bound=Node)
@@ -142,4 +142,5 @@ def _unit(source: Source, declarations: list[Node]) -> Unit:
         tests=of(TestDecl),
         scenarios=of(ScenarioDecl),
         roles=of(RoleDecl),
+        sizes=of(SizesDecl),
     )

@@ -81,7 +81,7 @@ class _Needs:
         names = {name for file in files for name in self.declared[file]}
         units = [self._units[file] for file in files]
         implied = bool(names & WELL_KNOWN.keys()) or any(
-            each.zones or each.vehicles or (each.skills and self._any) for each in units
+            each.zones or each.vehicles or each.sizes or (each.skills and self._any) for each in units
         )
         return any((implied and unit.policies) or names & self._mentioned[unit.file] for unit in by)
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from rtshcua.ground.checker.scope import ENTRY
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.ir.skills import Parameter
 from rtshcua.model.ir.tests import Named
@@ -31,7 +31,7 @@ def mentioned_by(unit: Unit) -> frozenset[str]:
 def _declarations(unit: Unit) -> Iterator[Node]:
     yield from (*unit.enums, *unit.signals, *unit.zones, *unit.vehicles)
     yield from (*unit.skills, *unit.templates, *unit.policies, *unit.missions)
-    yield from (*unit.nominals, *unit.tests, *unit.scenarios)
+    yield from (*unit.nominals, *unit.tests, *unit.scenarios, *unit.sizes)
 
 
 def _mentioned(node: Any, found: set[str]) -> None:

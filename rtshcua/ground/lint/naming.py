@@ -45,6 +45,8 @@ def _names(subject: Subject, unit: Unit) -> Iterator[Name]:
         for parameter in owner.parameters:
             yield parameter.name
             yield from (choice for choice in parameter.choices if choice.text not in subject.symbols.declared)
+    for skill in unit.skills:
+        yield from (size.name for size in skill.sizes)
     for mission in unit.missions:
         yield from (phase.name for phase in mission.phases)
 

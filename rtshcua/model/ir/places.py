@@ -5,6 +5,9 @@ from typing import Literal
 from rtshcua.model.ir.expression import Coordinates, Quantity, Reference, TimeOfDay
 from rtshcua.model.ir.node import Name, Node
 
+#: after the name of a zone: the place in it to fly to
+ENTRY = ".entry"
+
 
 class Circle(Node, kw_only=True):
     """All points nearer to `center` than `radius`."""

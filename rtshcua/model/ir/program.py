@@ -6,7 +6,7 @@ from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl, RoleDecl, TemplateDecl
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.ir.skills import SizesDecl, SkillDecl
 from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 
@@ -33,3 +33,4 @@ class Unit(Node):
     tests: tuple[TestDecl, ...] = ()
     scenarios: tuple[ScenarioDecl, ...] = ()
     roles: tuple[RoleDecl, ...] = ()
+    sizes: tuple[SizesDecl, ...] = ()

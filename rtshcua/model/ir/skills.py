@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from rtshcua.model.ir.expression import Condition, Quantity, Range, Value
+from rtshcua.model.ir.expression import Condition, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name, Node
 
 
@@ -59,8 +59,19 @@ class Clause(Node):
     where_fitted: bool = False
 
 
-class SkillDecl(Node):
-    """A skill contract. None or an empty tuple means: not written (the checker says which fields must be)."""
+class Sized(Node):
+    """`lasts at most longest`: a part of a contract whose amount is one of the skill's sizes."""
+
+    part: Literal["deadline", "validity", "duration", "grace", "energy"]
+    size: Reference
+
+
+class SkillDecl(Node, kw_only=True):
+    """A skill contract. None or an empty tuple means: not written (the checker says which fields must be).
+
+    `sizes` are numbers that a program may set for it (`SizesDecl`), each with a default; `sized` are the parts that
+    name one. As `checker/symbols.py` hands a skill out, the values stand in their places and `sized` is empty.
+    """
 
     name: Name
     parameters: tuple[Parameter, ...]
@@ -77,3 +88,19 @@ class SkillDecl(Node):
     fallback: tuple[LinkDecl, ...]
     energy: Quantity | None
     record: tuple[Name, ...]
+    sizes: tuple[Parameter, ...] = ()
+    sized: tuple[Sized, ...] = ()
+
+
+class GivenSize(Node):
+    """`highest = 120 m`."""
+
+    name: Name
+    value: Quantity
+
+
+class SizesDecl(Node):
+    """`sizes goto(highest = 120 m, longest = 6 min)`: what a program says of a skill's sizes."""
+
+    skill: Name
+    given: tuple[GivenSize, ...]

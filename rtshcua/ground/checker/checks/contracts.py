@@ -66,7 +66,9 @@ def _complete(context: Context, skill: SkillDecl) -> None:
         "energy at most": skill.energy is not None,
         "fallback": bool(skill.fallback) or kind == "land",
     }
-    missing = [f"`{field}`" for field, present in written.items() if not present]
+    words = {"validity": "valid for", "duration": "lasts at most", "energy": "energy at most"}
+    named = {words.get(each.part, each.part) for each in skill.sized}  # by a size that has no value, which is reported
+    missing = [f"`{field}`" for field, present in written.items() if not present and field not in named]
     if missing:
         context.report.add(
             codes.INCOMPLETE_CONTRACT,

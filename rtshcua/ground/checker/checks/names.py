@@ -33,7 +33,10 @@ def check(context: Context) -> None:
             _hides(context, member.name, "enumerator")
     owners: list[SkillDecl | TemplateDecl] = [*symbols.skills.values(), *symbols.templates.values()]
     for owner in owners:
-        _distinct(context, (parameter.name for parameter in owner.parameters), "parameter")
+        sizes = owner.sizes if isinstance(owner, SkillDecl) else ()
+        _distinct(context, (each.name for each in (*owner.parameters, *sizes)), "parameter" if not sizes else "name")
+        for size in sizes:
+            _hides(context, size.name, "size")
         for parameter in owner.parameters:
             _hides(context, parameter.name, "parameter")
             enum_of_name = enumerators.get(parameter.name.text)
@@ -86,6 +89,7 @@ def _called_phase(context: Context) -> None:
     names = [signal.name for signal in symbols.signals.values()] + [zone.name for zone in symbols.zones.values()]
     names += [member.name for enum in symbols.enums.values() for member in enum.members]
     owners: list[Parametric] = [*symbols.skills.values(), *symbols.templates.values(), *symbols.missions.values()]
+    names += [size.name for skill in symbols.skills.values() for size in skill.sizes]
     for owner in owners:
         for parameter in owner.parameters:
             names += [parameter.name, *parameter.choices]

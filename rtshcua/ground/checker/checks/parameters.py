@@ -6,7 +6,7 @@ from rtshcua.ground.checker.context import Context, Parametric
 from rtshcua.ground.checker.fields import size
 from rtshcua.ground.checker.fitting import declaration_labels
 from rtshcua.ground.checker.parts import walk
-from rtshcua.ground.checker.scope import Scope
+from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import EXAMPLES, NAMED, Kind
 from rtshcua.ground.checker.values import whole_range
@@ -42,17 +42,22 @@ def check(context: Context) -> None:
                 continue  # a second one of the same name: reported as such
             numeric = argument.type.kind is Kind.NUMBER
             if numeric != (parameter.range is not None):
-                _range(context, parameter)
+                no_range(context, parameter)
             elif parameter.range is not None:
-                before = len(context.report.found)
-                ends = whole_range(scope, parameter.range, argument.type)
-                if ends is None and len(context.report.found) == before:
-                    _unknown_end(scope, parameter.range)
-                elif ends is not None and argument.type.dimension is not None:
-                    for end, number in zip((parameter.range.low, parameter.range.high), ends, strict=True):
-                        size(context, end, argument.type.dimension, number)
+                check_range(context, argument, parameter.range)
             if parameter.default is not None:
                 bind_value(scope, argument, parameter.default)
+
+
+def check_range(context: Context, argument: Argument, range: Range) -> None:
+    """Report the ends of a parameter's range that are no numbers of its type, or too large."""
+    scope, before = context.scope(), len(context.report.found)
+    ends = whole_range(scope, range, argument.type)
+    if ends is None and len(context.report.found) == before:
+        _unknown_end(scope, range)
+    elif ends is not None and argument.type.dimension is not None:
+        for end, number in zip((range.low, range.high), ends, strict=True):
+            size(context, end, argument.type.dimension, number)
 
 
 def _unknown_end(scope: Scope, range: Range) -> None:
@@ -79,7 +84,7 @@ def _of_template(context: Context, parameter: Parameter) -> bool:
     """Whether no more is to say of a template's parameter: it is a role, or of a type that no rule can use."""
     if parameter.type.text == ROLE and not parameter.choices:
         if parameter.range is not None:
-            _range(context, parameter)
+            no_range(context, parameter)
         return True
     if parameter.choices or parameter.type.text == Kind.POSITION.value:
         context.report.add(
@@ -92,7 +97,8 @@ def _of_template(context: Context, parameter: Parameter) -> bool:
     return False
 
 
-def _range(context: Context, parameter: Parameter) -> None:
+def no_range(context: Context, parameter: Parameter) -> None:
+    """Report a parameter that has no range and is a number, or has one and is none."""
     name = parameter.name.text
     type = NAMED.get(parameter.type.text)
     if parameter.range is None and type is not None and type.dimension is not None:

@@ -27,6 +27,7 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedLink
 from rtshcua.decision.values import TRUE, interval
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.sizes import named_at
 from rtshcua.ground.compiler.mission import argument_span
 from rtshcua.ground.compiler.proofs.places import Place, planned
 from rtshcua.ground.compiler.proofs.situation import Ground
@@ -246,16 +247,19 @@ def _too_long(
     limit: Span,
     nearer: _Fix | None = None,
 ) -> None:
+    size = named_at(ground.context.report, ground.context.symbols.skills[contract.name], limit)
+    enough = display(-(-time_us // _SECOND) * _SECOND, Dimension.DURATION)
+    longer = "let it last longer" if size is None else f"write `sizes {contract.name}({size} = {enough})`"
     lasts = f"`{contract.name}` lasts at most {display(allowed, Dimension.DURATION)}"
     over = time_us - allowed
     ground.context.report.add(
         codes.PLAN_TOO_LONG,
         step.span if nearer is None else nearer[0],
-        f"{what} takes up to {display(-(-time_us // _SECOND) * _SECOND, Dimension.DURATION)}, and {lasts}"
+        f"{what} takes up to {enough}, and {lasts}"
         if over >= _SECOND
         else f"{lasts}, and {what} takes up to "
         f"{display(-(-over // _MILLISECOND) * _MILLISECOND, Dimension.DURATION)} longer",
-        help=f"fly a shorter path, or faster, or let it last longer; {_counted(ground)}",
+        help=f"fly a shorter path, or faster, or {longer}; {_counted(ground)}",
         labels=[(limit, "declared here"), *_declared(ground)],
         fix=nearer,
     )

@@ -1,7 +1,7 @@
 """Skill contracts."""
 
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Span
@@ -10,7 +10,16 @@ from rtshcua.ground.language.build.vehicles import Vehicles
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Condition, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Motion, Parameter, SkillDecl
+from rtshcua.model.ir.skills import (
+    ArgumentValue,
+    GivenSize,
+    LinkDecl,
+    Motion,
+    Parameter,
+    Sized,
+    SizesDecl,
+    SkillDecl,
+)
 
 
 class Choice(NamedTuple):
@@ -21,6 +30,8 @@ class Choice(NamedTuple):
     default: Name | None
 
 
+#: the parts of a skill that a size may stand in, by their first words
+_SIZED: Final = {"deadline": "deadline", "valid": "validity", "lasts": "duration", "grace": "grace", "energy": "energy"}
 #: parts of a skill that may be written several times: all of them hold
 _CLAUSES = ("require", "assume", "maintain")
 
@@ -157,11 +168,37 @@ class Skills(Vehicles):
         """`hover for 20 s`."""
         return LinkDecl(span=span, skill=skill, arguments=arguments or (), limit=limit)
 
-    def skill(self, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *given: Part) -> None:
+    def sized(self, span: Span, word: str, size: Reference, phases: tuple[Name, ...] | None = None) -> Part:
+        """`lasts at most longest`, where `longest` is one of the skill's sizes."""
+        made = Sized(span=span, part=_SIZED[str(word)], size=size)  # type: ignore[arg-type]
+        return Part(str(word), span, (made, phases or ()) if word == "valid" else made)
+
+    def own_sizes(self, span: Span, parameters: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+        """`sizes (highest: altitude in 10 m .. 500 m = 60 m)`, of a skill."""
+        return parameters
+
+    def given_size(self, span: Span, name: Name, value: Quantity) -> GivenSize:
+        """`highest = 120 m`."""
+        return GivenSize(span=span, name=name, value=value)
+
+    def sizes(self, span: Span, skill: Name, *given: GivenSize) -> None:
+        """`sizes goto(highest = 120 m, longest = 6 min)`."""
+        self.declare(SizesDecl(span=span, skill=skill, given=given))
+
+    def skill(
+        self,
+        span: Span,
+        name: Name,
+        parameters: tuple[Parameter, ...] | None,
+        sizes: tuple[Parameter, ...] | None,
+        *given: Part,
+    ) -> None:
         """`skill hover() { ... }`."""
         self.undotted(name, "skill")
         found = {key: part.value for key, part in self.parts("skill", name, _joined(given)).items()}
         validity, phases = found.get("valid", (None, ()))
+        amounts = {"validity": validity} | {part: found.get(word) for word, part in _SIZED.items() if word != "valid"}
+        plain = {part: None if isinstance(amount, Sized) else amount for part, amount in amounts.items()}
         self.declare(
             SkillDecl(
                 span=span,
@@ -169,17 +206,19 @@ class Skills(Vehicles):
                 parameters=parameters or (),
                 motion=found.get("motion"),
                 timing_class=found.get("class"),
-                deadline=found.get("deadline"),
-                validity=validity,
+                deadline=plain["deadline"],
+                validity=plain["validity"],
                 phases=phases,
-                duration=found.get("lasts"),
-                grace=found.get("grace"),
+                duration=plain["duration"],
+                grace=plain["grace"],
                 require=found.get("require", ()),
                 assume=found.get("assume", ()),
                 maintain=found.get("maintain", ()),
                 fallback=found.get("fallback", ()),
-                energy=found.get("energy"),
+                energy=plain["energy"],
                 record=found.get("record", ()),
+                sizes=sizes or (),
+                sized=tuple(amount for amount in amounts.values() if isinstance(amount, Sized)),
             ),
             name,
         )

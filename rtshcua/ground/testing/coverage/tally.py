@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.checker.symbols import collect
 from rtshcua.ground.testing.case import Tested
 from rtshcua.ground.testing.coverage.coverage import Coverage, Reached, coverage
 from rtshcua.ground.testing.coverage.reached import reached
@@ -42,8 +43,8 @@ class Tally:
         self.sources.update(sources)
         if tested.lowered.policy not in self._kept:
             found = universe(tested.prepared)
-            skills = [skill for unit in units for skill in unit.skills]
-            charges = {skill.name.text: skill.energy.span for skill in skills if skill.energy is not None}
+            skills = collect(units).skills
+            charges = {name: skill.energy.span for name, skill in skills.items() if skill.energy is not None}
             spans = tuple(_span(tested, item, charges) for item in found.items)
             self._kept[tested.lowered.policy] = _Kept(found, spans, [])
 

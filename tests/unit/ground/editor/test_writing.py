@@ -91,6 +91,8 @@ def proposed(desk: Desk, before: str, after: str = "") -> dict[str, str]:
         (SKILL + "require far < 3 ", ["m", "cm"], ["s", "%"]),
         (SKILL + "deadline 5 ", ["s", "min"], []),
         (SKILL + "fallback ", ["hover", "goto"], ["pond"]),
+        (HEAD + "sizes ", ["goto"], ["pond"]),
+        (HEAD + "sizes goto(highest = 90 m, ", ["longest = "], ["target = ", "highest = "]),
         (HEAD + "signal a : ", ["speed", "position", "mood"], ["pond"]),
         (HEAD + "signal a : speed = ", ["HEARTBEAT", "WIND"], ["battery"]),
         (HEAD + "signal a : speed = WIND.", ["WIND.speed", "WIND.direction"], []),

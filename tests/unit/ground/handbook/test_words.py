@@ -8,6 +8,7 @@ from typing import Any, get_args, get_type_hints
 import rtshcua.model.ir as ir
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker import time_zones
+from rtshcua.ground.checker.sizes import sized
 from rtshcua.ground.handbook.cases import told_test
 from rtshcua.ground.handbook.subject import within
 from rtshcua.ground.handbook.words.cases import told_nominal
@@ -147,7 +148,7 @@ def tellers(unit: Any, names: Vocabulary) -> Iterator[tuple[Node, Callable[[Any]
         yield zone, tell_zone
     for skill in unit.skills:
         own = names.asked(each.name.text for each in skill.parameters)
-        yield skill, lambda one, own=own: tell_skill(one, own)
+        yield skill, lambda one, own=own: tell_skill(sized(one, None), own)
     for policy in unit.policies:
         yield policy, lambda one: tell_policy(one, names.asked(["altitude", "target", "area"]))
     for nominal in unit.nominals:
@@ -223,7 +224,8 @@ def others(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
 
 def test_whatever_is_changed_in_a_declaration_changes_what_is_told_of_it(everything_program: Program) -> None:
     """So nothing that is signed is left unsaid. The `dialect` of an enumeration only the checker reads, and that a
-    choice is of the type `choice` is no word of the source.
+    choice is of the type `choice` is no word of the source. Of a size its value is told where it stands; what else it
+    might be is not signed.
     """
     names = Vocabulary(
         frozenset(signal.name.text for unit in everything_program.units for signal in unit.signals),
@@ -234,7 +236,14 @@ def test_whatever_is_changed_in_a_declaration_changes_what_is_told_of_it(everyth
         for node, tell in tellers(unit, names):
             before = tell(node)
             for where, other in changed(node):
-                if where.startswith("EnumDecl.dialect") or where.endswith("[2] > Parameter.type > Name.text"):
+                unsigned = where.startswith("SkillDecl.sizes[") and (
+                    "Parameter.range" in where or "Parameter.type" in where
+                )
+                if (
+                    unsigned
+                    or where.startswith("EnumDecl.dialect")
+                    or where.endswith("[2] > Parameter.type > Name.text")
+                ):
                     continue
                 tried += 1
                 if tell(other) == before:

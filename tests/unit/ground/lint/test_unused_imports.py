@@ -44,6 +44,12 @@ def test_a_policy_needs_what_it_does_not_mention() -> None:
     assert [code for code, _ in found(HEAD + 'import "lib:skills/hover.rts"\n' + every)] == ["E1303"]
 
 
+def test_what_is_given_for_sizes_is_used_by_the_policy() -> None:
+    sizes = HEAD + "sizes return_home(longest = 6 min)"
+    assert found('import "sizes.rts"\n' + HEAD + POLICY, sizes=sizes) == []
+    assert found(sizes) == []
+
+
 def fix_of(text: str) -> tuple[str, bool]:
     """The text after the only fix, and whether that is safe."""
     (fix,) = (fix for each in lint(program({"main.rts": text})) for fix in each.fixes)

@@ -226,6 +226,8 @@ class InForce:
 
 #: the last step of section 4.1 that a request must pass for its id to be used up
 _AUTHORITY: Final = 3
+#: a step that is not admitted is waited for, until its deadline
+_WAITS: Final = (OnInadmissible.HOLD, OnInadmissible.REPLAN)
 _INTEGRITY: Final = 1
 _STATE: Final = 6
 _PASSED: Final = 8
@@ -246,12 +248,21 @@ class Session:
         self._in_force = in_force
         self._enforced = enforced
         self._consumed: set[int] = set()
-        self._latest = -1  # the last step that was asked for and not denied
+        self._latest = -1  # the last step that was asked for and not denied,
+        self._allowed = -1  # and the last that may have been sent
 
     @property
     def current(self) -> int:
         """The step that may be asked for; the one after it may be too, once this one was."""
         return max(self._latest, 0)
+
+    @property
+    def _replaceable(self) -> bool:
+        """Whether the last step that was asked for may still be replaced: nothing of it was sent, nor is it used up."""
+        invocations, latest = self._in_force.invocations, self._latest
+        if not self._allowed < latest < len(invocations) or latest in self._consumed:
+            return False
+        return invocations[latest].invocation.on_inadmissible == OnInadmissible.REPLAN
 
     def consumed(self, step: int) -> int:
         """1 if the step's id was used up, as `Context` has it."""
@@ -282,6 +293,8 @@ class Session:
         decision = decide(invocation, state, self._policy, context, now)
         if decision.outcome is not _DENY or not self._enforced:
             self._latest = max(self._latest, step)
+        if decision.outcome is _ALLOW or not self._enforced:
+            self._allowed = max(self._allowed, step)
         if decision.step > _AUTHORITY and not may_ask_again(invocation.invocation, decision.outcome, decision.reason):
             self._consumed.add(step)
         return decision
@@ -310,11 +323,11 @@ class Session:
     def take(self, document: bytes, now: Now, released: int = 0) -> Receipt:
         """Take in a signed document, if it is to be trusted; see `InForce.take`.
 
-        `released` steps were released, as far as the caller knows; more were if they were asked for. The steps that a
-        replacement brings were never used.
+        `released` steps were released, as far as the caller knows; more were if they were asked for, but for one that
+        waits to be replaced (`on inadmissible replan`). The steps that a replacement brings were never used.
         """
         decided = self._latest + self.consumed(self._latest)
-        released = max(released, self._latest + 1)
+        released = max(released, self._latest + (not self._replaceable))
         receipt = self._in_force.take(document, now, decided=max(decided, 0), released=released, current=self.current)
         if receipt.kind == REPLACEMENT and receipt.accepted:
             self._consumed = {step for step in self._consumed if step < receipt.step}
@@ -326,5 +339,5 @@ def may_ask_again(invocation: Invocation, outcome: Outcome, reason: Reason) -> b
     for, until its deadline.
     """
     if outcome is _FALLBACK:
-        return invocation.on_inadmissible == OnInadmissible.HOLD and reason is not Reason.NO_SLACK
+        return invocation.on_inadmissible in _WAITS and reason is not Reason.NO_SLACK
     return outcome is _DEFER

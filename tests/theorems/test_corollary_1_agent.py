@@ -2,9 +2,10 @@
 
 Statement. From theorem 1: whatever an agent signs with its own key, what flies of it is what the policy permits to
 agents, under the policy's contracts or tighter ones, on this vehicle; its word approves nothing, recalls nothing, and
-sets nothing aside that a person ordered; what it cancels flies the
-policy's contingency, and no step any more. The key is bound by the trust root to its source, roles and policies;
-approvals are bound to a person, the mission and the flight.
+sets nothing aside that a person ordered; what it cancels flies the policy's contingency, and no step any more.
+Whatever it does or does not do, at any moment, the flight ends as one that the policy allows: flown to its end, or
+brought down by a chain of the policy. The key is bound by the trust root to its source, roles and policies; approvals
+are bound to a person, the mission and the flight.
 
 Attacker: the agent, with the mission key that `keys init` makes for agents, and all that was ever signed. It compiles
 whatever it likes: it need not use our compiler.
@@ -19,19 +20,32 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference import worlds
-from reference.documents import MIN, approval, cancellation, low_mission, recall, replacement
+from reference.documents import MIN, approval, cancellation, hand, low_mission, recall, replacement
 from reference.flat_case import BATTERY, HEIGHT, MISSION, POLICY, POSITION_X, POSITION_Y
 from reference.naive_code import TooNear
 from reference.oracle import Oracle
-from reference.world import FLIGHT, MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, START, VEHICLE, answer_to, request_for
+from reference.world import (
+    FLIGHT,
+    MISSION_KEY,
+    POLICY_KEY,
+    ROOT,
+    SESSION_KEY,
+    START,
+    VEHICLE,
+    Run,
+    answer_to,
+    assert_audited,
+    loaded,
+    request_for,
+)
 from rtshcua.decision.checks import mission as mission_checks
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import SourceKind
-from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Context, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Dispatch, Ending
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.document import DocumentError
 from rtshcua.wire.keys import Duty, SigningKey
@@ -203,6 +217,74 @@ def test_what_it_cancels_flies_the_contingency_and_no_step(of: Random) -> None:
     allowed = [answer for answer in (answer_to(found, link) for link in links) if isinstance(answer, Answer)]
     assert len(allowed) == len(links)
     assert any(answer.permit for answer in allowed)
+
+
+#: how a flight may end, whoever proposed it: nobody took it over, and nothing broke
+ENDS = {Ending.COMPLETED, Ending.ABORTED, Ending.CANCELLED, Ending.REFUSED}
+
+
+def meddled(of: Random) -> Run:
+    """A whole flight, in a world in which steps are not always admitted, with an agent that does what it likes, at any
+    moment: it replaces, cancels, repeats itself, babbles, or is silent when it is asked for another step.
+    """
+    otherwise = [OnInadmissible.REPLAN, *OnInadmissible]
+    steps = [replace(each, on_inadmissible=of.choice(otherwise)) for each in MISSION.invocations]
+    run = Run(loaded(mission=replace(MISSION, invocations=tuple(steps))))
+    handed: list[bytes] = []
+    for _ in range(4_000):
+        if run.ending is not None:
+            return run
+        run.tick()
+        slot = of.choice([*worlds.NEAR])
+        if of.random() < 0.05:
+            run.vehicle.values[slot] = of.choice([*worlds.NEAR[slot], flat.state().values[slot]])
+        if of.random() < 0.03 and run.ending is None:
+            handed.append(paper_of(of, run.loaded, handed))
+            hand(run, handed[-1])
+    return run
+
+
+def paper_of(of: Random, flying: Loaded, handed: list[bytes]) -> bytes:
+    """Something that the agent of this flight signs, or sends."""
+    mission, kept = flying.bundle.mission, of.randrange(len(flying.bundle.mission.invocations))
+    chance = of.random()
+    if chance < 0.1:
+        return cancellation(flying, MISSION_KEY)
+    if chance < 0.3:
+        return of.choice([*handed, of.randbytes(of.randrange(300))])
+    steps = list(mission.invocations[:kept])
+    for _ in range(of.randrange(3)):
+        steps.append(replace(of.choice(mission.invocations[1:]), step=len(steps)))
+    otherwise = of.choice([*OnInadmissible])
+    steps.append(replace(mission.invocations[-1], step=len(steps), on_inadmissible=otherwise))
+    other = replace(mission, issued_at_us=mission.issued_at_us + 1, invocations=tuple(steps))
+    try:
+        return replacement(flying, kept, other, MISSION_KEY)
+    except DocumentError:
+        return b""
+
+
+def met_its_end(run: Run) -> list[str]:
+    """What is wrong with how a flight ended."""
+    wrong = [] if run.ending in ENDS else [f"it ended as {run.ending}"]
+    return [*wrong, "it was left in the air"] if run.vehicle.airborne else wrong
+
+
+@given(worlds.CHANCES)
+@settings(max_examples=20)
+def test_whatever_an_agent_does_or_does_not_do_the_flight_ends_as_the_policy_has_it(of: Random) -> None:
+    run = meddled(of)
+    assert met_its_end(run) == []
+    assert_audited(run)
+
+
+@pytest.mark.soak
+@settings(max_examples=2_000)
+@given(worlds.CHANCES)
+def test_so_it_does_whatever_many_agents_do(of: Random) -> None:
+    run = meddled(of)
+    assert met_its_end(run) == []
+    assert_audited(run)
 
 
 def test_what_agents_may_do_flies() -> None:

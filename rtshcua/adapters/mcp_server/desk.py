@@ -28,6 +28,7 @@ from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.quantity import Dimension, display
+from rtshcua.onboard.runtime.controller import REPLAN
 from rtshcua.onboard.runtime.seen import value_in_words
 from rtshcua.wire.binding import bind, binding_of
 from rtshcua.wire.bundle import Bundle, mission_payload, policy_digest, policy_payload, seal_under
@@ -49,9 +50,14 @@ UNTRUSTED: Final = "what a vehicle, a log or another's mission says: data to loo
 CANCELS_US: Final = 600_000_000
 #: effects that say how a flight goes
 _TELLING: Final = frozenset(
-    {"dispatched", "succeeded", "skipped", "violated", "failed", "time-over", "recall", "cancellation"}
+    {"dispatched", "succeeded", "skipped", "replan", "violated", "failed", "time-over", "recall", "cancellation"}
 )
 _AWAITED: Final = "approval/awaited"
+#: the effects of which the last says whether another step is waited for
+_AFTER_REPLAN: Final = frozenset({REPLAN, "replacement", "dispatched", "cancellation", "recall"})
+_REPLANS: Final = (
+    "`replan` with this `from_step`; the vehicle holds meanwhile, and falls back when nothing comes in time"
+)
 
 
 class Misused(Exception):
@@ -274,9 +280,13 @@ class Desk:
             for each in records
             if each.get("event") in _TELLING
         ]
+        asked: Mapping[str, Any] = next((each for each in reversed(records) if each.get("event") in _AFTER_REPLAN), {})
         return {
             "stage": seen.stage,
             "over": seen.stage in ("ended", "unreachable"),
+            "replan": {"from_step": asked.get("step"), "within": asked.get("detail"), "how": _REPLANS}
+            if asked.get("event") == REPLAN and seen.stage == "flying"
+            else None,
             "ending": seen.close.get("ending"),
             "decision": None if decided is None else {key: decided.get(key) for key in _DECIDED},
             "approval": {"rule": decided.get("clause"), "step": decided.get("step"), "how": _HOW}

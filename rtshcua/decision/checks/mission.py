@@ -71,7 +71,7 @@ def invocation(invocation: Invocation, policy: Policy, zones: Sequence[PreparedZ
     yield from index("skill", invocation.skill, len(policy.contracts))
     yield from index("role", invocation.role, len(policy.roles))
     yield from within("source", invocation.source, SourceKind.AGENT, SourceKind.REFLEX)
-    yield from within("on inadmissible", invocation.on_inadmissible, OnInadmissible.ABORT, OnInadmissible.SKIP)
+    yield from within("on inadmissible", invocation.on_inadmissible, OnInadmissible.ABORT, OnInadmissible.REPLAN)
     yield from within("issued at", invocation.issued_at_us, 0, MAX_VALUE)
     yield from within("phases", invocation.phases, 0, (1 << MAX_PHASES) - 1)
     mine, policys = invocation.contract, policy.contracts[invocation.skill]

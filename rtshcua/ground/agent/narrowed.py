@@ -107,7 +107,7 @@ def _step(skill: Permitted, defaults: frozenset[tuple[str, str]]) -> Schema:
         {
             "skill": _const(contract.name),
             "arguments": _object(given, optional=left),
-            "on_inadmissible": {"type": "string", "enum": ["abort", "hold", "skip"]},
+            "on_inadmissible": {"type": "string", "enum": ["abort", "hold", "skip", "replan"]},
             "overrides": _overrides(),
         },
         optional=("on_inadmissible", "overrides", *(() if len(left) < len(given) else ("arguments",))),

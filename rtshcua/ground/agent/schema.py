@@ -83,7 +83,7 @@ class StepShape(Shape):
 
     skill: Name
     arguments: dict[Name, Text] = {}
-    on_inadmissible: Literal["abort", "hold", "skip"] = "abort"
+    on_inadmissible: Literal["abort", "hold", "skip", "replan"] = "abort"
     overrides: OverridesShape | None = None
 
 

@@ -12,6 +12,7 @@ class OnInadmissible(IntEnum):
     ABORT = 0
     HOLD = 1
     SKIP = 2
+    REPLAN = 3  # as HOLD, and whoever may replace the step is asked to
 
 
 class Plan(Flat, frozen=True):

@@ -30,7 +30,7 @@ class Step(Node, kw_only=True):
     kind: Literal["step"] = "step"
     skill: Name
     arguments: tuple[ArgumentValue, ...]
-    on_inadmissible: Literal["abort", "hold", "skip"]
+    on_inadmissible: Literal["abort", "hold", "skip", "replan"]
     overrides: Overrides | None = None
 
 

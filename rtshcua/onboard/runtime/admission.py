@@ -64,9 +64,13 @@ class InvocationQueue:
         if self.released_us is None:
             self.released_us = now_us
 
-    def replace(self, mission: Mission) -> None:
-        """From now on these are the steps; those that were released are the same ones."""
+    def replace(self, mission: Mission, first: int, now_us: int) -> None:
+        """From now on these are the steps, from `first` on others than before. Where the current one is among these, it
+        is released now.
+        """
         self._steps = mission.invocations
+        if first <= self._index and self.released_us is not None:
+            self.released_us = now_us
 
     def advance(self, now_us: int) -> None:
         """The current step ended, or is skipped: release the next."""

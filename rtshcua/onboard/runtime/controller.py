@@ -2,11 +2,14 @@
 
 What a step that is not admitted does: denied in the air, the contingency flies, and nothing that the step itself says
 is listened to. Deferred, it is asked for again until its deadline, in the air under a hold. Else `on inadmissible`
-counts: `skip` goes on with the next step, `hold` waits like a deferral, `abort` flies the step's fallback and, when
-that is used up, the contingency. On the ground nothing is sent, and the run ends.
+counts: `skip` goes on with the next step, `hold` waits like a deferral, `replan` too and asks for another step in its
+place, `abort` flies the step's fallback and, when that is used up, the contingency. On the ground nothing is sent, and
+the run ends.
 
 While the link is down, and until fresh state came or its time is over, there is no turn at all (`link`).
 """
+
+from typing import Final
 
 from rtshcua.decision.links import look_ahead
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
@@ -27,6 +30,8 @@ from rtshcua.onboard.runtime.view import Stage, View
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.response import Answer
 
+#: what is recorded where another step is asked for, in place of one that is not admitted
+REPLAN: Final = "replan"
 #: what ends a run matters more the further down it stands
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 _UP = LinkState.UP  # an enumeration's attributes are slow to find
@@ -182,6 +187,11 @@ class MissionController:
         if answer.permit:
             return self._start(now, invocation, answer)
         if self.retry.may_wait(invocation, answer, released_us, now.monotonic_us):
+            if self.retry.may_call(invocation, answer):
+                left_us = released_us + invocation.contract.deadline_us - now.monotonic_us
+                self._journal.effect(
+                    now, REPLAN, Ref(STEP, invocation.step, -1), detail=f"within {left_us // 1_000} ms"
+                )
             return self._bide(now, invocation, state)
         return self._inadmissible(now, invocation)
 
@@ -364,10 +374,19 @@ class MissionController:
         self._recording = True
         self.retry.news()
 
-    def replaced(self) -> None:
-        """A replacement is in force: steps that were not released are others now."""
-        mission = self._loaded.bundle.mission
-        self.queue.replace(mission)
+    @property
+    def released(self) -> int:
+        """How many steps do not change any more: those that were released, but for one that waits to be replaced."""
+        current = self.queue.current
+        waits = current is not None and current.on_inadmissible == OnInadmissible.REPLAN and self.stage is _DECIDING
+        return self.queue.released - (waits and self.queue.released > 0)
+
+    def replaced(self, now: Now, first: int) -> None:
+        """A replacement is in force: the steps from `first` on are others now."""
+        mission, current = self._loaded.bundle.mission, self.queue.current
+        self.queue.replace(mission, first, now.monotonic_us)
+        if current is not None and first <= current.step and self.stage is _DECIDING:
+            self.retry.renew(now.monotonic_us, at_once=True)
         self._journal.add(Expect(mission.invocations))
 
     def fall_back(self, kind: int, cause: Ending = Ending.ABORTED, *, holds: bool = True) -> None:

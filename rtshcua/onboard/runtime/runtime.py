@@ -235,7 +235,7 @@ class EventHandler:
     def _receipt(self, now: Now, document: bytes) -> Receipt:
         if self._controller.stage is Stage.FALLING and not _recalls(document):
             return Receipt(UNKNOWN, "falling-back", "the mission is over: the vehicle falls back")
-        receipt = decode(self._boundary.present(document, now, self._controller.queue.released))
+        receipt = decode(self._boundary.present(document, now, self._controller.released))
         return Receipt(UNKNOWN, "unanswered", receipt.text) if isinstance(receipt, Refusal) else receipt
 
     def _accepted(self, now: Now, receipt: Receipt, document: bytes) -> None:
@@ -252,7 +252,7 @@ class EventHandler:
             controller.cancel(now)
         else:
             journal.effect(now, "replacement", Ref(STEP, receipt.step, -1), detail=envelope)
-            controller.replaced()
+            controller.replaced(now, receipt.step)
 
     def _refused(self, now: Now, receipt: Receipt) -> None:
         at_us = now.monotonic_us

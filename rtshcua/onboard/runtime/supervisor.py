@@ -7,9 +7,9 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.session import may_ask_again
 from rtshcua.decision.values import FALSE, Truth
 from rtshcua.decision.watch import holding, watch
-from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.model.outcome import Reason
+from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.runtime.journal import Detail
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.seen import seen
@@ -85,11 +85,12 @@ class RetryPolicy:
         self._news = True  # something was received, or began, since the step was last asked for
         self._asked_us = 0  # when that was
         self._held = False  # a hold for the step was tried
+        self._called = False  # a replacement of it was asked for
 
     def renew(self, now_us: int, *, at_once: bool) -> None:
         """Another step is waited for from now on; it is asked for `at_once`, or when something was received."""
         self.grace = Grace()
-        self._news, self._asked_us, self._held = at_once, now_us, False
+        self._news, self._asked_us, self._held, self._called = at_once, now_us, False, False
 
     def news(self) -> None:
         """Something was received: the answer may be another one now."""
@@ -117,6 +118,12 @@ class RetryPolicy:
         """Whether a hold is to be tried while the step is waited for: once, for a hold goes on."""
         held, self._held = self._held, True
         return not held
+
+    def may_call(self, invocation: Invocation, answer: Answer) -> bool:
+        """Whether a replacement of the step is to be asked for, once: its mission says so, and it was not admitted."""
+        called, wanted = self._called, invocation.on_inadmissible == OnInadmissible.REPLAN
+        self._called = called or (wanted and answer.outcome is Outcome.FALLBACK)
+        return self._called and not called
 
     def unkept(self, prepared: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> str | None:
         """What forbids waiting on in the air; UNKNOWN has the step's grace."""

@@ -111,6 +111,8 @@ LATE = {"released_us": AT_US - flat.INVOCATIONS[0].contract.deadline_us - S}
         (OnInadmissible.SKIP, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], [0]),
         (OnInadmissible.HOLD, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], []),
         (OnInadmissible.HOLD, {}, LATE, FALLBACK, [0, 1], [0]),  # not after its deadline
+        (OnInadmissible.REPLAN, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], []),
+        (OnInadmissible.REPLAN, {}, LATE, FALLBACK, [0, 1], [0]),
     ],
 )
 def test_what_uses_an_id_up(
@@ -279,6 +281,31 @@ def later(us: int) -> Now:
 def test_a_replacement_keeps_what_was_released_or_asked_for(steps: int, released: int, slug: str) -> None:
     asked, of = confirmed(steps)
     assert asked.session.take(documents.replacement(of), NOW, released).slug == slug
+
+
+@pytest.mark.parametrize(
+    ("on_inadmissible", "values", "context", "slug"),
+    [
+        (OnInadmissible.REPLAN, {BATTERY: 2_000}, {}, "accepted"),
+        (OnInadmissible.REPLAN, EMPTY, {}, "accepted"),  # deferred
+        (OnInadmissible.REPLAN, {}, {}, "already-released"),  # it was permitted
+        (OnInadmissible.REPLAN, {}, LATE, "already-released"),  # its fallback flies
+        (OnInadmissible.REPLAN, {}, BINDING, "accepted"),  # a forger asked
+        (OnInadmissible.HOLD, {BATTERY: 2_000}, {}, "already-released"),
+        (OnInadmissible.SKIP, {BATTERY: 2_000}, {}, "already-released"),
+    ],
+)
+def test_only_a_step_that_waits_to_be_replaced_is_replaced_though_it_was_asked_for(
+    on_inadmissible: int, values: dict[int, int | None], context: dict[str, Any], slug: str
+) -> None:
+    of = with_mission(on_inadmissible)
+    asked = Asked(of)
+    asked.step(0, values, **context)
+    anew = replace(of.bundle.mission, issued_at_us=of.bundle.mission.issued_at_us + 1)
+    assert asked.session.take(documents.replacement(of, 0, anew), NOW).slug == slug
+    if slug == "accepted":
+        assert (asked.turns()[:1], asked.used()) == ([0], [])
+        assert asked.step(0) is ALLOW
 
 
 def test_a_replacement_brings_steps_that_were_never_used() -> None:

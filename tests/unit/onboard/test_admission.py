@@ -160,8 +160,11 @@ def test_the_queue_knows_what_was_released() -> None:
     for number in (2, 3, 4, 4):
         queue.advance(number)
         assert queue.released == number
-    queue.replace(replace(MISSION, invocations=MISSION.invocations + MISSION.invocations))
-    assert queue.current is MISSION.invocations[0]
+    longer = replace(MISSION, invocations=MISSION.invocations + MISSION.invocations)
+    queue.replace(longer, 5, 9)
+    assert (queue.current, queue.released_us) == (MISSION.invocations[0], 4)
+    queue.replace(longer, 4, 9)
+    assert queue.released_us == 9, "the current step is another one"
 
 
 def test_the_queue_releases_step_by_step_and_phase_by_phase() -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 from msgspec.structs import replace
 
+from reference.documents import hand, replacement
 from reference.flat_case import (
     BATTERY,
     CONTRACTS,
@@ -254,6 +255,53 @@ def test_held_for_in_vain_falls_back_at_the_deadline() -> None:
     run.until_over()
     assert run.flown == ["takeoff", "goto", "hover", "hover", "return_home"]
     assert run.ending is Ending.ABORTED
+
+
+def waiting_to_be_replaced() -> Run:
+    """The inspection is not admitted, and its mission asks for another step."""
+    run = start(loaded(mission=on_inadmissible(2, OnInadmissible.REPLAN))).until_flies("goto")
+    run.vehicle.values[OBSTACLE] = M
+    run.until_flies("hover")
+    assert run.events.count("replan") == 1
+    return run
+
+
+def test_another_step_is_asked_for_in_place_of_one_that_is_not_admitted() -> None:
+    run = waiting_to_be_replaced()
+    assert hand(run, replacement(run.loaded, 1)) == "already-released", "what was flown stays"
+    assert hand(run, replacement(run.loaded)) == "accepted"
+    began_us = run.clock.now().monotonic_us
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "return_home"]
+    assert run.ending is Ending.COMPLETED
+    (decided,) = [
+        each for each in run.records if (each.get("kind"), each.get("step"), each.get("outcome")) == (0, 2, "allow")
+    ]
+    assert decided["context"]["released_us"] >= began_us, "it has its own time from when it came"  # type: ignore[index]
+
+
+def test_without_another_step_it_falls_back_at_the_deadline() -> None:
+    run = waiting_to_be_replaced().until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "hover", "return_home"]
+    assert (run.ending, run.events.count("replan")) == (Ending.ABORTED, 1)
+
+
+def test_what_asks_for_another_step_flies_when_it_is_admitted_after_all() -> None:
+    run = waiting_to_be_replaced()
+    run.vehicle.values[OBSTACLE] = 20 * M
+    run.until_flies("inspect_area")
+    assert hand(run, replacement(run.loaded)) == "already-released"
+    assert run.until_over().ending is Ending.COMPLETED
+
+
+def test_the_first_step_is_replaced_on_the_ground() -> None:
+    vehicle = FakeVehicle()
+    vehicle.values[WIND] = None
+    run = start(loaded(mission=on_inadmissible(0, OnInadmissible.REPLAN)), vehicle)
+    mission = run.loaded.bundle.mission
+    assert hand(run, replacement(run.loaded, 0, replace(mission, issued_at_us=mission.issued_at_us + 1))) == "accepted"
+    vehicle.values[WIND] = 2 * M
+    assert run.until_over().ending is Ending.COMPLETED
 
 
 def test_a_step_that_awaits_an_approval_is_not_timed_by_its_deadline() -> None:

@@ -15,6 +15,7 @@ _OTHERWISE = {
     OnInadmissible.ABORT: "the mission ends: its fallback flies",
     OnInadmissible.HOLD: "it is waited for",
     OnInadmissible.SKIP: "it is left out",
+    OnInadmissible.REPLAN: "it is waited for, and whoever proposed it is asked for another step in its place",
 }
 
 

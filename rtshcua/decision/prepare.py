@@ -17,7 +17,7 @@ from rtshcua.decision.evaluate import NO_PHASE, Condition, Environment, Tables, 
 from rtshcua.decision.times import local_time
 from rtshcua.decision.tree import Node, monitored, parse, scope_of, slots_read, where
 from rtshcua.decision.values import AND, NOT, TRUE, Sets, Truth, Value, point
-from rtshcua.decision.volume import Planner, flown_at
+from rtshcua.decision.volume import Planner, flown_at, near_home
 from rtshcua.decision.zones import Place, PreparedZone, WellKnown
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause
@@ -192,7 +192,8 @@ class Compiler:
             cell = first_cell(contract, PLACE)
             path = link.arguments[cell : cell + 2]
         altitude = flown_at(motion, 0 if motion.altitude == -1 else link.arguments[motion.altitude], policy.vehicle)
-        planner = Planner(motion.kind, path, altitude, policy.vehicle.position_error)
+        vehicle = policy.vehicle
+        planner = Planner(motion.kind, path, altitude, vehicle.position_error, near_home(vehicle))
         return PreparedLink(link, tuple(map(point, link.arguments)), require, motion.kind, planner)
 
 
@@ -360,6 +361,7 @@ def prepare_invocation(
             plan.path,
             flown_at(contract.motion, plan.altitude, policy.policy.vehicle),
             policy.policy.vehicle.position_error,
+            near_home(policy.policy.vehicle),
         ),
         energy=Energy(contract, policy.policy.vehicle, plan.speed),
         reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(clauses, policy.policy)),

@@ -1,10 +1,13 @@
 """The planned volume: every place where a skill may take the vehicle from where it is now.
 
 It is the leg from the present position to the first point of the plan's path, and the path, at all heights between
-the present one and the plan's altitude; HOME climbs to the height that the vehicle returns at before it flies, and
-ends with the descent at home; LAND is the descent here. All of it is widened by the vehicle's position error. Zones
-that a vehicle takes off from or lands in must therefore have no floor (`LOWEST`): a height of 0 lies *on* a floor of
-0, hence outside.
+the present one and the plan's altitude; LAND is the descent here. HOME climbs where it is to the height that the
+vehicle returns at, if it is lower, flies home at that height or its own, and comes down there (`across`). All of it is
+widened by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no floor
+(`LOWEST`): a height of 0 lies *on* a floor of 0, hence outside.
+
+So fly PX4 1.16 (rtl.cpp, rtl_direct.cpp) and ArduCopter 4.7 (mode_rtl.cpp). Both set off across a little before they
+have the height, and climb less where they are near home: docs/flying/returns.md.
 """
 
 from collections.abc import Sequence
@@ -18,6 +21,13 @@ from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import Vehicle
 
 HOME = (0, 0)  # the origin of local coordinates
+#: so much below the height that it returns at, mm, a vehicle sets off for home: ArduCopter takes a corner within
+#: WPNAV_RADIUS, PX4 has reached a height within NAV_MC_ALT_RAD
+SHORT = 2_000
+#: a return from no further away than this, mm, or than a third of the height, may be flown lower: PX4 within
+#: RTL_MIN_DIST, ArduCopter by RTL_CONE_SLOPE
+NEAR = 10_000
+_STEEP = 3
 
 
 class Volume(NamedTuple):
@@ -38,16 +48,20 @@ UNKNOWN_VOLUME = Volume(NOWHERE, MISSING, (0, 0))
 class Planner:
     """The planned volumes of one plan. It remembers the last start, for which the answer is always the same."""
 
-    __slots__ = ("_altitude", "_distance", "_error", "_kind", "_last", "_leg", "_path", "_sweep")
+    __slots__ = ("_altitude", "_distance", "_error", "_kind", "_last", "_leg", "_near", "_path", "_sweep")
 
-    def __init__(self, kind: int, path: tuple[int, ...], altitude: int | None, position_error: int) -> None:
-        """`altitude` is None where the height at the start counts; for HOME it is what the return climbs to."""
-        self._kind, self._altitude = kind, altitude
+    def __init__(
+        self, kind: int, path: tuple[int, ...], altitude: int | None, position_error: int, near: int = 0
+    ) -> None:
+        """`altitude` is None where the height at the start counts; for HOME it is what the return climbs to, unless it
+        begins within `near` mm.
+        """
+        self._kind, self._altitude, self._near = kind, altitude, near
         self._path = HOME if kind == MotionKind.HOME else path
         self._error: Box = (-position_error, -position_error, position_error, position_error)
         self._sweep = Sweep(self._path, self._error) if self._path else None
         self._distance = max((distance(*self._path[at : at + 2]) for at in range(0, len(self._path), 2)), default=0)
-        self._leg: tuple[tuple[int, int, int, int], Sweep, Span] | None = None
+        self._leg: tuple[tuple[int, int, int, int], Sweep, Sweep, Span] | None = None
         self._last: tuple[tuple[Value, Value, Value], Volume] | None = None
 
     def volume(self, slots: Sequence[Value], known: WellKnown) -> Volume:
@@ -62,36 +76,56 @@ class Planner:
 
     def _from(self, x: Value, y: Value, height: Value) -> Volume:
         located, gap = max(x[2], y[2]), height[2]
-        leg, farthest = self._first_leg(x, y)
+        start, leg, farthest = self._first_leg(x, y)
         low, high = height[0], height[1]
-        parts: list[Part] = []
-        if self._kind == MotionKind.LAND:
+        parts: list[Part]
+        if self._kind == MotionKind.HOME:
+            returns = self._altitude or 0
+            high = max(high, returns) if returns else high
+            least = across(low, returns, near=farthest[0] <= self._near)
+            parts = [(leg, least, high)] if least == low else [(start, low, high), (leg, least, high)]
             low = min(low, 0)
-        elif self._kind == MotionKind.HOME:
-            high = max(high, self._altitude) if self._altitude else high
-        elif self._altitude is not None:
-            low, high = min(low, self._altitude), max(high, self._altitude)
-        parts.append((leg, low, high))
-        if self._sweep is not None:
-            if self._kind == MotionKind.HOME:
+        else:
+            if self._kind == MotionKind.LAND:
                 low = min(low, 0)
+            elif self._altitude is not None:
+                low, high = min(low, self._altitude), max(high, self._altitude)
+            parts = [(leg, low, high)]
+        if self._sweep is not None:
             parts.append((self._sweep, low, high))
         return Volume(Place(tuple(parts), located, gap), (low, high, gap, None), farthest)
 
-    def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Span]:
-        """The leg to the path, wherever in a box it starts, and the distance of the farthest point of leg and path."""
+    def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Sweep, Span]:
+        """The start, wherever in a box it is, the leg from there to the path, and the distance of the farthest point of
+        leg and path.
+        """
         west, east, south, north = key = (x[0], x[1], y[0], y[1])
         if self._leg is not None and self._leg[0] == key:
-            return self._leg[1], self._leg[2]
+            return self._leg[1:]
         left, bottom, right, top = self._error
-        leg = Sweep((west, south, *self._path[:2]), (left, bottom, right + east - west, top + north - south))
+        box = (left, bottom, right + east - west, top + north - south)
+        start, leg = Sweep((west, south), box), Sweep((west, south, *self._path[:2]), box)
         farthest = max(distance(max(abs(west), abs(east)), max(abs(south), abs(north))), self._distance)
         nearest = farthest
         if west != east or south != north:
             nearest = max(distance(min(max(0, west), east), min(max(0, south), north)), self._distance)
         span = (nearest, farthest)
-        self._leg = (key, leg, span)
-        return leg, span
+        self._leg = (key, start, leg, span)
+        return start, leg, span
+
+
+def across(low: int, returns: int, *, near: bool) -> int:
+    """The least height, mm above home, at which a return flies home that begins at `low`. `returns` is what it climbs
+    to, 0 if that is not known. Near home it may climb less, or not at all.
+    """
+    return low if near or not returns else max(low, returns - SHORT)
+
+
+def near_home(vehicle: Vehicle) -> int:
+    """From how far, mm, a return may be flown lower than the vehicle's return altitude: wherever home really is, and
+    as far as the position may be wrong.
+    """
+    return max(NEAR, -(-vehicle.return_altitude // _STEEP)) + vehicle.home_within + vehicle.position_error
 
 
 def flown_at(motion: Motion, altitude: int, vehicle: Vehicle) -> int | None:

@@ -1,16 +1,21 @@
 """The way home goes up to the height that the vehicle returns at, before it comes down."""
 
+from typing import Any
+
 import msgspec
 import pytest
 
 from reference import flat_case as flat
 from rtshcua.decision.prepare import prepare
-from rtshcua.decision.values import point
-from rtshcua.decision.volume import Planner, flown_at
+from rtshcua.decision.values import MISSING, interval, point
+from rtshcua.decision.volume import Planner, flown_at, near_home
 from rtshcua.decision.zones import WellKnown
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import Policy, Vehicle
+from virtual.rows import rows
+
+M = 1_000
 
 KNOWN = WellKnown(0, 1, 2, 3)
 HOME, CLIMB = Motion(MotionKind.HOME, -1, -1), Motion(MotionKind.CLIMB, 0, -1)
@@ -41,10 +46,50 @@ def test_other_motions_fly_where_their_step_says() -> None:
     assert flown_at(Motion(MotionKind.HOLD, -1, -1), 20_000, vehicle(30)) is None
 
 
-def test_the_leg_home_is_flown_at_that_altitude() -> None:
-    planner = Planner(MotionKind.HOME, (), flown_at(HOME, 0, vehicle(30)), 0)
-    (_, low, high), _ = planner.volume([point(100_000), point(0), point(15_000), point(0)], KNOWN).place.parts
-    assert (low, high) == (15_000, 30_000)
+START, LEG, END = (60, 80), (60, 80, 0, 0), (0, 0)
+
+
+@rows(
+    ("declared", "near", "height", "parts"),
+    [
+        # a climb where it is, across no lower than 2 m below the return altitude, down at home
+        (30, 0, 15, [(START, 15, 30), (LEG, 28, 30), (END, 0, 30)]),
+        (30, 0, 28, [(LEG, 28, 30), (END, 0, 30)]),
+        (30, 0, 29, [(LEG, 29, 30), (END, 0, 30)]),
+        (30, 0, 50, [(LEG, 50, 50), (END, 0, 50)]),  # higher, it flies as high as it is
+        (30, 99, 15, [(START, 15, 30), (LEG, 28, 30), (END, 0, 30)]),
+        (30, 100, 15, [(LEG, 15, 30), (END, 0, 30)]),  # so near it may not climb
+        (0, 0, 15, [(LEG, 15, 15), (END, 0, 15)]),  # it is not known how high it climbs
+        (1, 0, -2, [(START, -2, 1), (LEG, -1, 1), (END, -2, 1)]),
+    ],
+)
+def test_the_parts_of_the_way_home(declared: int, near: int, height: int, parts: list[Any]) -> None:
+    error = 3
+    planner = Planner(MotionKind.HOME, (), flown_at(HOME, 0, vehicle(declared)), error, near * M)
+    found = planner.volume([point(60 * M), point(80 * M), point(height * M), point(0)], KNOWN).place.parts
+    metres = [(tuple(each // M for each in sweep.path), low // M, high // M) for sweep, low, high in found]
+    assert metres == parts
+    assert {sweep.box for sweep, _, _ in found} == {(-error, -error, error, error)}
+
+
+def test_from_a_set_of_places_and_heights_every_way_is_covered() -> None:
+    planner = Planner(MotionKind.HOME, (), 30 * M, 0, 50 * M)
+    far = planner.volume([interval(60 * M, 70 * M), interval(-5 * M, 5 * M), interval(10 * M, 20 * M), MISSING], KNOWN)
+    (start, *climbs), (leg, *crosses), _ = far.place.parts
+    assert (start.path, start.box, climbs) == ((60 * M, -5 * M), (0, 0, 10 * M, 10 * M), [10 * M, 30 * M])
+    assert (leg.box, crosses) == (start.box, [28 * M, 30 * M])
+    some = planner.volume([interval(40 * M, 70 * M), point(0), interval(10 * M, 20 * M), MISSING], KNOWN)
+    assert [part[1:] for part in some.place.parts] == [(10 * M, 30 * M), (0, 30 * M)]
+
+
+@rows(
+    ("declared", "near"),
+    [(0, 10 + 50 + 3), (15, 10 + 50 + 3), (30, 10 + 50 + 3), (31, 63.334), (60, 20 + 50 + 3), (120, 40 + 50 + 3)],
+)
+def test_how_far_from_home_a_return_may_be_low(declared: int, near: float) -> None:
+    """10 m or a third of the height, and as far as home and the vehicle may be from where they are said to be."""
+    there = msgspec.structs.replace(vehicle(declared), home_within=50 * M, position_error=3 * M)
+    assert near_home(there) == round(near * M)
 
 
 def test_loading_refuses_a_return_below_ground() -> None:

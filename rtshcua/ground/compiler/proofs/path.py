@@ -9,7 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Condition, Environment
-from rtshcua.decision.prepare import PreparedInvocation
+from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.safety import ranging
 from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE
 from rtshcua.decision.values import Span as Utc
@@ -24,8 +24,10 @@ from rtshcua.ground.compiler.proofs.leaving import Leg, breach, path_legs, place
 from rtshcua.ground.compiler.proofs.period import Period, at_moment, keeps, zone_span
 from rtshcua.ground.compiler.proofs.places import Place, from_home, from_where, planned
 from rtshcua.ground.compiler.proofs.situation import EVER, Ground
+from rtshcua.ground.compiler.proofs.ways import Ways
 from rtshcua.ground.compiler.shapes import Point
 from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
@@ -121,13 +123,15 @@ def _airspace(
     begins = f"on its way, which {'may begin' if labels else 'begins'} {from_home(start.x, start.y)}, the vehicle would"
     written = (ground.span(airspace.airspace), "the airspace")
     if EVERYWHERE[keeps(volume.place, present)] == FALSE:
-        path = invocation.invocation.plan.path
-        legs = path_legs([(start.x, start.y), *zip(path[::2], path[1::2], strict=True)])
+        home = invocation.invocation.plan.kind == MotionKind.HOME
+        higher = Ways(ground).raised(start, present) if home else ""
         ground.context.report.add(
             codes.PATH_OUTSIDE,
             step.span,
-            f"{begins} {breach(policy, present, legs, *volume.height[:2])}",
-            help="the leg to where the step begins counts, widened by the vehicle's position error; "
+            f"{begins} {_breach(ground, present, volume)}",
+            help=f"{higher}; or go around by further steps"
+            if higher
+            else "the leg to where the step begins counts, widened by the vehicle's position error; "
             "go around by further steps",
             labels=[written, *period.labels(present, volume.place, lasts), *labels],
         )
@@ -149,6 +153,14 @@ def _airspace(
     for zone in airspace.inside:
         period.stay(zone, lasts)
     return True
+
+
+def _breach(ground: Ground, airspace: PreparedAirspace, volume: Volume) -> str:
+    """What the vehicle would do in the first part of a volume that does not keep the airspace."""
+    parts = volume.place.parts
+    sweep, low, high = next((part for part in parts if keeps(Places((part,)), airspace) != TRUE), parts[0])
+    points = list(zip(sweep.path[::2], sweep.path[1::2], strict=True))
+    return breach(ground.prepared.policy, airspace, path_legs(points), low, high)
 
 
 class Broken(NamedTuple):

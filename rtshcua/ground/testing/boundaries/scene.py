@@ -10,7 +10,7 @@ from rtshcua.decision.contracts import first_cell, misfit
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import point
-from rtshcua.decision.volume import Planner, flown_at
+from rtshcua.decision.volume import Planner, flown_at, near_home
 from rtshcua.model.flat.contract import PLACE, MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Context, Now, State
@@ -99,7 +99,8 @@ def replanned(invocation: PreparedInvocation, arguments: tuple[int, ...]) -> Pre
     speed = plan.speed if motion.speed == -1 else arguments[motion.speed]
     plan = replace(plan, path=path, altitude=altitude, speed=speed)
     planned: Invocation = replace(flat, arguments=arguments, plan=plan)
-    planner = Planner(plan.kind, path, flown_at(motion, altitude, vehicle), vehicle.position_error)
+    flown = flown_at(motion, altitude, vehicle)
+    planner = Planner(plan.kind, path, flown, vehicle.position_error, near_home(vehicle))
     return changed(
         invocation,
         invocation=planned,

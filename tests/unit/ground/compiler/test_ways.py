@@ -8,9 +8,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapely import MultiPoint, Point, Polygon, box, convex_hull, unary_union
 
-from reference.sources import found, mission, policy, program, skill
+from reference.sources import findings, found, mission, policy, program, skill
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
+from rtshcua.diagnostics.codes import Severity
 from rtshcua.ground.compiler.proofs.fan import Fan, Landmarks, disc, hull
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 from virtual.rows import rows
@@ -139,6 +140,111 @@ def test_the_less_is_known_of_home_the_more_is_found(within: int) -> None:
             "E0508",
             f"home may lie up to {within} m from where it is declared",
         )
+
+
+def towered(ceiling: int, returns: str, *steps: str, inside: str = "city") -> list[tuple[str, str, str]]:
+    """The errors of a mission around a tower 195 m north of home: code, message and help."""
+    vehicle = other(5).replace("reserve 15 %", f"reserve 15 %  {returns}")
+    tower = f"zone tower = circle(47.39950 N, 8.54559 E, 15 m)  ceiling {ceiling} m above home\n"
+    around = "zone around = circle(47.39950 N, 8.54559 E, 40 m)  entry 47.39920 N, 8.54559 E\n"
+    low = "zone low = circle(47.39774 N, 8.54559 E, 400 m)  ceiling 35 m above home\n"
+    rules = policy(f"airspace inside {inside} outside tower")
+    look = skill(
+        "look(over: zone, top: altitude in 5 m .. 60 m = 20 m, pattern: one of grid, perimeter, orbit = orbit, "
+        "pace: speed in 1 m/s .. 8 m/s = 6 m/s)",
+        motion="cover over at top pattern pattern speed pace",
+        lasts="at most 3 min",
+        energy="at most 30 %",
+    )
+    flight = mission(UP, *steps, HOME).replace("on quad", "on other")
+    found = findings(program(vehicle, tower, around, low, look, rules, flight))
+    return [(each.code.id, each.message, each.help or "") for each in found if each.code.severity is Severity.ERROR]
+
+
+ORBIT = (goto("around.entry"), "look(around)", goto("around.entry"))
+
+
+@rows(
+    ("ceiling", "returns", "expected", "help"),
+    [
+        (28, "return at 30 m", [], ""),
+        (29, "return at 30 m", ["E0514"], "with `return at 31 m` the way home leads above it"),
+        (28, "", ["E0514"], "with `return at 30 m` the way home leads above it"),
+        (38, "return at 20 m", ["E0514"], "with `return at 40 m` the way home leads above it"),
+        (16, "", [], ""),  # it flies above it all the while
+    ],
+)
+def test_the_way_home_from_around_a_tower_leads_above_it(
+    ceiling: int, returns: str, expected: list[str], help: str
+) -> None:
+    found = towered(ceiling, returns, *ORBIT)
+    assert [code for code, _, _ in found] == expected
+    if found:
+        ((_, message, helps),) = found
+        assert message.endswith("would enter `tower`, near 47.39957 N, 8.54575 E")
+        assert (help in helps) if help else ("return at" not in helps)
+
+
+@rows(("ceiling", "help"), [(32, "`return at 34 m`"), (33, "")])
+def test_no_return_altitude_is_named_that_leaves_the_airspace(ceiling: int, help: str) -> None:
+    ((code, _, helps),) = towered(ceiling, "return at 30 m", *ORBIT, inside="low")
+    assert code == "E0514"
+    assert help in helps
+    assert ("return at" in helps) == bool(help)
+
+
+def test_the_return_altitude_that_a_finding_names_is_enough() -> None:
+    for ceiling in (21, 33, 38):
+        ((_, _, help),) = towered(ceiling, "", *ORBIT)
+        named = int(help.split("`return at ")[1].split(" m`")[0])
+        assert towered(ceiling, f"return at {named} m", *ORBIT) == []
+        assert towered(ceiling, f"return at {named - 1} m", *ORBIT) != []
+
+
+def test_a_mission_that_returns_from_behind_a_tower_is_told_the_height_too() -> None:
+    behind = (goto("47.39860 N, 8.54700 E"), goto("47.40000 N, 8.54620 E"), goto("47.40000 N, 8.54559 E"))
+    codes = {code: help for code, _, help in towered(33, "return at 30 m", *behind)}
+    assert sorted(codes) == ["E0508", "E0514"]
+    assert all("with `return at 35 m` the way home leads above it" in help for help in codes.values())
+    assert towered(33, "return at 35 m", *behind) == []
+
+
+@rows(
+    ("place", "expected"),
+    [
+        ("47.39789 N, 8.54559 E", ["E0514"]),  # 17 m from home: within 10 + 5 + 3 m
+        ("47.39795 N, 8.54559 E", []),  # 23 m
+    ],
+)
+def test_near_home_the_way_home_may_be_low(place: str, expected: list[str]) -> None:
+    """A hedge north of home, gone around; from just behind it a return may not climb."""
+    hedge = (
+        "zone hedge = polygon(47.397840 N, 8.54545 E, 47.397840 N, 8.54573 E, 47.397850 N, 8.54573 E, "
+        "47.397850 N, 8.54545 E)  ceiling 25 m above home\n"
+    )
+    vehicle = other(5).replace("reserve 15 %", "reserve 15 %  return at 30 m")
+    around = [goto("47.39774 N, 8.54600 E"), goto("47.39811 N, 8.54600 E"), goto(place)]
+    flight = mission(UP, *around, "emergency_land()").replace("on quad", "on other")
+    rules = policy("airspace inside city outside hedge")
+    found = [each.code.id for each in findings(program(vehicle, hedge, rules, flight))]
+    assert found == expected
+
+
+def test_the_climb_and_the_descent_of_the_way_home_keep_the_airspace() -> None:
+    """A roof over a part of the way, and one over where home may be."""
+    roof = "zone roof = circle(47.39950 N, 8.54559 E, 15 m)  floor 24 m ceiling 50 m above home\n"
+    vehicle = other(12).replace("reserve 15 %", "reserve 15 %  return at 55 m")
+    under = mission(UP, goto("47.39950 N, 8.54559 E"), HOME).replace("on quad", "on other")
+    ((_, message), *_) = found(program(vehicle, roof, policy("airspace inside city outside roof"), under))
+    assert message == (
+        "the climb before the way home from this step, which begins 196 m north of home, would enter `roof`, near "
+        "47.39937 N, 8.54559 E"
+    )
+    porch = roof.replace("47.39950 N, 8.54559 E, 15 m", "47.39774 N, 8.54575 E, 3 m")
+    out = mission("takeoff(altitude = 10 m)", "goto(47.39950 N, 8.54559 E, altitude = 10 m)", HOME)
+    rules = policy("airspace inside city outside roof")
+    messages = [message for _, message in found(program(vehicle, porch, rules, out.replace("on quad", "on other")))]
+    assert any(message.startswith("the descent at the end of the way home") for message in messages)
 
 
 def test_zones_with_times_are_left_for_on_board() -> None:

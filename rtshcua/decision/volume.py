@@ -27,7 +27,7 @@ SHORT = 2_000
 #: a return from no further away than this, mm, or than a third of the height, may be flown lower: PX4 within
 #: RTL_MIN_DIST, ArduCopter by RTL_CONE_SLOPE
 NEAR = 10_000
-_STEEP = 3
+STEEP = 3
 
 
 class Volume(NamedTuple):
@@ -125,7 +125,12 @@ def near_home(vehicle: Vehicle) -> int:
     """From how far, mm, a return may be flown lower than the vehicle's return altitude: wherever home really is, and
     as far as the position may be wrong.
     """
-    return max(NEAR, -(-vehicle.return_altitude // _STEEP)) + vehicle.home_within + vehicle.position_error
+    return cone(vehicle.return_altitude) + vehicle.home_within + vehicle.position_error
+
+
+def cone(returns: int) -> int:
+    """How far from the real home a return may be flown lower than the height that it climbs to; all in mm."""
+    return max(NEAR, -(-returns // STEEP))
 
 
 def flown_at(motion: Motion, altitude: int, vehicle: Vehicle) -> int | None:

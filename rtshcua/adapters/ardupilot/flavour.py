@@ -3,11 +3,12 @@
 It obeys position targets in GUIDED only, and ignores them silently elsewhere; takeoff takes a height above home.
 """
 
-from rtshcua.adapters.vehicle import effects, flavour, messages
+from rtshcua.adapters.vehicle import effects, flavour, messages, returns
 from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.effects import Effect
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.returns import ReturnLimit
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
 from rtshcua.model.flat.contract import MotionKind
@@ -99,6 +100,11 @@ ARDUPILOT = AutopilotFlavour(
     ours=frozenset({CopterMode.GUIDED, CopterMode.BRAKE, CopterMode.RTL}),
     mode_within_us=200_000,  # HEARTBEAT is streamed at twice that rate
     returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
+    limits=(
+        (ReturnLimit("RTL_CONE_SLOPE", 1_000, returns.slope, may_be_off=True),),
+        (ReturnLimit("RTL_CLIMB_MIN", 10, returns.climb), ReturnLimit("RTL_CLIMB_MIN_M", 1_000, returns.climb)),
+        (ReturnLimit("WPNAV_RADIUS", 10, returns.corner), ReturnLimit("WP_RADIUS_M", 1_000, returns.corner)),
+    ),
     critical_acts=False,  # a failsafe that acts changes the mode
     bytewise=False,
     fence=FenceHabits(

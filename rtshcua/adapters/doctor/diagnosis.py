@@ -8,11 +8,12 @@ from typing import Final
 import msgspec
 
 from rtshcua.adapters.doctor.examination import ExaminingDriver
-from rtshcua.adapters.doctor.settings import SETTINGS, Need, Setting
+from rtshcua.adapters.doctor.settings import SETTINGS, Setting
 from rtshcua.adapters.qualification.identity import firmware_of, those_that_matter
 from rtshcua.adapters.qualification.standing import Standing
 from rtshcua.adapters.vehicle.bounds import Reach, reach_of
 from rtshcua.adapters.vehicle.preflight import SAME_MM
+from rtshcua.adapters.vehicle.returns import Need
 from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
 from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT

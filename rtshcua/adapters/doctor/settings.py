@@ -8,16 +8,11 @@ speeds are WPNAV_* in cm/s before 4.7 and WP_* in m/s from then on.
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
+from rtshcua.adapters.vehicle import returns
 from rtshcua.adapters.vehicle.bounds import Reach
+from rtshcua.adapters.vehicle.returns import Need
 from rtshcua.model.flat.limits import MAX_SPEED
-from rtshcua.model.flat.policy import Policy
-
-
-class Need(NamedTuple):
-    """What is needed of a parameter: at least or at most so much, in mm or mm/s."""
-
-    least: int | None = None
-    most: int | None = None
+from rtshcua.model.flat.policy import Policy, Vehicle
 
 
 class Setting(NamedTuple):
@@ -40,7 +35,9 @@ class Setting(NamedTuple):
     @property
     def unit(self) -> str:
         """Of its number, for a person."""
-        return "" if not self.mm else " m/s" if "speed" in self.about else " m"
+        if not self.mm or "slope" in self.about:
+            return ""
+        return " m/s" if "speed" in self.about else " m"
 
 
 def _speed(policy: Policy, _: Reach) -> Need | None:
@@ -103,6 +100,10 @@ def _returns(policy: Policy, _: Reach) -> Need | None:
     return Need(height, height) if height else None
 
 
+def _of(needs: Callable[[Vehicle], Need | None]) -> Callable[[Policy, Reach], Need | None]:
+    return lambda policy, _: needs(policy.vehicle)
+
+
 def _far(policy: Policy, reach: Reach) -> Need | None:
     return Need(least=reach.farthest + policy.vehicle.position_error) if reach.farthest else None
 
@@ -144,6 +145,13 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting("GF_MAX_HOR_DIST", "its own fence ends, from home (0: nowhere)", mm=1_000, needs=_far),
         Setting("GF_MAX_VER_DIST", "its own fence ends, above home (0: nowhere)", mm=1_000, needs=_high),
         Setting("RTL_RETURN_ALT", "height of a return", mm=1_000, needs=_returns),
+        Setting("RTL_CONE_ANG", "degrees, half the angle of the cone in which a return is low (0: none)"),
+        Setting("RTL_MIN_DIST", "how far from home a return may be low", mm=1_000, needs=_of(returns.near)),
+        Setting("NAV_MC_ALT_RAD", "how near to a height it counts as there", mm=1_000, needs=_of(returns.corner)),
+        Setting(
+            "RTL_TYPE", "where a return goes", {0: "home, or a rally point that is nearer"},
+            {float(kind): "what is proved of the way home is proved of home alone" for kind in range(1, 6)}, 0,
+        ),
         Setting("MPC_XY_CRUISE", "speed across where a step says none", mm=1_000, needs=_speed_and_return),
         Setting("MPC_XY_VEL_MAX", "greatest speed across", mm=1_000),
         Setting("MPC_Z_VEL_MAX_UP", "greatest speed up", mm=1_000, needs=_climb),
@@ -216,6 +224,18 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting("FENCE_MARGIN", "room that it keeps to its fence", mm=1_000),
         Setting("RTL_ALT", "height of a return", mm=10, needs=_returns),
         Setting("RTL_ALT_M", "height of a return", mm=1_000, needs=_returns),
+        Setting(
+            "RTL_CONE_SLOPE", "slope of the cone in which a return is low near home (0: none)", mm=1_000,
+            needs=_of(returns.slope),
+        ),
+        Setting("RTL_CLIMB_MIN", "climb of a return above its height", mm=10, needs=_of(returns.climb)),
+        Setting("RTL_CLIMB_MIN_M", "climb of a return above its height", mm=1_000, needs=_of(returns.climb)),
+        Setting(
+            "RTL_ALT_TYPE", "height of a return counts from", {0: "home", 1: "the terrain"},
+            {1: "what is proved of the way home is proved of heights above home"}, 0,
+        ),
+        Setting("WPNAV_RADIUS", "how near to a place it turns", mm=10, needs=_of(returns.corner)),
+        Setting("WP_RADIUS_M", "how near to a place it turns", mm=1_000, needs=_of(returns.corner)),
         Setting(
             "AVOID_ENABLE", "keeps away from (in LOITER and GUIDED velocity flight)",
             {0: "nothing", 1: "fences", 2: "obstacles", 3: "fences and obstacles", 4: "beacon fences",

@@ -4,11 +4,12 @@ Altitudes in commands are above mean sea level here, whatever the frame says. An
 DO_SET_MODE says nothing: only the heartbeat tells, and of a stop only the speed.
 """
 
-from rtshcua.adapters.vehicle import effects, flavour, messages
+from rtshcua.adapters.vehicle import effects, flavour, messages, returns
 from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.messages import NAN
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.returns import ReturnLimit
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
@@ -77,6 +78,10 @@ PX4 = AutopilotFlavour(
     ours=frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD, Px4Mode.RETURN}),
     mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
+    limits=(
+        (ReturnLimit("RTL_MIN_DIST", 1_000, returns.near),),
+        (ReturnLimit("NAV_MC_ALT_RAD", 1_000, returns.corner),),
+    ),
     critical_acts=True,  # since 1.15 a warning alone does not count (PX4-Autopilot pull request 22879)
     bytewise=True,
     fence=FenceHabits(frame=enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, all_inclusions=False, switches=()),

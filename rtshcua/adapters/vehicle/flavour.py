@@ -9,6 +9,7 @@ from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.effects import Effect, Measure
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle, Reported
+from rtshcua.adapters.vehicle.returns import ReturnLimit
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.onboard.ports import Command
 
@@ -116,9 +117,9 @@ class AutopilotFlavour:
     in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay.
     `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
     top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
-    there. `critical_acts`: a critical state in the air says that a failsafe of its own acts, also where it stays in the
-    mode that it is in; else it may tell only. `bytewise`: integer parameters travel as their bytes. `fence` says how it
-    takes a geofence, `own_fence` what bounds it has besides.
+    there, `limits` groups of such that lower or lift a return. `critical_acts`: a critical state in the air says that a
+    failsafe of its own acts, also where it stays in the mode that it is in; else it may tell only. `bytewise`: integer
+    parameters travel as their bytes. `fence` says how it takes a geofence, `own_fence` what bounds it has besides.
     """
 
     name: str
@@ -130,6 +131,7 @@ class AutopilotFlavour:
     ours: frozenset[int]
     mode_within_us: int
     returns: tuple[ReturnAltitude, ...]
+    limits: tuple[tuple[ReturnLimit, ...], ...]
     critical_acts: bool
     bytewise: bool
     fence: FenceHabits

@@ -15,6 +15,7 @@ from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ReturnAltitude
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
+from rtshcua.adapters.vehicle.returns import ReturnLimits
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -47,6 +48,7 @@ class Preflight:
         self._seen = seen
         self._projection, self._home_within = policy.projection, policy.vehicle.home_within
         self._wanted_mm = policy.vehicle.return_altitude
+        self._limits = ReturnLimits(flavour.limits, policy.vehicle)
         self._parameters = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
         self._fencing = Fencing(policy, flavour, self._parameters, wanted=fence, slack=slack)
         self._policy, self._steps = policy, steps
@@ -63,6 +65,7 @@ class Preflight:
         if self._wanted_mm and self._found is None:
             for each in self._flavour.returns:
                 self._parameters.read(each.parameter)
+        self._limits.ask(self._parameters)
         for name in self._flavour.own_fence.names if self._steps else ():
             if name not in self._parameters.values:
                 self._parameters.read(name)
@@ -112,7 +115,7 @@ class Preflight:
     def astray(self) -> str | None:
         """What is known to be otherwise than the policy has it, in words."""
         returns = None if self._found is None else self._returns_at(self._found)
-        return self._far_from_home() or returns or self._bounded()
+        return self._far_from_home() or returns or self._limits.wrong(self._values) or self._bounded()
 
     @property
     def unplaced(self) -> str | None:
@@ -123,7 +126,7 @@ class Preflight:
     def unread(self) -> str | None:
         """That its return altitude is not known, in words."""
         if not self._wanted_mm or self._found is not None:
-            return self._bounds_unread()
+            return self._limits.unread(self._parameters) or self._bounds_unread()
         names = [each.parameter for each in self._flavour.returns]
         quoted = " or ".join(f"`{name}`" for name in names)
         if all(map(self._parameters.is_absent, names)):

@@ -31,14 +31,20 @@ CITY = replace(
 FLAVOURS = pytest.mark.parametrize("flavour", [PX4, ARDUPILOT], ids=lambda flavour: flavour.name)
 
 
+#: what limits the way home, of both flavours
+AS_IT_COMES = {
+    "RTL_MIN_DIST": 10.0, "NAV_MC_ALT_RAD": 0.8, "RTL_CONE_SLOPE": 3.0, "RTL_CLIMB_MIN": 0.0, "WPNAV_RADIUS": 200.0,
+}  # fmt: skip
+
+
 class Port:
     """A vehicle that takes parameters and a fence, as the flavour asks and answers. `lose` decides on each frame."""
 
     def __init__(self, flavour: Flavour, parameters: dict[str, float] | None = None) -> None:
         self.flavour = flavour
         self.legacy = flavour is ARDUPILOT
-        self.parameters = parameters if parameters is not None else {"RTL_RETURN_ALT": 30.0, "RTL_ALT": 3_000.0,
-                                                                    "FENCE_TYPE": 3.0, "FENCE_ENABLE": 0.0}  # fmt: skip
+        usual = {"RTL_RETURN_ALT": 30.0, "RTL_ALT": 3_000.0, "FENCE_TYPE": 3.0, "FENCE_ENABLE": 0.0}
+        self.parameters = parameters if parameters is not None else usual | AS_IT_COMES
         self.items: dict[int, Any] = {}
         self.count = 0
         self.result = 0
@@ -162,6 +168,47 @@ def test_the_same_return_altitude_is_ready(flavour: Flavour, parameters: Any) ->
     one = preflight(flavour, fence=False)
     Port(flavour, parameters).settle(one)
     assert one.unready is None
+
+
+@rows(("flavour", "parameters", "says"), [
+    (PX4, {}, None),
+    (PX4, {"RTL_MIN_DIST": 10.5}, "set `RTL_MIN_DIST` to at most 10"),
+    (PX4, {"NAV_MC_ALT_RAD": 2.5}, "set `NAV_MC_ALT_RAD` to at most 2"),
+    (PX4, {"NAV_MC_ALT_RAD": float("nan")}, "(`NAV_MC_ALT_RAD` is nan): set `NAV_MC_ALT_RAD` to at most 2"),
+    (ARDUPILOT, {}, None),
+    (ARDUPILOT, {"RTL_CONE_SLOPE": 0.0}, None),
+    (ARDUPILOT, {"RTL_CONE_SLOPE": 1.0}, "(`RTL_CONE_SLOPE` is 1): set `RTL_CONE_SLOPE` to at least 3"),
+    (ARDUPILOT, {"RTL_CLIMB_MIN": 100.0}, "set `RTL_CLIMB_MIN` to at most 0"),
+    (ARDUPILOT, {"WPNAV_RADIUS": 500.0}, "set `WPNAV_RADIUS` to at most 200"),
+])  # fmt: skip
+def test_what_lowers_or_lifts_the_way_home_keeps_it_from_being_ready(
+    flavour: Flavour, parameters: dict[str, float], says: str | None
+) -> None:
+    one = preflight(flavour, fence=False)
+    Port(flavour, {"RTL_RETURN_ALT": 30.0, "RTL_ALT": 3_000.0} | AS_IT_COMES | parameters).settle(one)
+    assert says is None if one.unready is None else (says or "nothing") in one.unready
+
+
+def test_the_limits_of_the_way_home_by_their_new_names_and_for_another_height() -> None:
+    high = replace(CITY, vehicle=replace(CITY.vehicle, return_altitude=60_000))
+    new = {"RTL_ALT_M": 60.0, "RTL_CONE_SLOPE": 0.0, "RTL_CLIMB_MIN_M": 0.0, "WP_RADIUS_M": 2.0}
+    for flavour, parameters, ready in (
+        (ARDUPILOT, new, True),
+        (ARDUPILOT, new | {"WP_RADIUS_M": 2.5}, False),
+        (ARDUPILOT, new | {"RTL_CLIMB_MIN_M": 1.0}, False),
+        (PX4, {"RTL_RETURN_ALT": 60.0, "NAV_MC_ALT_RAD": 0.8, "RTL_MIN_DIST": 20.0}, True),
+        (PX4, {"RTL_RETURN_ALT": 60.0, "NAV_MC_ALT_RAD": 0.8, "RTL_MIN_DIST": 21.0}, False),
+    ):
+        one = Preflight(high, flavour, at_home(), fence=False)
+        Port(flavour, parameters).settle(one)
+        assert (one.unready is None) is ready, parameters
+
+
+def test_what_limits_the_way_home_is_waited_for() -> None:
+    one, port = preflight(PX4, fence=False), Port(PX4)
+    port.lose = lambda name: name == "PARAM_VALUE" and len(port.heard) > 1
+    port.settle(one, 3)
+    assert one.unready == "what limits its way home (`RTL_MIN_DIST`) was not read yet"
 
 
 @FLAVOURS

@@ -43,7 +43,7 @@ class Energy:
     planned place, and the vehicle's reserve.
 
     A skill that ends on the ground needs no way home, and it is what the reserve is kept for; the others are those that
-    `stays` is true of. `asked` is the speed that the step asks for, 0 if none.
+    `stays` is true of. `asked` is the slowest speed that the step and those before it ask for, 0 if none does.
     """
 
     __slots__ = ("_asked", "_fixed", "_vehicle", "stays")

@@ -27,6 +27,11 @@ OVER_HOME = 5 * SECOND
 LANDED = 8 * SECOND
 
 
+def slower(one: int, other: int) -> int:
+    """The slower of two speeds that steps ask for, mm/s; 0 asks for none."""
+    return min(one or other, other or one)
+
+
 def over_ground(speeds: Speeds, asked: int, wind: int | None = None) -> int:
     """The speed over ground that is sure where `asked` is flown, against the declared wind or another, mm/s."""
     return max(1, min(asked, speeds.air - (speeds.wind if wind is None else wind)))
@@ -58,7 +63,8 @@ def landing_us(speeds: Speeds, height: int) -> int:
 def home_us(vehicle: Vehicle, speeds: Speeds, distance: int, heights: tuple[int, int], asked: int = 0) -> int:
     """Home from anywhere within a distance of where it is declared and between two heights, and down there.
 
-    An autopilot may go on with the speed that a step asked for (PX4: DO_CHANGE_SPEED outlives the mode).
+    An autopilot may go on with a speed that this step or one before it asked for (PX4: DO_CHANGE_SPEED outlives the
+    mode): `asked` is the slowest of these, 0 if none did.
     """
     low, high = heights
     up = rising_us(speeds, vehicle.return_altitude - low)

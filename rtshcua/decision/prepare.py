@@ -5,7 +5,7 @@ malformed is refused with a value that names it. Signatures, digests and binding
 """
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import msgspec
@@ -14,6 +14,7 @@ from rtshcua.decision.checks import mission as mission_checks
 from rtshcua.decision.checks.policy import problems
 from rtshcua.decision.contracts import Energy, first_cell, longest, misfit
 from rtshcua.decision.evaluate import NO_PHASE, Condition, Environment, Tables, always, build, within
+from rtshcua.decision.flying import slower
 from rtshcua.decision.times import local_time
 from rtshcua.decision.tree import Node, monitored, parse, scope_of, slots_read, where
 from rtshcua.decision.values import AND, NOT, TRUE, Sets, Truth, Value, point
@@ -325,12 +326,23 @@ def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedI
     if problem is not None:
         return Refusal("malformed", problem)
     prepared: list[PreparedInvocation] = []
+    slowest = 0
     for step, invocation in enumerate(mission.invocations):
         found = prepare_invocation(invocation, policy, mission.phases)
         if isinstance(found, Refusal):
             return Refusal("malformed", f"step {step}: {found.text}")
-        prepared.append(found)
+        prepared.append(at_slowest(found, slowest))
+        slowest = slower(slowest, invocation.plan.speed)
     return tuple(prepared)
+
+
+def at_slowest(prepared: PreparedInvocation, slowest: int) -> PreparedInvocation:
+    """The invocation in a mission whose steps before it ask for a speed as slow as this, mm/s; 0 if none does."""
+    plan, contract = prepared.invocation.plan, prepared.invocation.contract
+    asked = slower(slowest, plan.speed)
+    if asked == plan.speed:
+        return prepared
+    return replace(prepared, energy=Energy(contract, prepared.policy.policy.vehicle, asked))
 
 
 def prepare_invocation(

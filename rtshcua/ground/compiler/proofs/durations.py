@@ -56,21 +56,11 @@ class StepBound(NamedTuple):
     energy: int
 
 
-class Slowest(NamedTuple):
-    """The slowest speed that a step asked for so far, mm/s; 0: none did."""
-
-    speed: int = 0
-
-    def after(self, speed: int) -> "Slowest":
-        """With one more step, that asks for this speed, 0 for none."""
-        return Slowest(min(self.speed or speed, speed or self.speed))
-
-
 def prove(
-    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: Slowest
+    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: int
 ) -> StepBound | None:
-    """What a step takes at most that may begin at `starts`, `slowest` being that of it and those before; None after a
-    finding.
+    """What a step takes at most that may begin at `starts`; None after a finding. `slowest` is the slowest speed that
+    it and those before it ask for, mm/s, 0 if none does.
     """
     before = len(ground.context.report.found)
     speeds, contract = _speeds(ground), invocation.invocation.contract
@@ -78,7 +68,7 @@ def prove(
 
     def takes(height: int) -> int:
         """What it takes if it leads to a height."""
-        return max(_step_us(ground, invocation, start, height, slowest.speed, wind) for start in starts)
+        return max(_step_us(ground, invocation, start, height, slowest, wind) for start in starts)
 
     time_us, fits = takes(invocation.invocation.plan.altitude), _energy_us(speeds, contract.energy)
     if 0 < contract.duration_us < time_us:
@@ -96,7 +86,7 @@ def prove(
         nearer = _nearer(ground, step, invocation, starts[0].height, takes, fits)
         _too_much(ground, step, "the step", contract, energy, nearer)
     if len(ground.context.report.found) == before:
-        _links(ground, step, invocation, starts, slowest.speed)
+        _links(ground, step, invocation, starts, slowest)
     if len(ground.context.report.found) > before:
         return None
     return StepBound(contract.name, time_us, energy)

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
+from rtshcua.decision.flying import slower
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.proofs import chaining, charge, durations, last_link, path, starting
-from rtshcua.ground.compiler.proofs.durations import Slowest, StepBound
+from rtshcua.ground.compiler.proofs.durations import StepBound
 from rtshcua.ground.compiler.proofs.period import Period
 from rtshcua.ground.compiler.proofs.places import AT_HOME, MOST_PLACES, Place, after, may_be_skipped
 from rtshcua.ground.compiler.proofs.situation import Ground
@@ -29,7 +30,7 @@ def prove(
     ways = Ways(ground)
     starts: list[tuple[Place, ...]] = []
     places: tuple[Place, ...] = (AT_HOME,)
-    decided, slowest = True, Slowest()
+    decided, slowest = True, 0
     bounds: list[StepBound] = []
     for number, (step, one, period) in enumerate(zip(steps, invocations, comes, strict=True)):
         able = places if permitted[number] and one.invocation.skill not in ground.impossible else ()
@@ -37,7 +38,7 @@ def prove(
             able = chaining.aloft(ground, step, one, able, steps[:number])
         able = path.prove(ground, step, one, period, able, steps[:number]) if able else ()
         able = chaining.aloft(ground, step, one, able, steps[:number])
-        slowest = slowest.after(one.invocation.plan.speed)
+        slowest = slower(slowest, one.invocation.plan.speed)
         bound = durations.prove(ground, step, one, able, slowest) if able else None
         able = chaining.prove(ground, step, one, able, steps[:number]) if able else ()
         if not able or not (number or starting.prove(ground, step, comes)):

@@ -2,7 +2,8 @@
 
 from functools import lru_cache
 
-from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
+from rtshcua.decision.flying import slower
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, at_slowest, prepare
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
@@ -58,12 +59,14 @@ def _asked(policy: Policy) -> tuple[PreparedPolicy, Questions] | Refusal:
 def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> tuple[StepBound, ...]:
     """The proofs of a mission under a policy; what each step takes at most, as far as the mission can be flown."""
     prepared: list[PreparedInvocation] = []
+    slowest = 0
     for invocation in mission.invocations:
         found = ground.prepare(invocation, mission.phases)
         if isinstance(found, Refusal):
             refused(ground.context, ground.lowered, found)
             return ()
-        prepared.append(found)
+        prepared.append(at_slowest(found, slowest))
+        slowest = slower(slowest, invocation.plan.speed)
     steps = [step for phase in declared.phases for step in phase.steps]
     permitted = [authority.prove(ground, declared, step, one) for step, one in zip(steps, prepared, strict=True)]
     before = len(ground.context.report.found)

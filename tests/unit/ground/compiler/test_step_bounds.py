@@ -5,10 +5,13 @@ from pathlib import Path
 import pytest
 
 from reference.sources import LIBRARY, findings, found, mission, policy, program, skill
-from rtshcua.ground.compiler.program import compile_program
+from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.compiler.proofs.durations import StepBound
 from rtshcua.ground.language.load import load
 from rtshcua.mavlink import dialect
+from rtshcua.wire.binding import bind
 from virtual.rows import rows
 
 UP, HOME = "takeoff(altitude = 20 m)", "return_home()"
@@ -18,13 +21,18 @@ LONG = {"lasts": "at most 5 min", "energy": "at most 30 %"}
 EAST = "aim: position, top: altitude in 5 m .. 50 m"
 
 
-def bounds(*parts: str) -> tuple[StepBound, ...]:
-    """What the steps of a program are proved to take."""
+def compiled(*parts: str) -> Compiled:
+    """A program, compiled."""
 
     def read(path: str) -> bytes:
         return program(*parts).encode() if path == "probe.rts" else Path(path).read_bytes()
 
-    made = compile_program(load(["probe.rts"], read, LIBRARY), dialect.load(), mission=None, issued_at_us=1)
+    return compile_program(load(["probe.rts"], read, LIBRARY), dialect.load(), mission=None, issued_at_us=1)
+
+
+def bounds(*parts: str) -> tuple[StepBound, ...]:
+    """What the steps of a program are proved to take."""
+    made = compiled(*parts)
     assert made.bounds is not None, made.diagnostics
     return made.bounds.steps
 
@@ -102,3 +110,47 @@ def test_the_nearest_height_that_is_in_time_is_named(top: str) -> None:
     further = int(fix.replacement.split()[0]) + (1 if top == "45 m" else -1)
     again = text[: fix.span.start] + f"{further} m" + text[fix.span.end :]
     assert [code for code, _ in found(again) if code == "E0804"] == ["E0804"]
+
+
+def prepared_steps(*parts: str) -> tuple[PreparedInvocation, ...]:
+    """The steps of a program, as on board."""
+    made = compiled(*parts)
+    assert made.policy is not None
+    assert made.mission is not None, made.diagnostics
+    policy = prepare(made.policy)
+    assert not isinstance(policy, Refusal)
+    steps = prepare_mission(bind(made.mission, bytes(32)), policy)
+    assert not isinstance(steps, Refusal)
+    return steps
+
+
+def test_on_board_the_way_home_counts_the_slowest_speed_that_was_asked_for() -> None:
+    """As the proofs count it, or the boundary would admit what they refuse."""
+    goto = "goto(47.398{}9 N, 8.54559 E, 20 m, speed = {} m/s)"
+    legs = [goto.format(1, 4), goto.format(2, 2), goto.format(1, 5), "hover()"]
+    steps = prepared_steps(policy(), mission(UP, *legs, HOME))
+    alone = prepared_steps(policy(), mission(UP, goto.format(1, 2), HOME))[1]
+    fast = prepared_steps(policy(), mission(UP, goto.format(1, 5), HOME))[1]
+    ways = [step.energy.way_home(100_000, (20_000, 20_000)) for step in (*steps, alone, fast)]
+    up, four, two, five, hover, _, slow, quick = ways
+    assert four > up >= quick
+    assert two == five == hover == slow > four
+
+
+def test_the_charge_of_a_mission_is_proved_as_on_board() -> None:
+    """E0620: with what the steps before may have taken, a step that comes after a slow one finds too little."""
+    far = "goto(47.40100 N, 8.54559 E, 20 m, speed = {} m/s)"
+    near = "goto(47.39864 N, 8.54559 E, 20 m, speed = {} m/s)"
+    long = skill(
+        "goto2(target: position, altitude: altitude in 5 m .. 60 m, speed: speed in 1 m/s .. 8 m/s)",
+        motion="fly to target at altitude speed speed", lasts="at most 10 min", energy="at most 25 %",
+        fallback="emergency_land",
+    )  # fmt: skip
+
+    def charged(first: int) -> list[str]:
+        legs = [near.format(first).replace("goto(", "goto2("), far.format(8).replace("goto(", "goto2(")]
+        rules = policy(contingency="emergency_land")
+        return [code for code, _ in found(program(long, rules, mission(UP, *legs, "emergency_land()")))]
+
+    assert charged(8) == []
+    assert charged(1) == ["E0620"]

@@ -115,6 +115,7 @@ class Drawn(NamedTuple):
     forbid: tuple[bool, Zone] | None
     legs: tuple[Leg, ...]
     within: float
+    returns: float  # the height above home that it returns at; 0: that is not said
 
 
 def zone(of: Random, name: str, dated: bool) -> Zone:
@@ -168,8 +169,11 @@ def draw(seed: int) -> Drawn:
     latest += RETURN[0]
     legs.append(Leg(at, (0.0, 0.0, 0.0), latest, latest + RETURN[1], False, True))
     steps.append("return_home()")
-    text = _text(zones, inside, outside, maintain, permit, forbid, steps, within)
-    return Drawn(text, issued, zones, tuple(inside), tuple(outside), maintain, permit, forbid, tuple(legs), within)
+    returns = of.choice([0.0, 18.0, 29.0, 30.0, 40.0])
+    text = _text(zones, inside, outside, maintain, permit, forbid, steps, within, returns)
+    return Drawn(
+        text, issued, zones, tuple(inside), tuple(outside), maintain, permit, forbid, tuple(legs), within, returns
+    )
 
 
 def _side(rule: tuple[bool, Zone]) -> str:
@@ -178,7 +182,7 @@ def _side(rule: tuple[bool, Zone]) -> str:
 
 def _text(
     zones: tuple[Zone, ...], inside: list[Zone], outside: list[Zone], maintain: tuple[bool, Zone] | None,
-    permit: tuple[bool, Zone] | None, forbid: tuple[bool, Zone] | None, steps: list[str], within: float,
+    permit: tuple[bool, Zone] | None, forbid: tuple[bool, Zone] | None, steps: list[str], within: float, returns: float,
 ) -> str:  # fmt: skip
     lists = [("inside", inside), ("outside", outside)]
     airspace = " ".join(f"{word} {', '.join(each.name for each in some)}" for word, some in lists if some)
@@ -189,6 +193,7 @@ def _text(
             f'vehicle quad {{\n  identity "quad-07"\n  home {written(0, 0)} within {within:.0f} m\n',
             f"  speed at most 12 m/s  climb at most 3 m/s\n  position error {ERROR:.0f} m\n",
             "  energy 100 % = 18 min hover  reserve 15 %\n",
+            f"  return at {returns:.0f} m\n" if returns else "",
             "  clock utc +02:00\n}\n",
             *(each.source() for each in zones),
             "skill fly(target: position, altitude: altitude in 5 m .. 60 m) {\n  motion fly to target at altitude\n",
@@ -288,20 +293,13 @@ def needs(program: Drawn) -> Needs:
     for leg in program.legs:
         path = list(_between(leg.start, leg.end))
         low, high = sorted((leg.start[2], leg.end[2]))
-        # who comes home flies as high as before, and comes down there
-        parts = [(path, high, high), ([(0.0, 0.0)], low, high)] if leg.home else [(path, low, high)]
         for each, side in airspace:
-            for part in parts:
-                found += _stay(each, side, _extent(each, *part), 0, (leg.ended, leg.ended))
-            if not leg.home:
-                ways = [
-                    place
-                    for at in path[::2]
-                    for home in _homes(program.within)
-                    for place in list(_between(at, home))[::2]
-                ]
-                extent = _extent(each, ways, low, high)
-                found += _stay(each, side, extent, 0, (leg.ended + HOMEWARD, leg.ended + ALL_LINKS))
+            if leg.home:
+                found += _homeward(program, each, side, [leg.start[:2]], high, high, (leg.ended, leg.ended))
+            else:
+                found += _stay(each, side, _extent(each, path, low, high), 0, (leg.ended, leg.ended))
+                until = (leg.ended + HOMEWARD, leg.ended + ALL_LINKS)
+                found += _homeward(program, each, side, path[::2], low, high, until)
         if leg.flies:
             if program.maintain:
                 side, each = program.maintain
@@ -320,6 +318,26 @@ def needs(program: Drawn) -> Needs:
         tuple(need for sure, need in found if sure and need is not None),
         tuple(need for sure, need in found if not sure and need is not None),
     )
+
+
+def _homeward(
+    program: Drawn, zone: Zone, inside: bool, starts: list[tuple[float, float]], low: float, high: float,
+    until: tuple[int, int],
+) -> Iterator[tuple[bool, Need | None]]:  # fmt: skip
+    """What the ways home from some places, anywhere between two heights, need of a zone: up there, across, down."""
+    homes, returns = _homes(program.within), program.returns
+    top = max(high, returns)
+    # who begins so near to home may stay as low as there: stock cones reach out to 10 m, or a third of the height
+    near = max(10.0, returns / 3) + program.within + ERROR
+    surely, hardly = ([not returns or hypot(*at) < near + each for at in starts] for each in (-SURE, CLEAR))
+    for low_from, kinds in ((surely, (True, False)),) if surely == hardly else ((surely, (True,)), (hardly, (False,))):
+        parts = [(homes, 0.0, top)]
+        for lowly, least in ((True, low), (False, max(low, returns - 2.0))):
+            some = [at for at, is_low in zip(starts, low_from, strict=True) if is_low == lowly]
+            ways = [place for at in some for home in homes for place in list(_between(at, home))[::2]]
+            parts += [(ways, least, top), (some, low, top)] if some else []
+        for part in parts:
+            yield from (each for each in _stay(zone, inside, _extent(zone, *part), 0, until) if each[0] in kinds)
 
 
 def _asked(zone: Zone, inside: bool, depth: float, latest: int) -> Iterator[tuple[bool, Need | None]]:

@@ -1,0 +1,106 @@
+"""Returns from behind a tower that is a keep-out lead over it, by what really was: ours, and a pilot's."""
+
+from collections.abc import Callable
+from math import hypot
+from pathlib import Path
+
+import pytest
+
+from rtshcua.model import faults
+from rtshcua.model.faults import Fault, Mode
+from rtshcua.model.scenario import AfterStep
+from rtshcua.virtual.flown import Sample, ScenarioFlown
+from rtshcua.virtual.judge import judge, local_mm
+from virtual import case
+from virtual.scenarios import flown, scenario, when
+from virtual.shipped import sealed
+
+M = 1_000
+CEILING, RADIUS = 26, 15
+#: of the tower, metres north of home
+NORTH = 195.7
+SOURCE = f"""
+import "lib:skills/takeoff.rts"
+import "lib:skills/goto.rts"
+import "lib:skills/hover.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+
+vehicle quad {{
+  identity "quad-07"  home 47.39774 N, 8.54559 E within 5 m
+  speed at most 12 m/s  climb at most 3 m/s  position error 3 m
+  energy 100 % = 18 min hover  reserve 15 %
+  return at 28 m
+  without obstacle.distance, link.quality, wind.speed, battery.voltage
+}}
+
+zone tower  = circle(47.39950 N, 8.54559 E, {RADIUS} m)  ceiling {CEILING} m above home
+zone around = circle(47.39950 N, 8.54559 E, 40 m)  entry 47.39920 N, 8.54559 E
+
+skill look(
+  area: zone, altitude: altitude in 5 m .. 30 m, pattern: one of grid, perimeter, orbit, speed: speed in 1 m/s .. 8 m/s
+) {{
+  motion   cover area at altitude pattern pattern speed speed
+  class    tactical
+  deadline 5 s
+  valid    for 20 min
+  lasts    at most 3 min
+  fallback return_home, emergency_land
+  energy   at most 30 %
+}}
+
+policy towers version 1 {{
+  permit  takeoff, goto, hover, look, return_home, emergency_land by any
+  degrade look when battery < 40 % to return_home
+  airspace outside tower
+  contingency return_home, emergency_land
+}}
+
+mission flight under towers@1 on quad {{
+  proposed by agent openclaw for role operator
+  phase departure {{ takeoff(altitude = 15 m) }}
+  phase inspection {{
+    goto(around.entry, altitude = 15 m)
+    look(area = around, altitude = 15 m, pattern = orbit, speed = 6 m/s)
+    goto(around.entry, altitude = 15 m)
+    return_home()
+  }}
+}}
+"""
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The mission, which the checker accepts: from all around the tower the way home leads above it."""
+    source = tmp_path_factory.mktemp("tower") / "tower.rts"
+    source.write_text(SOURCE, encoding="utf-8")
+    return sealed(Path(source))
+
+
+def away(of: ScenarioFlown) -> Callable[[Sample], float]:
+    """How far from the middle of the tower it was, on the plane, metres."""
+
+    def metres(sample: Sample) -> float:
+        x, y = local_mm(of.policy, sample.latitude, sample.longitude)
+        return hypot(x / M, y / M - NORTH)
+
+    return metres
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    "fault", [faults.BatteryLevel(0, 3_800), faults.PilotMode(0, Mode.RETURN)], ids=["degraded", "by-the-pilot"]
+)
+def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str, fault: Fault) -> None:
+    found = flown(scenario(when(AfterStep(2, 29 * case.S, 29 * case.S), fault)), flavour, bundle=bundle)
+    homeward = [each for each in found.samples if each.mode is Mode.RETURN and each.in_air]
+    far = away(found)
+    begun = homeward[0]
+    assert begun.up_mm < 17 * M
+    assert local_mm(found.policy, begun.latitude, begun.longitude)[1] > (NORTH + 20) * M, "behind the tower"
+    over = [each.up_mm for each in homeward if far(each) < RADIUS]
+    assert over
+    assert min(over) > CEILING * M
+    assert [each.slug for each in judge(found).failures] == []
+    last = found.samples[-1]
+    assert hypot(*local_mm(found.policy, last.latitude, last.longitude)) < 3 * M, "it came home"

@@ -293,8 +293,12 @@ TOO_LARGE = [
     ("lib:policies/site.rts", SHIPPED["lib:policies/site.rts"].replace("12 m/s", "2000 m/s"), "E1003"),
     ("lib:policies/site.rts", SHIPPED["lib:policies/site.rts"].replace("ceiling 120 m", "ceiling 2000 km"), "E1003"),
     ("lib:policies/site.rts", SHIPPED["lib:policies/site.rts"].replace("error 3 m", "error 2 km"), "E1003"),
-    ("lib:skills/hover.rts", SHIPPED["lib:skills/hover.rts"].replace("40 min", "1500 h"), "E1003"),
-    ("lib:skills/hover.rts", SHIPPED["lib:skills/hover.rts"].replace("30 s =", "1500 h ="), "E1003"),
+    (
+        "lib:skills/hover.rts",
+        SHIPPED["lib:skills/hover.rts"].replace("valid    for lifetime", "valid    for 1500 h"),
+        "E1003",
+    ),
+    ("lib:skills/hover.rts", SHIPPED["lib:skills/hover.rts"].replace("longest - 5 s =", "1500 h ="), "E1003"),
     (
         "lib:skills/signals.rts",
         SHIPPED["lib:skills/signals.rts"].replace("stale after 10 s", "stale after 2 h"),
@@ -302,7 +306,7 @@ TOO_LARGE = [
     ),
     (
         "lib:skills/inspect_area.rts",
-        SHIPPED["lib:skills/inspect_area.rts"].replace("area, 15 m", "area, 900 km"),
+        SHIPPED["lib:skills/inspect_area.rts"].replace("area, margin", "area, 900 km"),
         "E1003",
     ),
     (

@@ -28,18 +28,13 @@ AREAS = {
 def shipped(name: str) -> str:
     """A source that ships; its survey may last so long, and take so much, that each of these can be flown."""
     text = Path(name).read_text(encoding="utf-8")
-    return text.replace("lasts    at most 2 min", "lasts    at most 8 min").replace("at most 13 %", "at most 40 %")
+    return text.replace("30 min = 2 min", "30 min = 8 min").replace("= 13 %", "= 40 %")
 
 
 SHIPPED = {name: shipped(str(CHECKOUT / name)) for name in
            ("skills/inspect_area.rts", "policies/bridge_inspection.rts")}  # fmt: skip
 #: the skill that ships with more time and charge, as the areas here are large; and one without a choice of pattern
-LOOK = (
-    SHIPPED["skills/inspect_area.rts"]
-    .replace("skill inspect_area", "skill look")
-    .replace("lasts    at most 2 min", "lasts    at most 5 min")
-    .replace("energy   at most 13 %", "energy   at most 35 %")
-)
+LOOK = SHIPPED["skills/inspect_area.rts"].replace("skill inspect_area", "skill look")
 SWEEP = (
     LOOK.replace("skill look", "skill sweep")
     .replace("  pattern:  one of grid, perimeter, orbit = grid,\n", "")

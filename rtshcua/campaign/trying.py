@@ -61,6 +61,7 @@ class Trial:
             tuple(f"{each.at_us / 1_000_000:.2f} s {each.text}" for each in was.happened),
             tuple(_reached(was)) if self.with_coverage else (),
             (perf_counter_ns() - began_ns) // 1_000,
+            was.notes,
         )
 
     def lost(self, flight: Try) -> Tried:

@@ -1,10 +1,16 @@
 """The simulated vehicle that fits a policy."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
+from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.vehicle.bounds import narrower, reach_of
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.quantity import Dimension
-from rtshcua.simulation.config import HOME, Extra, SimulationConfig
+from rtshcua.simulation.ardupilot.parameters import PARAMETERS
+from rtshcua.simulation.config import HOME, Extra, Kind, SimulationConfig
 from rtshcua.simulation.place import Home
 
 _CRUISE_MM_S = 5_000
@@ -42,3 +48,16 @@ def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:
     if vehicle.return_altitude:
         fits["return_mm"] = vehicle.return_altitude
     return SimulationConfig(**(fits | chosen))
+
+
+def with_room(config: SimulationConfig, policy: Policy, steps: Sequence[Invocation]) -> SimulationConfig:
+    """The same vehicle, with a fence of its own that is as wide and high as a mission goes: so its owner would have set
+    FENCE_RADIUS and FENCE_ALT_MAX, without which no real one is ready for it. A PX4 comes without such bounds.
+    """
+    if config.flavour is not Kind.ARDUPILOT:
+        return config
+    own = ARDUPILOT.own_fence
+    values = {each.name: each.value for each in PARAMETERS if each.name in own.names} | dict(config.parameters)
+    room = policy.vehicle.position_error + policy.vehicle.home_within
+    wider = narrower(own, values, reach_of(steps, policy, (0, 0)), room, armed=True)
+    return replace(config, parameters=(*config.parameters, *((each.parameter, each.needed) for each in wider)))

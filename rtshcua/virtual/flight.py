@@ -155,7 +155,7 @@ class VirtualFlight:
         sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
         settings: Mapping[str, int] = MappingProxyType({}), owed: dict[str, Owed] | None = None,
     ) -> None:  # fmt: skip
-        policy, mission = _claimed(bundle)
+        policy, mission = claimed(bundle)
         utc_us = mission.issued_at_us + LATER_US if utc_us is None else utc_us
         self.clock = vehicle.clock if vehicle else VirtualClock(Now(START.monotonic_us, utc_us, START.utc_error_us))
         now = self.clock.now()
@@ -271,7 +271,7 @@ class _Seeds:
         return self._drawn.to_bytes(32)
 
 
-def _claimed(bundle: bytes) -> tuple[Policy, Mission]:
+def claimed(bundle: bytes) -> tuple[Policy, Mission]:
     """What is in a bundle, whoever signed it: `load` verifies it, once it is known when it flies, and on what."""
     policy, mission = (cose.unverified(envelope).payload for envelope in bundles.envelopes(bundle))
     return bundles.parse(names.POLICY, policy, Policy), bundles.parse(names.MISSION, mission, Mission)

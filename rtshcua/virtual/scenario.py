@@ -30,8 +30,8 @@ from rtshcua.onboard.ports import Action, Dispatch, Ending, Event, Presented, Re
 from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
-from rtshcua.virtual.fitting import fitting
-from rtshcua.virtual.flight import MemorySink, VirtualFlight
+from rtshcua.virtual.fitting import fitting, with_room
+from rtshcua.virtual.flight import MemorySink, VirtualFlight, claimed
 from rtshcua.virtual.flown import Frame, Happened, Heard, Life, Reaction, Sample, ScenarioFlown, Turn
 from rtshcua.virtual.triggers import Due, Triggers
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
@@ -187,7 +187,8 @@ class _Flight:
         self._drawn = 0
 
         def vehicle(policy: Any) -> SimulationConfig:
-            self._configs.append(self._config(chosen, policy))
+            config = self._config(chosen, policy)
+            self._configs.append(with_room(config, policy, claimed(bundle)[1].invocations))
             return self._configs[-1]
 
         self._flight = VirtualFlight(
@@ -300,6 +301,9 @@ class _Flight:
 
     def _close(self, how: Ending) -> None:
         flight = self._flight
+        waits = flight.vehicle.driver.unready if how is Ending.REFUSED else None
+        if waits is not None:
+            self._notes.append(f"the vehicle was never ready: {waits}")
         flight.close(how)
         self._lives.append(self._life(how.value, tuple(flight.sink.lines)))
 

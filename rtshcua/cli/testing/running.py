@@ -19,6 +19,7 @@ from rtshcua.ground.testing.scenarios import ScenarioFlight
 from rtshcua.ground.testing.suite import scenarios as scenarios_of
 from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
+from rtshcua.virtual.flight import LATER_US
 
 #: when missions of scenarios are issued, unless they say it: a Monday in June, 10:00 UTC
 ISSUED_AT_US: Final = 1_780_308_000_000_000
@@ -101,7 +102,7 @@ def _scenarios(
     program = reading.program
     if not program.units or not program.units[0].scenarios:
         return ()
-    made = scenarios_of(program, dialect.load(), ISSUED_AT_US)
+    made = scenarios_of(program, dialect.load(), ISSUED_AT_US, LATER_US)
     sources |= {**program.sources, **made.sources}
     for diagnostic in made.diagnostics:
         found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)

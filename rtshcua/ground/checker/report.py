@@ -24,6 +24,7 @@ class Report:
         self._context: tuple[Label, ...] = ()
         self._among = 0
         self._plain: dict[Diagnostic, tuple[Diagnostic, int]] = {}
+        self._amounts: dict[Diagnostic, int] = {}
 
     def add(
         self,
@@ -34,8 +35,13 @@ class Report:
         help: str | None = None,
         labels: Iterable[tuple[Span, str]] = (),
         fix: tuple[Span, str, str] | None = None,
+        amount: int = 0,
     ) -> None:
-        """Report one finding; `labels` are places with their words, `fix` is a span, its replacement and a title."""
+        """Report one finding; `labels` are places with their words, `fix` is a span, its replacement and a title.
+
+        `amount` is how much is too much of it: of what is found of a mission with some values and with others, the
+        finding with the most is told.
+        """
         found = Diagnostic(
             code,
             message,
@@ -47,6 +53,7 @@ class Report:
         if self._context:
             plain, found = found, replace(found, labels=(*found.labels, *self._context))
             self._plain[found] = plain, self._among
+            self._amounts[plain] = max(amount, self._amounts.get(plain, 0))
         self.found.append(found)
 
     @contextmanager
@@ -65,15 +72,30 @@ class Report:
 
     def merged(self) -> tuple[Diagnostic, ...]:
         """The findings, each once: those that differ in the labels of `within` alone are one, with those of up to
-        `MAX_CONTEXTS` contexts, of which the others say the same as the first.
+        `MAX_CONTEXTS` contexts, of which the others say the same as the first. Of a mission that is checked with
+        several values, findings of one code at one place are one too, of which the worst is told.
         """
         groups: dict[Diagnostic, tuple[dict[Diagnostic, None], int]] = {}
         for found in self.found:
             plain, among = self._plain.get(found, (found, 0))
             groups.setdefault(plain, ({}, among))[0][found] = None
-        return tuple(
-            plain if len(group) == among > 1 else _joined(list(group)) for plain, (group, among) in groups.items()
-        )
+        told = {
+            plain: plain if len(group) == among > 1 else _joined(list(group))
+            for plain, (group, among) in groups.items()
+        }
+        alike: dict[tuple[Code, Span | None], list[Diagnostic]] = {}
+        for plain, (_, among) in groups.items():
+            if among > 1:
+                alike.setdefault((plain.code, plain.span), []).append(plain)
+        for some in alike.values():
+            worst = max(some, key=lambda each: self._amounts[each])
+            for each in some:
+                if each is not worst:
+                    del told[each]
+            if len(some) > 1:
+                others = "other values of the mission's parameters fail here too"
+                told[worst] = replace(told[worst], help="; ".join(filter(None, (worst.help, others))))
+        return tuple(told.values())
 
     def text(self, span: Span) -> str:
         """The source text under a span, with its white space folded; for quoting in a message."""

@@ -139,7 +139,9 @@ def _candidates(program: Program) -> list[MissionDecl]:
 
 
 class Compilation:
-    """One compilation: `check` first, then what is asked of it, then `diagnostics`."""
+    """One compilation: `check` first, then what is asked of it, then `diagnostics`. `issues` has, of missions by their
+    names, other times of issue than that of all.
+    """
 
     def __init__(
         self,
@@ -148,9 +150,11 @@ class Compilation:
         issued_at_us: int,
         chosen: str | None = None,
         settings: Settings | None = None,
+        issues: Mapping[str, int] | None = None,
     ) -> None:
         self.program = program
         self.issued_at_us = issued_at_us
+        self.issues = issues or {}
         given = settings or Settings()
         options = {given.source.file: given.source} if given.source.text else {}
         self.report = Report({**program.sources, **options}, program.data)
@@ -230,7 +234,7 @@ class Compilation:
         under = self._policy(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
         if under is None:
             return None
-        lowered = lower_mission(self.context, mission, under.lowered, self.program.stable, self.issued_at_us)
+        lowered = lower_mission(self.context, mission, under.lowered, self.program.stable, self._issued(mission))
         if lowered is None:
             return None
         under = replace(under, lowered=replace(under.lowered, files=lowered.files))
@@ -241,6 +245,9 @@ class Compilation:
         tested = Tested(under.lowered, under.prepared)
         self._flown.setdefault(mission.name.text, UnderScenario(tested, flat, mission))  # the first has the defaults
         return under.lowered.policy, flat
+
+    def _issued(self, mission: MissionDecl) -> int:
+        return self.issues.get(mission.name.text, self.issued_at_us)
 
     def _unused(self, policy: PolicyDecl) -> None:
         """Lower a policy that no mission is under, for the first vehicle that it imports."""
@@ -269,7 +276,7 @@ class Compilation:
         for mission in self.context.missions():
             under = self._under_test(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
             if under is not None:
-                lower_mission(self.context, mission, under.lowered, self.program.stable, self.issued_at_us)
+                lower_mission(self.context, mission, under.lowered, self.program.stable, self._issued(mission))
         for policy in symbols.policies.values():
             vehicle = self._imported_vehicle(policy)
             if vehicle is not None and all(name != policy.name.text for name, _ in self._tested):

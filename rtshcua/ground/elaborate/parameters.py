@@ -167,7 +167,10 @@ def _candidates(context: Context, mission: MissionDecl, argument: Argument, file
         for zone in context.symbols.zones.values():
             if zone.span.file in files and (zone.entry is not None or not entered):
                 found.append(value_of(zone, argument, at))
-    return list({_key(value): value for value in reversed(found)}.values())[::-1] if found else []
+    once: dict[tuple[object, ...], Value] = {}
+    for value in found:
+        once.setdefault(_key(value), value)
+    return list(once.values())
 
 
 def _key(value: Value) -> tuple[object, ...]:

@@ -30,7 +30,7 @@ class Wrong(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Tried:
     """What came of a flight. `reached`: what it covers of its policy, each time that a step was decided on; `took_us`:
-    how long it took to fly and judge, by the machine's clock.
+    how long it took to fly and judge, by the machine's clock; `notes`: why a run of it did not begin, in words.
     """
 
     number: int
@@ -42,6 +42,7 @@ class Tried:
     happened: tuple[str, ...]
     reached: tuple[Reached, ...]
     took_us: int = 0
+    notes: tuple[str, ...] = ()
 
 
 class Flown(NamedTuple):
@@ -87,9 +88,10 @@ def _place(scenario: ScenarioFlight, expectation: int) -> Span:
 
 
 def _help(flight: Tried) -> str:
-    if not flight.happened:
-        return f"nothing went wrong before it ended as `{flight.ending}`"
-    return f"before it ended as `{flight.ending}`: " + ", ".join(flight.happened)
+    happened = ", ".join(flight.happened)
+    before = f"before it ended as `{flight.ending}`"
+    told = f"{before}: {happened}" if happened else f"nothing went wrong {before}"
+    return "; ".join((told, *flight.notes))
 
 
 def flown_json(flown: Sequence[Flown], sources: Mapping[str, Source]) -> list[dict[str, Any]]:

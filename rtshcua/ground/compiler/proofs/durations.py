@@ -252,6 +252,7 @@ def _too_long(
         help=f"fly a shorter path, or faster, or {longer}; {_counted(ground)}",
         labels=[(limit, "declared here"), *_declared(ground)],
         fix=nearer,
+        amount=time_us,
     )
 
 
@@ -272,6 +273,7 @@ def _too_much(
         f"{_counted(ground)}",
         labels=[(declared.span, "declared here"), *_declared(ground)],
         fix=nearer,
+        amount=energy,
     )
 
 

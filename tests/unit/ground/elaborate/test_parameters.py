@@ -158,6 +158,18 @@ def test_what_every_value_brings_about_is_one_finding_without_values(check_text:
     assert not any(label.text.startswith("with ") for label in found[0].labels)
 
 
+def test_what_several_values_bring_about_at_one_place_is_one_finding_the_worst(check_text: Check, site: str) -> None:
+    body = BODY.replace("goto(where.entry, altitude = high + 2 m)", "goto(where.entry, altitude = 20 m, speed = pace)")
+    pace = "pace: speed in 1 m/s .. 2 m/s = 2 m/s"
+    text = mission(f"where: zone = bridge_a, high: altitude in 10 m .. 20 m = 15 m, {pace}")
+    found = [each for each in check_text(site + text.replace(BODY, body)).diagnostics if each.code.id == "E0804"]
+    assert len({each.span for each in found}) == len(found) > 0
+    for each in found:
+        assert "with `pace = 1 m/s`" in {label.text for label in each.labels}
+        assert each.help is not None
+        assert each.help.endswith("; other values of the mission's parameters fail here too")
+
+
 def test_a_place_without_a_default_leaves_the_mission_undecided(check_text: Check, site: str) -> None:
     body = BODY.replace("where.entry", "where")
     found = check_text(site + mission("where: position, high: altitude in 10 m .. 20 m", body)).diagnostics

@@ -185,14 +185,49 @@ mission lift(top: altitude in 10 m .. 30 m = 20 m) under bridge_inspection@7 on 
 }
 scenario "it" { flies lift after takeoff kill() }
 """
-    (one,) = made(mission, "").found
-    compiled = compile_program(program(mission), dialect.load(), mission="lift", issued_at_us=5)
-    assert one.mission == compiled.mission
+    for default in ("20 m", "30 m"):  # the end of the range is a value that it is checked with anyway
+        text = mission.replace("20 m", default)
+        (one,) = made(text, "").found
+        compiled = compile_program(program(text), dialect.load(), mission="lift", issued_at_us=5)
+        assert one.mission == compiled.mission
     without = made(mission.replace(" = 20 m)", ")"), "")
     assert ("E0603", "`lift` is flown without a value for `top`") in [
         (each.code.id, each.message) for each in without.diagnostics
     ]
     assert without.found == ()
+
+
+def test_a_mission_is_proved_for_when_its_scenarios_begin() -> None:
+    """A mission that may fly on Saturdays alone is none to fly on another day; each scenario has its own time."""
+    text = """import "lib:policies/site.rts"
+import "lib:skills/takeoff.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+policy weekend version 1 {
+  permit takeoff by role operator when local time on saturday
+  permit return_home, emergency_land by any
+  airspace inside city
+  contingency return_home, emergency_land
+}
+mission lift under weekend@1 on quad {
+  proposed by operator ada for role operator
+  phase departure { takeoff(altitude = 20 m) }  phase recovery { return_home() }
+}
+mission other under weekend@1 on quad {
+  proposed by operator ada for role operator
+  phase departure { takeoff(altitude = 30 m) }  phase recovery { return_home() }
+}
+scenario "early" { flies lift start at "2026-11-21T09:00:00Z" }
+scenario "late" { flies lift start at "2026-11-28T15:00:00Z" }
+"""
+    of_both = scenarios(program(text), dialect.load(), 5, 60 * S)
+    assert of_both.diagnostics == ()
+    assert [each.scenario.name for each in of_both.found] == ["early", "late"]
+    starts = [(each.mission.issued_at_us + 60 * S, each.scenario.start.utc_us) for each in of_both.found]
+    assert all(issued == begins for issued, begins in starts)
+    on_monday = scenarios(program(text.replace("11-28", "11-30")), dialect.load(), 5, 60 * S)
+    assert [each.code.id for each in on_monday.diagnostics] == ["E0718"]
+    assert on_monday.found == ()
 
 
 def test_scenarios_of_an_imported_file_are_its_own_business() -> None:

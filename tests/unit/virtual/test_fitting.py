@@ -1,0 +1,33 @@
+"""The vehicle that a scenario is flown with: its owner has set it for how far the mission goes, and for no more."""
+
+from msgspec.structs import replace
+
+from reference.deciding import program
+from rtshcua.ground.compiler.program import compile_program
+from rtshcua.mavlink import dialect
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.simulation.config import Kind
+from rtshcua.virtual.fitting import fitting, with_room
+
+
+def standard() -> tuple[Policy, Mission]:
+    compiled = compile_program(
+        program('import "lib:missions/standard.rts"'), dialect.load(), mission="standard", issued_at_us=5
+    )
+    assert compiled.policy is not None
+    assert compiled.mission is not None
+    return compiled.policy, compiled.mission
+
+
+def test_a_fence_of_its_own_is_as_wide_and_high_as_the_mission_goes() -> None:
+    policy, mission = standard()
+    copter = fitting(policy, flavour=Kind.ARDUPILOT)
+    assert with_room(copter, policy, mission.invocations) == copter
+    step = mission.invocations[1]
+    far = replace(step, plan=replace(step.plan, path=(300_000, 400_000), altitude=120_000))
+    room = (policy.vehicle.position_error + policy.vehicle.home_within) // 1_000
+    set_by_its_owner = {"FENCE_RADIUS": 500 + room, "FENCE_ALT_MAX": 120 + room}
+    assert dict(with_room(copter, policy, (far,)).parameters) == set_by_its_owner
+    px4 = fitting(policy)
+    assert with_room(px4, policy, (far,)) == px4

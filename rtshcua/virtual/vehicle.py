@@ -1,6 +1,6 @@
 """The simulated vehicle behind its real driver, in one process and explicit time: the `Vehicle` and `Clock` ports."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import Stages
@@ -43,8 +43,8 @@ class VirtualClock:
 class VirtualVehicle:
     """Steps the simulation tick by tick; what would be datagrams are method calls.
 
-    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt` gives
-    the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is begun counts as
+    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt`, if
+    it is set, gives the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is begun counts as
     permitted. `verifier`, `fence`, `manoeuvres` and `steps` are the driver's. Every `tick_us` it hears what was
     said since.
     """
@@ -62,7 +62,7 @@ class VirtualVehicle:
         self.clock = clock or VirtualClock()
         self.received = self.sent = 0
         self.lose: Callable[[bytes], bool] = lambda frame: False
-        self.hurt: Callable[[bytes], Sequence[bytes]] = lambda datagram: [datagram]
+        self.hurt: Callable[[bytes], Sequence[bytes]] | None = None
         self._pending: list[Event] = []
         self._waiting: list[bytes] = []
 
@@ -122,12 +122,13 @@ class VirtualVehicle:
             if not self.lose(frame):
                 self._take(self.simulation.receive(frame, self.clock.elapsed_us), events)
 
-    def _take(self, datagrams: Sequence[bytes], events: list[Event]) -> None:
-        now_us = self.clock.monotonic_us
-        for original in datagrams:
-            for datagram in self.hurt(original):
-                came, answers, frames = self.driver.receive(datagram, now_us)
-                self.received += len(frames)
-                events += came
-                if answers:
-                    self._send(answers, events)
+    def _take(self, datagrams: Iterable[bytes], events: list[Event]) -> None:
+        now_us, hurt, receive = self.clock.monotonic_us, self.hurt, self.driver.receive
+        if hurt is not None:
+            datagrams = (datagram for original in datagrams for datagram in hurt(original))
+        for datagram in datagrams:
+            came, answers, frames = receive(datagram, now_us)
+            self.received += len(frames)
+            events += came
+            if answers:
+                self._send(answers, events)

@@ -190,13 +190,15 @@ class Driver:
             send.append(messages.heartbeat())
         aged = self.seen.pass_time(now_us)
         self._watch.strict = self._watch.strict or self.seen.airborne  # what is sent to it there has to arrive
-        ts1_ns = self.source.clock.due(now_us)
-        if ts1_ns is not None:
-            send.append(messages.time_sync(ts1_ns))
+        if now_us >= self.source.clock.due_us:
+            ts1_ns = self.source.clock.due(now_us)
+            if ts1_ns is not None:
+                send.append(messages.time_sync(ts1_ns))
         if self.asks_utc and now_us - self._asked_utc_us >= EACH_US:
             self._asked_utc_us = now_us
             send.append(messages.request(self.system, "SYSTEM_TIME"))
-        send += self.stream_requests.due(self.system, now_us)
+        if now_us >= self.stream_requests.due_us:
+            send += self.stream_requests.due(self.system, now_us)
         if self.asks is not None and self.seen.down:
             send += self.asks.due(self.system, now_us)
         if not self._was_ready and self.seen.down and not self.prepares:
@@ -206,7 +208,8 @@ class Driver:
         self._look(now_us, events)
         if self._manoeuvre is not None and (aged or now_us >= self._manoeuvre.due_us):
             self._advance(now_us, send, events)
-        send += self._ask(now_us)
+        if now_us >= self._aids.query.due_us:
+            send += self._ask(now_us)
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
@@ -217,9 +220,8 @@ class Driver:
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         frames = self._pack(send, now_us, events) if send else []
-        asked = self.settings.due(self.system, now_us)
-        if asked:
-            out, refused = self.link.pack(asked, now_us)
+        if self.settings.outstanding:
+            out, refused = self.link.pack(self.settings.due(self.system, now_us), now_us)
             frames += out
             self.settings.refused = refused[0] if refused else self.settings.refused
         return events, frames

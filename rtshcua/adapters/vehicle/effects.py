@@ -4,6 +4,7 @@ Tolerances are arrival tolerances, not safety margins.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from math import cos, hypot, radians
 
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
@@ -20,6 +21,7 @@ Measure = Callable[[ObservedVehicle], tuple[int, ...] | None]
 """What is left, in mm, in one or more ways of which one falls while there is progress; None: not known now."""
 
 
+@lru_cache(maxsize=8)  # one report is held against the same place several times
 def apart(latitude: int, longitude: int, to_latitude: int, to_longitude: int) -> float:
     """How far two places (1e-7 degree) are from each other, in mm."""
     north = (latitude - to_latitude) * _MM_PER_UNIT

@@ -102,15 +102,15 @@ class VehicleLink:
         if self._others is not None:
             self.overhear(datagram, now_us, elsewhere=False)
         for each in self._codec.parse(datagram, now_us):
-            _, name, system, component, _, _, _ = each
+            _, name, system, component, _, signed, frame = each
             if component == OURS:
                 continue  # what comes back under our own name says nothing of the vehicle
             if system == RADIO_SYSTEM != self._system and self._system and not is_radio(each):
                 continue
             received.append(each)
             if name in _OBSERVED:
-                self._frames.observe(unsigned(each.frame), now_us)
-            elif name == "RADIO_STATUS" and not each.signed and isinstance(self._verifier, UnsignedRadio):
+                self._frames.observe(unsigned(frame) if signed else frame, now_us)
+            elif name == "RADIO_STATUS" and not signed and isinstance(self._verifier, UnsignedRadio):
                 self._verifier.temper(each.message, now_us)
         return received
 

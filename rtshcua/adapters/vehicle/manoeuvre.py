@@ -135,6 +135,8 @@ class WhoFliesQuery:
         self._within_us = within_us * slack
         self._target_us = TARGET_US * slack
         self._asked_us: int | None = None
+        #: before then `due` gives nothing, so nobody need call it
+        self.due_us = 0
         self._came: tuple[int, int] | None = None  # how many reports of mode and target had, when a frame began to wait
         self._target = False  # the frame waits for a target, too
         #: when the frame waits no longer for a target; None while it waits for the mode, or for nothing
@@ -155,7 +157,7 @@ class WhoFliesQuery:
         """
         if self._came is None:
             self._came = seen.beats, seen.targets
-            self._asked_us = None  # ask at once
+            self._asked_us, self.due_us = None, 0  # ask at once
         self._target = target
         beats, targets = self._came
         if seen.beats == beats:
@@ -172,17 +174,20 @@ class WhoFliesQuery:
 
     def due(self, system: int, seen: ObservedVehicle, now_us: int, *, flies: bool) -> list[Message]:
         """The question to put now, if one is due. `flies`: something of ours does, or the vehicle is in the air."""
+        half_us = self._within_us // 2
         if self._came is not None:
             every_us = AGAIN_US
         elif not flies:
             every_us = IDLE_US
-        elif seen.heartbeat_us is not None and now_us - seen.heartbeat_us < self._within_us // 2:
+        elif seen.heartbeat_us is not None and now_us - seen.heartbeat_us < half_us:
             every_us = STREAMED_US
         else:
-            every_us = self._within_us // 2
+            every_us = half_us
         if self._asked_us is not None and now_us - self._asked_us < every_us:
+            if every_us == STREAMED_US:  # until the last heartbeat is too old for that
+                self.due_us = min(self._asked_us + every_us, (seen.heartbeat_us or 0) + half_us)
             return []
-        self._asked_us = now_us
+        self._asked_us, self.due_us = now_us, now_us + min(half_us, AGAIN_US)
         names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if self._target else ("HEARTBEAT",)
         return [messages.request(system, name) for name in names]
 

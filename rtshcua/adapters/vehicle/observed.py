@@ -139,6 +139,7 @@ HEEDED: Final = (
     "HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "POSITION_TARGET_GLOBAL_INT", "GPS_RAW_INT", "SYS_STATUS",
     "ATTITUDE",
 )  # fmt: skip
+_OF_DOWN: Final = ("HEARTBEAT", "EXTENDED_SYS_STATE")
 _REASONS = ("PreArm:", "Arm:", "Preflight Fail:", "Arming denied")
 _PREARM: Final = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
 
@@ -215,6 +216,8 @@ class ObservedVehicle:
             if at_us < self.made_us.get(name, at_us):
                 return False
             self.made_us[name] = at_us
+        if name not in _OF_DOWN:
+            return self._take(name, message, now_us, at_us)
         was_down = self.down
         news = self._take(name, message, now_us, at_us)
         if self.down and not was_down:

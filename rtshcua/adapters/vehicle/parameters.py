@@ -37,7 +37,8 @@ class VehicleParameters:
         self._slack = slack
         self.values: dict[str, float] = {}
         self._types: dict[str, int] = {}
-        self._wanted: dict[str, _Wanted] = {}
+        #: what was asked for, or is to be set, and was not answered yet
+        self.outstanding: dict[str, _Wanted] = {}
         #: what was set: the value that was found, and the one that is wanted
         self.changed: dict[str, tuple[float, float]] = {}
         #: why the boundary did not let out what was to be set, last
@@ -45,23 +46,23 @@ class VehicleParameters:
 
     def read(self, name: str) -> None:
         """Ask for one that is not asked for yet."""
-        self._wanted.setdefault(name, _Wanted(None))
+        self.outstanding.setdefault(name, _Wanted(None))
 
     def forget(self, name: str) -> None:
         """As if it had never been asked for."""
-        self._wanted.pop(name, None)
+        self.outstanding.pop(name, None)
         self.values.pop(name, None)
 
     def drop(self, name: str) -> None:
         """Ask for it, or set it, no more; what was heard of it stays."""
-        self._wanted.pop(name, None)
+        self.outstanding.pop(name, None)
         self.refused = None
 
     def write(self, name: str, value: float) -> None:
         """Set one that was read before."""
         before, _ = self.changed.get(name, (self.values[name], 0.0))
         self.changed[name] = before, value
-        self._wanted[name] = _Wanted(value)
+        self.outstanding[name] = _Wanted(value)
 
     def fits(self, name: str, value: float) -> bool:
         """Whether one that was read keeps this value as it is, by the type that the vehicle says it has."""
@@ -84,7 +85,7 @@ class VehicleParameters:
 
     def is_absent(self, name: str) -> bool:
         """Whether it did not answer, as often as it was asked."""
-        return name in self._wanted and self._wanted[name].silent
+        return name in self.outstanding and self.outstanding[name].silent
 
     def is_known(self, name: str) -> bool:
         """Whether it answered, or is given up for now."""
@@ -92,23 +93,23 @@ class VehicleParameters:
 
     def is_settled(self, name: str) -> bool:
         """Whether nothing about it is outstanding."""
-        return name not in self._wanted
+        return name not in self.outstanding
 
     def take(self, message: Any) -> None:
         """A PARAM_VALUE."""
         name, value = message.param_id, decode(message.param_value, message.param_type, bytewise=self._bytewise)
-        wanted = self._wanted.get(name)
+        wanted = self.outstanding.get(name)
         if wanted is None and name not in self.values:
             return
         self.values[name], self._types[name] = value, message.param_type
         if wanted is not None and wanted.value in (None, value):
-            del self._wanted[name]
+            del self.outstanding[name]
 
     def due(self, system: int, now_us: int) -> list[Message]:
         """The requests to send now. What no message can carry, by the type that the vehicle says now, is given up."""
         out: list[Message] = []
         unfit: list[str] = []
-        for name, wanted in self._wanted.items():
+        for name, wanted in self.outstanding.items():
             pause_us = (AGAIN_US if wanted.silent else RETRY_US) * self._slack
             if wanted.tries and now_us - wanted.sent_us < pause_us:
                 continue
@@ -124,5 +125,5 @@ class VehicleParameters:
                 else:
                     out.append(messages.parameter_set(system, name, raw, kind))
         for name in unfit:
-            del self._wanted[name]
+            del self.outstanding[name]
         return out

@@ -79,6 +79,8 @@ class VehicleClock:
     def __init__(self) -> None:
         self._asked: dict[int, int] = {}  # ts1 to when it was sent
         self._asked_us: int | None = None
+        self.due_us = 0
+        """Before then `due` gives nothing, so nobody need call it."""
         self._answers = 0
         self._least_us: int | None = None
         self._since_us = 0
@@ -98,9 +100,13 @@ class VehicleClock:
         """The `ts1` to send now, in ns; None when nothing is due. It ends in our component id, as ArduPilot's do in its
         system id, so that answers to another program on this machine are not taken for ours.
         """
-        if self._asked_us is not None and now_us - self._asked_us < self._wait_us(now_us):
-            return None
-        self._asked_us, self._doubted = now_us, False
+        if self._asked_us is not None:
+            wait_us = self._wait_us(now_us)
+            if now_us - self._asked_us < wait_us:
+                missed_us = now_us if self.answered_us is None else self.answered_us + MISSED_US
+                self.due_us = self._asked_us + wait_us if wait_us < EACH_US else min(self._asked_us + wait_us, missed_us)
+                return None
+        self._asked_us, self._doubted, self.due_us = now_us, False, 0
         ts1_ns = now_us * 1_000 + OURS
         self._asked[ts1_ns] = now_us
         if len(self._asked) > _OUTSTANDING:
@@ -149,7 +155,7 @@ class VehicleClock:
 
     def doubt(self, now_us: int) -> None:
         """Something speaks against the bound: ask soon."""
-        self._doubted = self.answered_us is not None and now_us - self.answered_us > _REST_US
+        self._doubted, self.due_us = self.answered_us is not None and now_us - self.answered_us > _REST_US, 0
 
 
 def _drift_us(passed_us: int) -> int:
@@ -280,9 +286,12 @@ class SourceTime:
             up = (now_us - offset_us) // us
             ago = (up - boot) % _WRAP
             boot = up - (ago if ago < _HALF else ago - _WRAP)
-        at_us = self._checked(offset_us + boot * us, now_us)
-        if at_us is None:
-            return None
+        at_us = offset_us + boot * us
+        if at_us > now_us:
+            checked_us = self._checked(at_us, now_us)
+            if checked_us is None:
+                return None
+            at_us = checked_us
         if told is not None and at_us < told[1]:
             if not 0 < (raw - told[0]) % _WRAP < _HALF:
                 return at_us  # overtaken

@@ -120,6 +120,8 @@ class StreamRequests:
         self._heard_us: dict[str, int] = {}
         self._asking: str | None = None
         self._asked_us = self._looked_us = 0
+        #: before then `due` gives nothing, so nobody need call it
+        self.due_us = 0
         self._answer_us = ANSWER_US
         self._late_us: deque[int] = deque()  # when requests were given up whose answers may come yet
         self._since_us: int | None = None
@@ -138,7 +140,7 @@ class StreamRequests:
         before, self.plan = {**self._wanted, **self._at_times}, plan
         self._at_times, self._wanted = _sorted(plan)
         self._queue += [name for name, us in {**self._wanted, **self._at_times}.items() if before.get(name) != us]
-        self._measured_us = None
+        self._measured_us, self.due_us = None, 0
         if plan.shortfall is not None:
             self.notes.append(plan.shortfall)
 
@@ -161,7 +163,7 @@ class StreamRequests:
         if self._asking is not None:
             if not accepted:
                 self._refused.add(self._asking)
-            self._asking = None
+            self._asking, self.due_us = None, 0
 
     def due(self, system: int, now_us: int) -> list[Message]:
         """The request to send now, if one is due. One that is not answered goes to the end of the queue."""
@@ -169,6 +171,7 @@ class StreamRequests:
             self._since_us = now_us
         if self._asking is not None:
             if now_us - self._asked_us < self._answer_us:
+                self.due_us = self._asked_us + self._answer_us
                 return []
             self._queue.append(self._asking)
             self._asking = None
@@ -181,8 +184,9 @@ class StreamRequests:
                 self._looked_us = now_us
                 self._queue += [name for name in self._wanted if self._is_quiet(name, now_us)]
         if not self._queue:
+            self.due_us = min((self._measured_us or 0) + MEASURE_US, self._looked_us + ANSWER_US)
             return []
-        self._asking, self._asked_us = self._queue.pop(0), now_us
+        self._asking, self._asked_us, self.due_us = self._queue.pop(0), now_us, 0
         if self._asking in self._off:
             interval_us = _NEVER_US
         else:
@@ -196,7 +200,7 @@ class StreamRequests:
 
     def interrupted(self) -> None:
         """The link was silent: rates are measured anew."""
-        self._measured_us = None
+        self._measured_us, self.due_us = None, 0
 
     def renew(self, now_us: int) -> None:
         """What was heard so far does not count as heard."""

@@ -145,8 +145,9 @@ class TargetWatch:
         self._more = 0  # how often it may name another, for it was told again
         self._left: Reported | None = None  # what it flew to before a command that has no target
         self._strayed: int | None = None  # the number of the heartbeat after which it flew elsewhere
-        #: whether the autopilot was seen to fly to the present target
+        #: whether the autopilot was seen to fly to the present target,
         self.shown = False
+        self._shown: Reported | None = None  # and as what it was last reported
 
     @property
     def compares(self) -> bool:
@@ -183,7 +184,7 @@ class TargetWatch:
     def is_foreign(self, seen: ObservedVehicle) -> bool:
         """Whether it flies to somebody else's target."""
         expected, reported = self._expected, seen.target
-        if reported is None:
+        if reported is None or (self.shown and reported == self._shown):
             return False
         if expected is None:
             return self._has_strayed(reported, seen.beats)
@@ -222,7 +223,7 @@ class TargetWatch:
     def _show(self, expected: ExpectedTarget, reported: Reported) -> None:
         if not self.shown:  # this is the one, from now on
             self._ours[-1] = self._expected = expected.as_reported(reported)
-        self.shown = True
+        self.shown, self._shown = True, reported
 
 
 def _same(one: Reported, other: Reported) -> bool:
@@ -260,18 +261,23 @@ class CrashWatch:
 
     def look(self, seen: ObservedVehicle, now_us: int) -> str | None:
         """What shows that it crashed; None, also once that was told."""
-        if seen.airborne and seen.armed:
+        flies = seen.armed and seen.airborne
+        if flies:
             self._flown = True
         if not self._flown or self._told:
             return None
-        how = self._motors(seen, now_us) or self._attitude(seen, now_us) or self._fall(seen, now_us)
+        how = self._motors(seen, now_us, flies=flies)
+        if how is None and (seen.tilt >= TILTED or self._tilted_us is not None):
+            how = self._attitude(seen)
+        if how is None and (seen.descent >= FALLS or self._fell is not None or self._impact is not None):
+            how = self._fall(seen, now_us, flies=flies)
         self._told = how is not None
         return how
 
-    def _motors(self, seen: ObservedVehicle, now_us: int) -> str | None:
+    def _motors(self, seen: ObservedVehicle, now_us: int, *, flies: bool) -> str | None:
         """Autopilots call a vehicle landed that is disarmed: what counts is how it flew when it was last seen armed."""
         if seen.armed:
-            if seen.airborne and seen.levelled:
+            if flies and seen.levelled:
                 self._flew = now_us, seen.height, seen.landing
             return None
         flew, self._flew = self._flew, None
@@ -279,7 +285,7 @@ class CrashWatch:
             return None
         return f"its motors stopped {flew[1] // 1_000} m above home"
 
-    def _attitude(self, seen: ObservedVehicle, now_us: int) -> str | None:
+    def _attitude(self, seen: ObservedVehicle) -> str | None:
         if seen.tilt < TILTED or not (seen.armed or seen.airborne):
             self._tilted_us = None
             return None
@@ -287,7 +293,7 @@ class CrashWatch:
             self._tilted_us = seen.tilt_us
         return f"it leans {seen.tilt} degrees" if seen.tilt_us - self._tilted_us >= LASTS_US else None
 
-    def _fall(self, seen: ObservedVehicle, now_us: int) -> str | None:
+    def _fall(self, seen: ObservedVehicle, now_us: int, *, flies: bool) -> str | None:
         if seen.descent >= FALLS:
             self._fell, self._impact = (now_us, seen.descent), None
         elif self._fell is not None:
@@ -298,6 +304,6 @@ class CrashWatch:
                 self._impact, self._fell = self._fell, None
         if self._impact is None or now_us - self._impact[0] > LIES_WITHIN_US:
             return None
-        if seen.airborne and seen.armed:
+        if flies:
             return None
         return f"it came down at {self._impact[1] / 1_000:.1f} m/s"

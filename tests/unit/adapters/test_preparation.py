@@ -235,7 +235,7 @@ def test_nothing_is_asked_for_any_more_where_it_broke_off() -> None:
     one = flight({"FENCE_ALT_MAX": 80.0})
 
     def turn() -> bool:
-        return one._pass(lambda _: ()) and not one.vehicle.driver.settings._wanted
+        return one._pass(lambda _: ()) and not one.vehicle.driver.settings.outstanding
 
     assert one.preparations.begin(turn) is None
-    assert not one.vehicle.driver.settings._wanted
+    assert not one.vehicle.driver.settings.outstanding

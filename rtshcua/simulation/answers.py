@@ -47,15 +47,8 @@ class Inbox:
         self._lanes = lanes
         self._chance = chance
         self._waiting: list[deque[tuple[int, Received]]] = [deque() for _ in lanes.delays]
-
-    def __bool__(self) -> bool:
-        """Whether something waits."""
-        return any(self._waiting)
-
-    @property
-    def next_us(self) -> int | None:
-        """When the autopilot gets to the next one."""
-        return min((lane[0][0] for lane in self._waiting if lane), default=None)
+        self.next_us: int | None = None
+        """When the autopilot gets to the next one; None while nothing waits."""
 
     def put(self, received: Received, now_us: int) -> None:
         """A message has come."""
@@ -63,10 +56,11 @@ class Inbox:
         lane = self._waiting[number]
         at_us = now_us + self._lanes.delays[number].draw(self._chance)
         lane.append((max(at_us, lane[-1][0]) if lane else at_us, received))
+        self._look()
 
     def due(self, now_us: int) -> Iterator[tuple[int, Received]]:
         """What the autopilot has got to by now, and when."""
-        if not any(self._waiting):
+        if self.next_us is None or self.next_us > now_us:
             return iter(())
         ready: list[list[tuple[int, Received]]] = []
         for lane in self._waiting:
@@ -74,9 +68,14 @@ class Inbox:
             while lane and lane[0][0] <= now_us:
                 taken.append(lane.popleft())
             ready.append(taken)
+        self._look()
         return merge(*ready, key=lambda entry: entry[0])
 
     def clear(self) -> None:
         """Forgets all that waits."""
         for lane in self._waiting:
             lane.clear()
+        self.next_us = None
+
+    def _look(self) -> None:
+        self.next_us = min((lane[0][0] for lane in self._waiting if lane), default=None)

@@ -251,7 +251,8 @@ class Autopilot:
             return
         self.now_us += TICK_US
         air, sensors, vehicle, battery = self.air, self.sensors, self.vehicle, self.battery
-        air.step(_TICK_S)
+        if air.gusts:
+            air.step(_TICK_S)
         sensors.step(_TICK_S)
         wind = (air.north, air.east)
         load = vehicle.step(_TICK_S, wind, sensors.error, powered=battery.level > 0, sees=sensors.estimates)
@@ -264,10 +265,15 @@ class Autopilot:
         if self.flavour.target_timeout_us is not None:
             self._keep_targets(self.flavour.target_timeout_us)
         self._follow_plans()
+        if self._boot_texts:
+            self._tell_of_boot()
+        self._tell()
+
+    def _tell_of_boot(self) -> None:
+        sensors = self.sensors
         while self._boot_texts and sensors.age_s >= self._boot_texts[0][0]:
             _, severity, text = self._boot_texts.popleft()
             self.say(severity, text.format(amsl=self.home.amsl_mm // 1000))
-        self._tell()
 
     def reboot(self) -> None:
         """Starts again: the motors stop, it says nothing for a while, then it comes up with its clock at 0.

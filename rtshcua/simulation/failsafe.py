@@ -77,7 +77,11 @@ class Failsafes:
         if not vehicle.armed or not vehicle.in_air:
             self._lands_blind = False
             return
-        self._watch_position(dt)
+        if self._sensors.has_position and not self._lands_blind:
+            self._without_s = 0.0
+            self._back_s += dt
+        else:
+            self._watch_position(dt)
         if battery.level <= LOW_TO_LAND and vehicle.mode is not Mode.LAND:
             self._say(*self._rules.level)
             self._enter(Mode.LAND)

@@ -26,7 +26,8 @@ class Link:
         self._chance = chance
         self._order = count()
         self._free_us = 0
-        self._under_way: list[tuple[int, int, bytes]] = []
+        self.under_way: list[tuple[int, int, bytes]] = []
+        """What was sent and has not arrived: (when it does, its place in the order of sending, the datagram), a heap."""
         self._waiting: list[bytes] = []
 
     def send(self, datagram: bytes, now_us: int) -> None:
@@ -48,7 +49,7 @@ class Link:
             at_us += OVERTAKEN_US
         else:
             self._free_us = at_us
-        heappush(self._under_way, (at_us, next(self._order), datagram))
+        heappush(self.under_way, (at_us, next(self._order), datagram))
 
     def release(self, now_us: int, shuffle: Random | None = None) -> None:
         """Sends what waited, in another order if it is to be shuffled."""
@@ -62,7 +63,7 @@ class Link:
     def due(self, now_us: int) -> list[bytes]:
         """What has arrived by now."""
         arrived: list[bytes] = []
-        under_way = self._under_way
+        under_way = self.under_way
         while under_way and under_way[0][0] <= now_us:
             arrived.append(heappop(under_way)[2])
         return arrived

@@ -1,6 +1,6 @@
 """Where things are: local metres around home, and latitude and longitude in 1e-7 degree (WGS 84)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import copysign, cos, pi, radians
 
 _METRES_PER_E7 = 6_378_137 * pi / 180e7
@@ -25,6 +25,10 @@ class Home:
     latitude: int
     longitude: int
     amsl_mm: int
+    _shrink: float = field(init=False, repr=False, compare=False)  # of a degree of longitude
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_shrink", cos(radians(self.latitude / 1e7)))
 
     def local(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Metres north and east of home; the plane is tangent at home, good for some kilometres."""
@@ -32,15 +36,12 @@ class Home:
         east = longitude - self.longitude
         if abs(east) > _HALF_TURN_E7:  # longitude 180 lies between
             east -= copysign(2 * _HALF_TURN_E7, east)
-        return north, east * _METRES_PER_E7 * self._shrink()
+        return north, east * _METRES_PER_E7 * self._shrink
 
     def globe(self, north: float, east: float) -> tuple[int, int]:
         """Latitude and longitude in 1e-7 degree: the inverse of `local`, as far as the 32 bits of messages hold it."""
-        longitude = self.longitude + round(east / _METRES_PER_E7 / self._shrink())
+        longitude = self.longitude + round(east / _METRES_PER_E7 / self._shrink)
         if abs(longitude) > _HALF_TURN_E7:
             longitude -= 2 * _HALF_TURN_E7 if longitude > 0 else -2 * _HALF_TURN_E7
         latitude = self.latitude + round(north / _METRES_PER_E7)
         return max(-_MOST_E7, min(_MOST_E7, latitude)), max(-_MOST_E7, min(_MOST_E7, longitude))
-
-    def _shrink(self) -> float:
-        return cos(radians(self.latitude / 1e7))

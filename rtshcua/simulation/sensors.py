@@ -180,7 +180,7 @@ class Sensors:
     @property
     def has_position(self) -> bool:
         """Whether the estimator vouches for its position."""
-        return self.estimates and not self.unhealthy
+        return self._without_fix_s < self._coast_s and self.locates and not self.unhealthy
 
     @property
     def estimates(self) -> bool:

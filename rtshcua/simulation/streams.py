@@ -18,7 +18,8 @@ class Streams:
         self._default = dict(default)
         self._interval = dict(default)
         self._due = {number: phases.randrange(every) if phases else 0 for number, every in default.items()}
-        self._next_us = 0  # nothing is due before
+        self.next_us = 0
+        """Nothing is due before."""
 
     def set(self, message_id: int, interval_us: int) -> None:
         """Sets an interval as SET_MESSAGE_INTERVAL means it: 0 is the default one, negative is never.
@@ -32,7 +33,7 @@ class Streams:
             self._due.pop(message_id, None)
         elif interval_us != self._interval.get(message_id):
             self._interval[message_id] = interval_us
-            self._due[message_id] = self._next_us = 0
+            self._due[message_id] = self.next_us = 0
 
     def interval(self, message_id: int) -> int:
         """The interval of a message, -1 if it is not streamed."""
@@ -40,7 +41,7 @@ class Streams:
 
     def due(self, now_us: int) -> list[int]:
         """The messages to send now; each is due again an interval later."""
-        if now_us < self._next_us:
+        if now_us < self.next_us:
             return []
         due_us = self._due
         due = [message_id for message_id, at_us in due_us.items() if at_us <= now_us]
@@ -49,7 +50,7 @@ class Streams:
             interval = self._interval[message_id]
             following = due_us[message_id] + interval
             due_us[message_id] = following if following > now_us else now_us + interval
-        self._next_us = min(due_us.values(), default=now_us)
+        self.next_us = min(due_us.values(), default=now_us)
         return due
 
 

@@ -34,15 +34,16 @@ class Air:
         """Another mean wind from now on."""
         speed, towards = wind.speed_mm_s / 1000, radians(wind.from_deg + 180)
         self._mean = (speed * cos(towards), speed * sin(towards))
-        self._gusts = wind.gust_mm_s / 1000
+        self.gusts = wind.gust_mm_s / 1000
+        """Their standard deviation; 0: the air moves evenly, and no step changes that."""
         self._sum()
 
     def step(self, dt: float) -> None:
         """Lets `dt` seconds pass: an Ornstein-Uhlenbeck process in each axis."""
-        if not self._gusts:
+        if not self.gusts:
             return
         keep = exp(-dt / _GUST_SECONDS)
-        spread = self._gusts * sqrt(1 - keep * keep)
+        spread = self.gusts * sqrt(1 - keep * keep)
         self._gust_north = self._gust_north * keep + self._chance.gauss(0, spread)
         self._gust_east = self._gust_east * keep + self._chance.gauss(0, spread)
         self._sum()

@@ -89,29 +89,33 @@ class Simulation:
 
     def advance(self, to_us: int) -> list[bytes]:
         """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
-        autopilot, face, down = self._autopilot, self._face, self._down
+        autopilot, face, up, down, inbox = self._autopilot, self._face, self._up, self._down, self._inbox
         while self._ticked_us + TICK_US <= to_us:
             at_us = self._ticked_us + TICK_US
-            if self._inbox:
-                self._obey(self._inbox, at_us - 1)
+            if inbox is not None and inbox.next_us is not None:
+                self._obey(inbox, at_us - 1)
             self._ticked_us = at_us
             if autopilot.surroundings.moving:
                 autopilot.surroundings.step(TICK_US / 1_000_000)
             if self._events:
                 self._happen(at_us)
-            self._deliver(at_us)
+            if up.under_way:
+                self._deliver(at_us)
+            if inbox is not None and inbox.next_us is not None:
+                self._obey(inbox, at_us)
             if not self._halted:
                 autopilot.tick()
-                for frame in face.due():
-                    down.send(frame, at_us)
+                if autopilot.outbox or autopilot.now_us >= autopilot.streams.next_us:
+                    for frame in face.due():
+                        down.send(frame, at_us)
             if autopilot.taker is not None and self._taken_over_us is None:
                 self._taken_over_us = at_us
             if at_us >= face.radio_due_us:
                 down.send(face.radio(at_us), at_us)
         self._now_us = now_us = max(self._now_us, to_us)
-        if self._inbox:
-            self._obey(self._inbox, now_us)
-        return down.due(now_us)
+        if inbox is not None and inbox.next_us is not None:
+            self._obey(inbox, now_us)
+        return down.due(now_us) if down.under_way else []
 
     def receive(self, data: bytes, at_us: int) -> list[bytes]:
         """The other end sends a datagram at `at_us`: lets time pass until then, and gives what `advance` would.
@@ -121,6 +125,8 @@ class Simulation:
         before = self.advance(at_us)
         self._up.send(data, self._now_us)
         self._deliver(self._now_us)
+        if self._inbox is not None:
+            self._obey(self._inbox, self._now_us)
         return before + self._down.due(self._now_us)
 
     def inject(self, fault: Fault) -> None:
@@ -160,11 +166,11 @@ class Simulation:
     def _reboot(self) -> None:
         self._autopilot.reboot()
         self._face.restart()
-        if self._inbox:
+        if self._inbox is not None:
             self._inbox.clear()
 
     def _deliver(self, now_us: int) -> None:
-        """What has come over the link is obeyed, at once or when the autopilot gets to it."""
+        """What has come over the link is obeyed at once, or put where the autopilot gets to it."""
         if self._halted:
             return
         inbox = self._inbox
@@ -178,10 +184,9 @@ class Simulation:
                     self._answer(received, now_us)
                 else:
                     inbox.put(received, now_us)
-        if inbox:
-            self._obey(inbox, now_us)
 
     def _obey(self, inbox: Inbox, until_us: int) -> None:
+        """What the autopilot gets to until then is obeyed."""
         if not self._halted:
             for at_us, received in inbox.due(until_us):
                 self._answer(received, max(at_us, self._ticked_us))  # what waited while it was halted comes after

@@ -8,7 +8,7 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from heapq import merge
+from operator import itemgetter
 from random import Random
 
 from rtshcua.codec.frames import Received
@@ -62,14 +62,12 @@ class Inbox:
         """What the autopilot has got to by now, and when."""
         if self.next_us is None or self.next_us > now_us:
             return iter(())
-        ready: list[list[tuple[int, Received]]] = []
+        ready: list[tuple[int, Received]] = []
         for lane in self._waiting:
-            taken = []
             while lane and lane[0][0] <= now_us:
-                taken.append(lane.popleft())
-            ready.append(taken)
+                ready.append(lane.popleft())
         self._look()
-        return merge(*ready, key=lambda entry: entry[0])
+        return iter(sorted(ready, key=itemgetter(0)))
 
     def clear(self) -> None:
         """Forgets all that waits."""

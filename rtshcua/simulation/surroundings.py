@@ -28,6 +28,8 @@ class Air:
     def __init__(self, wind: Wind, chance: Random) -> None:
         self._chance = chance
         self._gust_north = self._gust_east = 0.0
+        self._dt = 0.0  # the last step, and for that, for 1 m/s of gusts,
+        self._keep, self._spread = 1.0, 0.0  # what stays of a gust and how far it strays
         self.set(wind)
 
     def set(self, wind: Wind) -> None:
@@ -42,10 +44,12 @@ class Air:
         """Lets `dt` seconds pass: an Ornstein-Uhlenbeck process in each axis."""
         if not self.gusts:
             return
-        keep = exp(-dt / _GUST_SECONDS)
-        spread = self.gusts * sqrt(1 - keep * keep)
-        self._gust_north = self._gust_north * keep + self._chance.gauss(0, spread)
-        self._gust_east = self._gust_east * keep + self._chance.gauss(0, spread)
+        if dt != self._dt:
+            self._dt, self._keep = dt, exp(-dt / _GUST_SECONDS)
+            self._spread = sqrt(1 - self._keep * self._keep)
+        keep, spread, gauss = self._keep, self.gusts * self._spread, self._chance.gauss
+        self._gust_north = self._gust_north * keep + gauss(0, spread)
+        self._gust_east = self._gust_east * keep + gauss(0, spread)
         self._sum()
 
     def _sum(self) -> None:

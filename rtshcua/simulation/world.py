@@ -5,11 +5,11 @@ the same times give the same bytes.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
 from math import hypot
 from random import Random
+from typing import NamedTuple
 
 from rtshcua.codec.frames import Received
 from rtshcua.model.faults import Fault, Mode
@@ -25,8 +25,7 @@ from rtshcua.simulation.px4.flavour import Px4
 FLAVOURS: Mapping[Kind, Flavour] = {Kind.PX4: Px4(), Kind.ARDUPILOT: ArduCopter()}
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
+class Truth(NamedTuple):
     """Where the vehicle really is and what it does, whatever it reports; mm and mm/s from home, battery in 1/10000."""
 
     north_mm: int
@@ -139,7 +138,8 @@ class Simulation:
         """What really is, as of the last tick."""
         vehicle = self._autopilot.vehicle
         body = vehicle.body
-        distance = self._autopilot.surroundings.distance(body)
+        surroundings = self._autopilot.surroundings
+        distance = surroundings.distance(body) if surroundings.pillars else None
         return Truth(
             round(body.north * 1000),
             round(body.east * 1000),

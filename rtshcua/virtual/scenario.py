@@ -111,10 +111,10 @@ class _Sink(MemorySink):
         self.kept_us += [self._clock.elapsed_us] * (self.kept - len(self.kept_us))
 
     def trouble(self) -> str | None:
-        return self._lateness.stuck(self.kept, self._clock.elapsed_us / SECOND)
+        return self._lateness.stuck(self.kept, self._clock.elapsed_us / SECOND) if self._waiting else None
 
     def late(self) -> str | None:
-        return self._lateness.late(self.kept, self._clock.elapsed_us / SECOND)
+        return self._lateness.late(self.kept, self._clock.elapsed_us / SECOND) if self._waiting else None
 
 
 class _Watched(Simulation):

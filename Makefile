@@ -21,7 +21,7 @@ demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, veri
 	@.make/demo
 
 test: setup ## run the tests; decision, wire and evidence covered in full
-	$(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --cov --cov-report term
+	$(BIN)/pytest -n $(JOBS) --cov --cov-report term
 
 clients: setup ## run the tests with programs that others made, and of the wheel; as root, install what is missing
 	@.make/clients

@@ -13,15 +13,16 @@ from importlib import import_module
 from itertools import count
 from pathlib import Path
 from pkgutil import walk_packages
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import TemporaryDirectory, gettempdir
 from typing import Any
 
 import pytest
-from _pytest.runner import runtestprotocol
 from hypothesis import settings
 from hypothesis.internal import charmap
 from hypothesis.internal.conjecture import providers
 
+from processes import Processes
 from virtual import once
 from virtual.forked import Forked, forked
 
@@ -71,53 +72,61 @@ def measuring(config: pytest.Config) -> Any:
     return getattr(config.pluginmanager.getplugin("_cov"), "cov_controller", None)
 
 
-def deals_out(config: pytest.Config) -> bool:
-    """Whether this process runs no test itself, but has others run them."""
-    return not hasattr(config, "workerinput") and bool(config.getoption("numprocesses", None))
-
-
 #: folders of what is installed that no process imports from
 NOT_IMPORTED = ("__pycache__", "idlelib", "lib2to3", "pip", "site-packages", "test", "tests")
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """All processes of a run share a folder; and where no byte code may be kept, theirs, away from the checkout.
+def pytest_addoption(parser: Any) -> None:
+    group = parser.getgroup("processes")
+    group._addoption("-n", dest="processes", type=int, default=0, help="run the tests in this many processes")
 
-    What is installed has its byte code, and is linked to it; the rest is compiled by whoever comes first.
-    """
+
+def pytest_configure(config: pytest.Config) -> None:
+    """All processes of a run share a folder, and byte code."""
     if config.getoption("--hypothesis-profile") != "soak":
         same_examples()
-    if hasattr(config, "workerinput"):
-        return
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell starts what runs in the background
         signal.signal(signal.SIGINT, signal.default_int_handler)  # else commands would inherit it
     shared = TemporaryDirectory(prefix="rtshcua_once_")
     config.add_cleanup(shared.cleanup)
     os.environ[once.FOLDER] = shared.name
-    if not os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
-        return
-    folder = TemporaryDirectory(prefix="rtshcua_byte_code_")
-    config.add_cleanup(folder.cleanup)
-    os.environ["PYTHONPYCACHEPREFIX"] = folder.name
+    if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+        keep_byte_code(config)
+    if config.option.processes and not config.option.usepdb:
+        config.pluginmanager.register(Processes(config.option.processes, lambda: save_measured(config)))
+
+
+def save_measured(config: pytest.Config) -> None:
+    """Keep what one of several processes measured, for the one that adds it up."""
+    if controller := measuring(config):
+        controller.cov.save()
+
+
+def keep_byte_code(config: pytest.Config) -> None:
+    """Where no byte code may be kept in the checkout, keep it in pytest's cache, or for this run alone.
+
+    What is installed has its byte code, and is linked to it; the rest is compiled by whoever comes first.
+    """
+    cache = getattr(config, "cache", None)
+    if cache is not None:
+        folder = cache.mkdir("byte-code")
+        for run in (folder / gettempdir().lstrip("/")).glob("pytest-of-*"):
+            rmtree(run, ignore_errors=True)  # of modules that tests made in runs before
+    else:
+        temporary = TemporaryDirectory(prefix="rtshcua_byte_code_")
+        config.add_cleanup(temporary.cleanup)
+        folder = Path(temporary.name)
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = str(folder)
+    sys.dont_write_bytecode = False
     for installed in {sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")}:
         for path, folders, _ in os.walk(installed):
             folders[:] = [each for each in folders if each not in NOT_IMPORTED]
-            kept = Path(folder.name, path.lstrip("/"))
-            kept.mkdir(parents=True, exist_ok=True)
+            kept = folder / path.lstrip("/")
+            if kept.exists():
+                continue
+            kept.mkdir(parents=True)
             for each in Path(path, "__pycache__").glob(f"*.{sys.implementation.cache_tag}.pyc"):
                 (kept / each.name).symlink_to(each)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """With xdist pytest-cov begins once too often in a test process, and also where none is run. End those.
-
-    The first would take over wherever a test is not to be measured, so that all were traced, at three times the price;
-    the other traces whoever deals out the tests and reads the reports.
-    """
-    controller = measuring(session.config)
-    if controller is not None and (hasattr(session.config, "workerinput") or deals_out(session.config)):
-        controller.cov.stop()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -127,8 +136,7 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
     What is collected stays for as long as the process: looking for garbage in it, time and again, took a third of
     collecting. What the tests make is looked through as ever, but for that in it that was there before them.
     """
-    if not hasattr(session.config, "workerinput"):
-        every_character()
+    every_character()
     gc.disable()
     try:
         return (yield from collected(session))
@@ -142,7 +150,7 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
 def collected(session: pytest.Session) -> Generator[None, object, object]:
     """Collect, measuring no more than what is covered."""
     controller = measuring(session.config)
-    if controller is None or deals_out(session.config):
+    if controller is None:
         return (yield)
     for package in map(import_module, COVERED):
         for module in walk_packages(package.__path__, f"{package.__name__}."):
@@ -155,22 +163,6 @@ def collected(session: pytest.Session) -> Generator[None, object, object]:
 def pytest_unconfigure() -> None:
     """Let go of what was collected: libraries look at the end whether anything of theirs is left, and print what is."""
     gc.unfreeze()
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
-    """With xdist, tell of a test once; what its fixtures came to only if they failed, or if `--durations` asks for it.
-
-    To send three reports, read them and count them takes longer than most tests.
-    """
-    if not hasattr(item.config, "workerinput") or item.config.getoption("durations") is not None:
-        return None
-    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-    for report in runtestprotocol(item, log=False, nextitem=nextitem):
-        if report.when == "call" or not report.passed:
-            item.ihook.pytest_runtest_logreport(report=report)
-    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
-    return True
 
 
 class Measured:
@@ -206,23 +198,6 @@ class Measured:
         finally:
             self._coverage.stop()
             self._begun = False
-
-
-class Turned(pytest.Dir):
-    """A folder of tests, from which each process of xdist takes another part first.
-
-    What pytest compiles of a test file it keeps for the others, so each file is compiled once, not by every process.
-    """
-
-    def collect(self) -> list[pytest.Item | pytest.Collector]:
-        found = list(super().collect())
-        worker = self.config.workerinput
-        first = len(found) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
-        return found[first:] + found[:first]
-
-
-def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    return Turned.from_parent(parent, path=path) if hasattr(parent.config, "workerinput") else None
 
 
 def spread(paths: set[Path], waiting: Path) -> dict[Path, tuple[float, Path]]:

@@ -1,0 +1,203 @@
+"""`pytest -n N`: run the tests in N processes, forked from one that has imported and collected them.
+
+To import and collect all tests takes longer than any file's tests take, so it is done once. A file is run by one
+process as a whole: what its tests share is made once. Whoever is done with a file asks for the next.
+"""
+
+import gc
+import os
+import signal
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import groupby
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection, wait
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from _pytest.unraisableexception import collect_unraisable
+
+
+@dataclass
+class Worker:
+    """A process that runs tests: the tests it has been given and has not begun, and the one it has begun."""
+
+    number: int
+    process: int
+    pipe: Connection
+    given: list[int] = field(default_factory=list)
+    begun: int | None = None
+
+    @property
+    def node(self) -> SimpleNamespace:
+        """What a report of xdist says, too: then the terminal writes the letters of all files in a row."""
+        name = f"p{self.number}"
+        return SimpleNamespace(gateway=SimpleNamespace(id=name), _workerinfocache=f"[{name}]")
+
+
+class Crashed(Exception):
+    """A process that runs tests failed outside of them. The text is the traceback."""
+
+
+class Processes:
+    """Runs the tests of a session in `number` processes. In each, `ended` is called at its end."""
+
+    def __init__(self, number: int, ended: Callable[[], None]) -> None:
+        self._number, self._ended = number, ended
+        self._workers: list[Worker] = []
+        self._begun = 0
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool | None:
+        if session.config.option.collectonly or (
+            session.testsfailed and not session.config.option.continue_on_collection_errors
+        ):
+            return None
+        files = [[at for at, _ in group] for _, group in groupby(enumerate(session.items), lambda each: each[1].path)]
+        files.reverse()  # the next is the last
+        session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  one folder for all processes
+        try:
+            for _ in range(min(self._number, len(files))):
+                self._fork(session)
+            while self._workers:
+                for pipe in wait([worker.pipe for worker in self._workers]):
+                    worker = next(each for each in self._workers if each.pipe is pipe)
+                    self._hear(session, worker, files)
+                    if session.shouldfail:
+                        raise session.Failed(session.shouldfail)
+                    if session.shouldstop:
+                        raise session.Interrupted(session.shouldstop)
+        finally:
+            for worker in self._workers:
+                worker.pipe.close()
+                os.kill(worker.process, signal.SIGTERM)
+                os.waitpid(worker.process, 0)
+        if self._begun != len(session.items):
+            raise Crashed(f"{self._begun} of {len(session.items)} tests were begun")
+        return True
+
+    def _fork(self, session: pytest.Session) -> None:
+        """Begin another process."""
+        number = max((worker.number for worker in self._workers), default=-1) + 1
+        own, other = Pipe()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        with warnings.catch_warnings():  # libraries that compute have threads, and let go of them when it forks
+            warnings.simplefilter("ignore", DeprecationWarning)
+            process = os.fork()
+        if process:
+            other.close()
+            self._workers.append(Worker(number, process, own))
+            return
+        code = 1
+        with suppress(KeyboardInterrupt, OSError):  # Ctrl-C, or nobody listens: whoever forked says so
+            own.close()
+            for worker in self._workers:
+                worker.pipe.close()
+            try:
+                _become(session.config, number, other)
+                _run(session, other)
+                self._ended()
+                code = 0
+            except Exception:  # noqa: BLE001  told where it is seen
+                other.send(traceback.format_exc())
+        os._exit(code)
+
+    def _hear(self, session: pytest.Session, worker: Worker, files: list[list[int]]) -> None:
+        """Take what a process says: the test it begins, a report, or (None) that it wants another file."""
+        try:
+            said = worker.pipe.recv()
+            if said is None:
+                file = files.pop() if files else []
+                worker.given += file
+                worker.pipe.send(file)
+                return
+        except (EOFError, OSError):
+            self._lost(session, worker, files)
+            return
+        if isinstance(said, int):
+            worker.given.remove(said)
+            worker.begun = said
+            self._begun += 1
+        elif isinstance(said, str):
+            raise Crashed(said)
+        else:
+            hook = session.config.hook
+            report = hook.pytest_report_from_serializable(config=session.config, data=said)
+            report.node = worker.node
+            hook.pytest_runtest_logreport(report=report)
+
+    def _lost(self, session: pytest.Session, worker: Worker, files: list[list[int]]) -> None:
+        """A process is over. If it was not done, its test has failed, and another runs those that it would have."""
+        self._workers.remove(worker)
+        worker.pipe.close()
+        code = os.waitstatus_to_exitcode(os.waitpid(worker.process, 0)[1])
+        if code == 0:
+            return
+        if worker.begun is not None:
+            item = session.items[worker.begun]
+            report = pytest.TestReport(
+                item.nodeid, item.location, {}, "failed", f"its process ended with {code}", "call"
+            )
+            report.node = worker.node  # type: ignore[attr-defined]
+            session.config.hook.pytest_runtest_logreport(report=report)
+        if worker.given:
+            files.append(worker.given)
+        if files:
+            self._fork(session)
+
+
+class _Told:
+    """Sends reports to whoever counts them: of each test one, and of its fixtures if they failed or are timed."""
+
+    def __init__(self, config: pytest.Config, pipe: Connection) -> None:
+        self._config, self._pipe = config, pipe
+        self._timed = config.option.durations is not None
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.when == "call" or not report.passed or self._timed:
+            to = self._config.hook.pytest_report_to_serializable
+            self._pipe.send(to(config=self._config, report=report))
+
+
+def _become(config: Any, number: int, pipe: Connection) -> None:
+    """Get what a process must not share: where it writes, what it captures, the folder of its files."""
+    plugins = config.pluginmanager
+    plugins.unregister(name="terminalreporter")
+    plugins.register(_Told(config, pipe))
+    capture = plugins.getplugin("capturemanager")
+    capture.stop_global_capturing()
+    capture.start_global_capturing()
+    capture.suspend_global_capture(in_=False)
+    factory = config._tmp_path_factory
+    factory._basetemp = factory.mktemp(f"process{number}-")
+
+
+def _run(session: pytest.Session, pipe: Connection) -> None:
+    """Run what is given."""
+    items = _given(pipe)
+    at = next(items, None)
+    while at is not None:
+        following = next(items, None)
+        pipe.send(at)
+        item, after = session.items[at], None if following is None else session.items[following]
+        item.config.hook.pytest_runtest_protocol(item=item, nextitem=after)
+        at = following
+    gc.collect()
+    collect_unraisable(session.config)
+
+
+def _given(pipe: Connection) -> Iterator[int]:
+    """The tests to be run. Before the last of a file begins, the next file is asked for."""
+    while True:
+        pipe.send(None)
+        file = pipe.recv()
+        if not file:
+            return
+        yield from file

@@ -1,0 +1,99 @@
+"""Tests run by several processes: none is lost, each file is one process's, and a process that dies is a failure."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CONFTEST = """
+from processes import Processes
+
+def ended():
+    with open("ended", "a") as told:
+        print("over", file=told)
+
+def pytest_configure(config):
+    config.pluginmanager.register(Processes(2, ended))
+"""
+PASSES = """
+import os, pytest
+
+@pytest.fixture(scope="module")
+def process():
+    return os.getpid()
+
+@pytest.mark.parametrize("n", range(3))
+def test_one_process_runs_a_file(process, n, tmp_path):
+    with open(__file__ + ".ran", "a") as ran:
+        print(n, file=ran)
+    assert os.getpid() == process != os.getppid()
+"""
+FAILS = """
+def test_fails():
+    print("said before")
+    assert 1 + 1 == 3
+"""
+DIES = """
+import os, signal
+
+def test_before():
+    pass
+
+def test_dies():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+def test_after():
+    pass
+"""
+LEAVES = """
+import pytest
+
+class Left:
+    def __del__(self):
+        raise RuntimeError("not let go of")
+
+def test_leaves_garbage():
+    left = Left()
+    left.itself = left
+"""
+
+
+def run(folder: Path, *words: str, **files: str) -> tuple[int, str]:
+    """What pytest says of these files, and its exit code."""
+    for name, text in {"conftest": CONFTEST, **files}.items():
+        (folder / f"{name}.py").write_text(text, encoding="utf-8")
+    paths = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:cov", "-p", "no:hypothesispytest"]
+    done = subprocess.run(
+        [*command, "--rootdir=.", "--basetemp=t", "-W", "error", *words], check=False, capture_output=True, cwd=folder,
+        env={**os.environ, "PYTHONPATH": paths}, text=True, timeout=120,
+    )  # fmt: skip
+    return done.returncode, done.stdout
+
+
+def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
+    code, said = run(tmp_path, test_a=PASSES, test_b=FAILS, test_c=DIES, test_d=PASSES)
+    assert code == 1, said
+    assert "2 failed, 8 passed" in said, said
+    assert "assert (1 + 1) == 3" in said
+    assert "said before" in said
+    assert "test_c.py::test_dies - its process ended with -9" in said, said
+    for name in ("test_a", "test_d"):
+        assert (tmp_path / f"{name}.py.ran").read_text(encoding="utf-8").split() == ["0", "1", "2"]
+    assert (tmp_path / "ended").read_text(encoding="utf-8").split() == ["over"] * 2
+
+
+@pytest.mark.parametrize(
+    ("words", "files", "told"),
+    [
+        (("-x",), {f"test_{n}": FAILS for n in range(9)}, "stopping after 1 failures"),
+        ((), {"test_left": LEAVES}, "not let go of"),
+        ((), {"test_wrong": "import nothing_of_that_name"}, "1 error"),
+    ],
+)
+def test_it_ends_early_or_at_the_end(tmp_path: Path, words: tuple[str, ...], files: dict[str, str], told: str) -> None:
+    code, said = run(tmp_path, *words, **files)
+    assert code != 0
+    assert told in said

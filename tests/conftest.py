@@ -8,7 +8,7 @@ import signal
 import stat
 import sys
 import sysconfig
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from importlib import import_module
 from itertools import count
 from pathlib import Path
@@ -72,6 +72,8 @@ def measuring(config: pytest.Config) -> Any:
     return getattr(config.pluginmanager.getplugin("_cov"), "cov_controller", None)
 
 
+#: the socket, in the folder of a run, of the process from which commands are forked
+COMMANDS = "commands"
 #: folders of what is installed that no process imports from
 NOT_IMPORTED = ("__pycache__", "idlelib", "lib2to3", "pip", "site-packages", "test", "tests")
 
@@ -217,6 +219,15 @@ def spread(paths: set[Path], waiting: Path) -> dict[Path, tuple[float, Path]]:
     }
 
 
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Begin the process from which commands are forked, if a test asks for it: it loads while the first tests run."""
+    wanted = any("commands" in getattr(item, "fixturenames", ()) for item in session.items)
+    if wanted and not session.config.option.collectonly:
+        beginning = forked(Path(os.environ[once.FOLDER], COMMANDS))
+        beginning.__enter__()
+        session.config.add_cleanup(lambda: beginning.__exit__(None, None, None))
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Coverage is measured by the tests that are for it, and among these by the cases that somebody chose.
 
@@ -238,10 +249,9 @@ def checkout() -> Path:
 
 
 @pytest.fixture(scope="session")
-def commands() -> Iterator[Forked]:
+def commands() -> Forked:
     """`rtshcua` in processes that need not load it first."""
-    with forked() as made:
-        yield made
+    return Forked(Path(os.environ[once.FOLDER], COMMANDS))
 
 
 class Worlds:

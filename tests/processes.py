@@ -16,10 +16,12 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
+from tempfile import TemporaryFile
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from _pytest.capture import FDCapture
 from _pytest.unraisableexception import collect_unraisable
 
 
@@ -41,7 +43,7 @@ class Worker:
 
 
 class Crashed(Exception):
-    """A process that runs tests failed outside of them. The text is the traceback."""
+    """A process failed before its first test, or a test was lost."""
 
 
 class Processes:
@@ -103,9 +105,9 @@ class Processes:
                 _become(session.config, number, other)
                 _run(session, other)
                 self._ended()
-                code = 0
             except Exception:  # noqa: BLE001  told where it is seen
                 other.send(traceback.format_exc())
+            code = 0
         os._exit(code)
 
     def _hear(self, session: pytest.Session, worker: Worker, files: list[list[int]]) -> None:
@@ -125,7 +127,7 @@ class Processes:
             worker.begun = said
             self._begun += 1
         elif isinstance(said, str):
-            raise Crashed(said)
+            self._failed(session, worker, said)
         else:
             hook = session.config.hook
             report = hook.pytest_report_from_serializable(config=session.config, data=said)
@@ -139,17 +141,20 @@ class Processes:
         code = os.waitstatus_to_exitcode(os.waitpid(worker.process, 0)[1])
         if code == 0:
             return
-        if worker.begun is not None:
-            item = session.items[worker.begun]
-            report = pytest.TestReport(
-                item.nodeid, item.location, {}, "failed", f"its process ended with {code}", "call"
-            )
-            report.node = worker.node  # type: ignore[attr-defined]
-            session.config.hook.pytest_runtest_logreport(report=report)
+        self._failed(session, worker, f"its process ended with {code}")
         if worker.given:
             files.append(worker.given)
         if files:
             self._fork(session)
+
+    def _failed(self, session: pytest.Session, worker: Worker, why: str) -> None:
+        """Count what went wrong outside of tests as a failure of the one that was begun last."""
+        if worker.begun is None:
+            raise Crashed(why)
+        item = session.items[worker.begun]
+        report = pytest.TestReport(item.nodeid, item.location, {}, "failed", why, "call")
+        report.node = worker.node  # type: ignore[attr-defined]
+        session.config.hook.pytest_runtest_logreport(report=report)
 
 
 class _Told:
@@ -171,10 +176,11 @@ def _become(config: Any, number: int, pipe: Connection) -> None:
     plugins = config.pluginmanager
     plugins.unregister(name="terminalreporter")
     plugins.register(_Told(config, pipe))
-    capture = plugins.getplugin("capturemanager")
-    capture.stop_global_capturing()
-    capture.start_global_capturing()
-    capture.suspend_global_capture(in_=False)
+    captured = plugins.getplugin("capturemanager")._global_capturing
+    for stream in (captured.out, captured.err):
+        if isinstance(stream, FDCapture):  # it stays the same file for those that have it already
+            with TemporaryFile() as own:
+                os.dup2(own.fileno(), stream.tmpfile.fileno(), inheritable=False)
     factory = config._tmp_path_factory
     factory._basetemp = factory.mktemp(f"process{number}-")
 

@@ -12,6 +12,7 @@ import yaml
 
 from reference.github_runner import ROOT, runner
 from rtshcua.cli.init import project
+from virtual.forked import Forked
 
 OWN_WORKFLOW = ROOT / "examples/starter/.github/workflows/policy.yml"
 FILES = [
@@ -43,10 +44,10 @@ def test_the_action_imports_nothing_from_the_checkout(hostile: Path, tmp_path: P
     assert {*ended.outcomes.values()} == {"success"}, ended.printed
 
 
-def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_path: Path) -> None:
+def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_path: Path, commands: Forked) -> None:
     (hostile / "tests/::warning::nobody said this.rts").write_text("test  x\n", encoding="utf-8")
     (hostile / "tests/flights.rts").unlink()  # the test before flies it
-    ended = runner(tmp_path)(hostile, sarif="")
+    ended = runner(tmp_path, commands)(hostile, sarif="")
     stopped = None
     for line in ended.printed.splitlines():
         if (match := re.match(r"::stop-commands::([0-9a-f]{32})$", line)) is not None:
@@ -59,18 +60,20 @@ def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_
     assert ended.printed.count("::stop-commands::") == 2
 
 
-def test_a_path_is_no_option_and_a_name_is_one_output(hostile: Path, tmp_path: Path) -> None:
+def test_a_path_is_no_option_and_a_name_is_one_output(hostile: Path, tmp_path: Path, commands: Forked) -> None:
     (hostile / "--fix.rts").write_text("zone  a = circle(47 N, 8 E, 10 m)\n", encoding="utf-8")
-    ended = runner(tmp_path)(hostile, paths="--fix.rts", format="false", sarif="a\nsecret=b.sarif", junit="c\nd=e.xml")
+    ended = runner(tmp_path, commands)(
+        hostile, paths="--fix.rts", format="false", sarif="a\nsecret=b.sarif", junit="c\nd=e.xml"
+    )
     assert "nothing found in 1 file" in ended.printed
     assert "error" not in ended.printed
     assert ended.outputs == {"sarif": "", "junit": ""}
 
 
-def test_a_report_that_was_not_written_is_no_output(hostile: Path, tmp_path: Path) -> None:
+def test_a_report_that_was_not_written_is_no_output(hostile: Path, tmp_path: Path, commands: Forked) -> None:
     (tmp_path / "mine.json").write_text('{"runs": [{"results": [{"suppressions": [1]}]}]}', encoding="utf-8")
     (hostile / "rtshcua.sarif").symlink_to(tmp_path / "mine.json")
-    ended = runner(tmp_path)(hostile, tests="false", format="false")
+    ended = runner(tmp_path, commands)(hostile, tests="false", format="false")
     assert ended.outputs == {"sarif": "", "junit": ""}
     assert '"suppressions": [1]' in (tmp_path / "mine.json").read_text(encoding="utf-8")
 

@@ -123,6 +123,7 @@ class Ground:
         )  # fmt: skip
         self._commands, self.speed = commands, SPEED
         self.command: Sequence[str] | None = None
+        self.program = commands.program(folder / "rtshcua")
         self.started: list[Run] = []
 
     def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight", return_mm: int = case.LOW) -> str:

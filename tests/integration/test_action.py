@@ -8,11 +8,12 @@ import pytest
 
 from reference.github_runner import ROOT, Run, runner
 from rtshcua.cli.init import project
+from virtual.forked import Forked
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Run:
-    return runner(tmp_path)
+def run(tmp_path: Path, commands: Forked) -> Run:
+    return runner(tmp_path, commands)
 
 
 @pytest.fixture

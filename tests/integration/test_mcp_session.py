@@ -55,9 +55,9 @@ def base(ground: Any) -> str:
 async def hosted(
     ground: Any, base: str, place: Path, *more: str, heard: Callable[[str], None] | None = None
 ) -> AsyncIterator[ClientSession]:
-    words = ["-m", "rtshcua.cli.app", "mcp", base, "--to", str(place), "--with", str(POLICY), *more]
+    words = ["mcp", base, "--to", str(place), "--with", str(POLICY), *more]
     server = StdioServerParameters(
-        command=sys.executable, args=words, env=dict(ground.environment), cwd=str(ground.folder)
+        command=ground.program, args=words, env=dict(ground.environment), cwd=str(ground.folder)
     )
 
     async def message(what: Any) -> None:

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from virtual.forked import Forked
+
 ROOT = Path(__file__).resolve().parents[2]
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
 STEPS: list[dict[str, Any]] = ACTION["runs"]["steps"]
@@ -61,9 +63,14 @@ exec {python} "$@"
 """
 
 
-def runner(tmp_path: Path) -> Run:
-    """What executes the action's steps in a workspace, with inputs by name (`fail_on="error"`)."""
+def runner(tmp_path: Path, commands: Forked | None = None) -> Run:
+    """What executes the action's steps in a workspace, with inputs by name (`fail_on="error"`).
+
+    With `commands`, `rtshcua` is loaded already: where it is not the start that is looked at.
+    """
     (tmp_path / "bin").mkdir()
+    if commands is not None:
+        commands.program(tmp_path / "bin/rtshcua")
     python = tmp_path / "bin/python"
     python.write_text(PYTHON.format(python=sys.executable, noted=tmp_path / "installed"), encoding="utf-8")
     python.chmod(0o755)

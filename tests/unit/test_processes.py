@@ -18,7 +18,9 @@ def pytest_configure(config):
     config.pluginmanager.register(Processes(2, ended))
 """
 PASSES = """
-import os, pytest
+import os, pytest, sys
+
+KEPT = sys.stderr  # as libraries do when they are imported
 
 @pytest.fixture(scope="module")
 def process():
@@ -28,6 +30,7 @@ def process():
 def test_one_process_runs_a_file(process, n, tmp_path):
     with open(__file__ + ".ran", "a") as ran:
         print(n, file=ran)
+    print("said to what was kept", file=KEPT)
     assert os.getpid() == process != os.getppid()
 """
 FAILS = """
@@ -89,7 +92,7 @@ def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
     ("words", "files", "told"),
     [
         (("-x",), {f"test_{n}": FAILS for n in range(9)}, "stopping after 1 failures"),
-        ((), {"test_left": LEAVES}, "not let go of"),
+        ((), {"test_left": LEAVES, "test_before": PASSES}, "1 failed, 4 passed"),
         ((), {"test_wrong": "import nothing_of_that_name"}, "1 error"),
     ],
 )

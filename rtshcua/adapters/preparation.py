@@ -21,6 +21,9 @@ from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
 PREPARATION: Final = "preparation"
 PREPARED: Final = "prepared"
 NOT_PREPARED: Final = "not-prepared"
+#: and what the boundary permitted of it, or why it did not
+PERMITTED: Final = "permitted"
+NOT_PERMITTED: Final = "not-permitted"
 NOT_RESTORED: Final = "not-restored"
 
 #: how long it is waited for that the vehicle is known to stand on the ground, before a flight and after one,
@@ -200,7 +203,7 @@ class Preparations:
         self._stands(turn, ANSWERS_US)  # the disk took its time: what is known of where it is may be old by now
         now_us = self._clock.now().monotonic_us
         sealed = self._issuer.permit(encode(Preparation(0, restoring, 0, listed)), now_us)
-        opened = sealed if isinstance(sealed, Refusal) else self._executor.prepare(sealed, now_us)
+        opened = sealed if isinstance(sealed, Refusal) else self._permitted(sealed, now_us)
         why = ""
         found: Values = {}
         if isinstance(opened, Refusal):
@@ -225,6 +228,15 @@ class Preparations:
             self._keep_owed(self.owed)
         self._record(NOT_PREPARED, text)
         return text
+
+    def _permitted(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
+        """What the boundary lets be set. That it does is recorded, and nothing waits for the disk: all is on it."""
+        opened = self._executor.prepare(sealed, now_us)
+        if isinstance(opened, Refusal):
+            self._note(NOT_PERMITTED, opened.slug)
+        else:
+            self._note(PERMITTED, told_of(opened.writes, restoring=opened.restoring))
+        return opened
 
     def _read(self, names: Iterable[str], turn: Callable[[], bool]) -> dict[str, int]:
         """What the vehicle says now that these parameters are, of those that it tells."""

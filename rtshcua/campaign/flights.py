@@ -51,7 +51,7 @@ class Field:
     def flown(self, scenario: Scenario, flavour: str, seed: int) -> ScenarioFlown:
         """A flight of a scenario, as it was."""
         made = development.keys()
-        keys = Keys(made[Duty.LOG], development.approvers(self.roles), made[Duty.MISSION])
+        keys = Keys(made[Duty.LOG], development.approvers(self.roles), made[Duty.MISSION], made[Duty.BOUNDARY])
         return fly(self.bundle, self.root, keys, scenario, flavour, seed)
 
     def fly(self, flight: Flight) -> Result:

@@ -25,7 +25,7 @@ def close_log(
 ) -> tuple[str, ...]:  # fmt: skip
     """Sign and close the log, and give what of the evidence is missing: nothing, if it is whole.
 
-    Without an ending (a fault) the log stays unsigned. `note` tells a person, `heard` gets the close's line.
+    Without an ending (a fault) the log stays unsigned. `note` tells a person, `heard` gets the lines of its end.
     """
     missing: list[str] = []
     tlog, lack = _finish(frames)
@@ -35,13 +35,14 @@ def close_log(
         at = now()
         with suppress(OSError):
             if recorder.overdue(at):
-                sink.append(recorder.seal(at), SYNCED_FIRST)
+                for line in recorder.sealing(at):
+                    sink.append(line, SYNCED_FIRST)
             sink.append(recorder.effect(at, FRAMES_LOST, detail=lack), WRITTEN)
     if ending is not None:
         with suppress(OSError):
-            line = recorder.close(now(), ending=ending, tlog=tlog)
-            sink.append(line, SYNCED_FIRST)
-            heard(line)
+            for line in recorder.closing(now(), ending=ending, tlog=tlog):
+                sink.append(line, SYNCED_FIRST)
+                heard(line)
     trouble: OSError | None = None
     try:
         sink.close()

@@ -17,6 +17,7 @@ from rtshcua.adapters.preparation import Preparations
 from rtshcua.adapters.utc import CLOCK, UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.attesting import BoundarySession
 from rtshcua.cli.closing import close_log, keep_summary
 from rtshcua.cli.configured import foreign
 from rtshcua.cli.interrupts import Interrupts, Wish
@@ -32,6 +33,7 @@ from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
+from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Append, Ending, Event, Interrupted, Presented
 from rtshcua.onboard.runtime.runtime import Runtime
@@ -88,7 +90,7 @@ class Flight:
         self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts,
         tape: Tape,
         *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
-        events: Sequence[Event], past: Past, witnesses: Witnessing, utc: UtcWatch,
+        events: Sequence[Event], past: Past, boundary: BoundarySession, witnesses: Witnessing, utc: UtcWatch,
         lapsed: Callable[[], Refused | None], debts: OwedParameters, agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None,
     ) -> None:  # fmt: skip
@@ -121,6 +123,12 @@ class Flight:
             sync_us=clock.us_in(SYNC_US / 1e6),
         )  # fmt: skip
         self._sink.append(genesis, SYNCED_FIRST)
+        self._boundary = boundary
+        loaded.attestation.begin(boundary.key)
+        boundary.begun(loaded.attestation.digest)
+        self._recorder.attest = loaded.attestation.statement
+        for line in self._recorder.attested(now):
+            self._sink.append(line, WRITTEN)
         if simulated is not None:
             self._sink.append(self._recorder.effect(now, SIMULATED, detail=simulated), WRITTEN)
         if past.note:
@@ -289,11 +297,16 @@ class Flight:
         """Put one there, and do not wait for the disk: the loop sees what becomes of it. Raises OSError."""
         now = self._clock.now()
         if self._recorder.overdue(now):
-            self._sink.append(self._recorder.seal(now), SYNCED_FIRST)
+            self._seal(now)
         line = self._recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST)
         self._sink.append(line, SYNCED_FIRST)
         self._told = detail
         self._watch(now, (), (Append(line, SYNCED_FIRST),))
+
+    def _seal(self, now: Now) -> None:
+        """End an epoch. Raises OSError."""
+        for line in self._recorder.sealing(now):
+            self._sink.append(line, SYNCED_FIRST)
 
     def _look_at_utc(self) -> list[Event]:
         """The vehicle may tell the time of day after the log began: from then on it is known. By it something may have
@@ -332,7 +345,7 @@ class Flight:
         self._vehicle.release()
         if self._recorder.overdue(now):
             with suppress(OSError):
-                self._sink.append(self._recorder.seal(now), SYNCED_FIRST)
+                self._seal(now)
         line = self._recorder.effect(now, "left", detail=f"the operator stopped watching; {told}; nothing more is sent")
         with suppress(OSError):
             self._sink.append(line, SYNCED)
@@ -341,11 +354,14 @@ class Flight:
 
     def _close(self, ending: Ending | None) -> tuple[str, ...]:
         """Sign and close the log; what of the evidence is missing. Without an ending (a fault) it stays unsigned."""
-        return close_log(
+        missing = close_log(
             self._recorder, self._sink, self._frames, self._clock.now, ending,
             lambda text: self._feed.post(Note(text)),
             self._agents.tell if self._agents is not None else lambda line: None,
         )  # fmt: skip
+        if ending is not None and not missing:
+            self._boundary.ended(self._loaded.attestation.digest)
+        return missing
 
     def _summary(self, ending: Ending, code: ExitCode, missing: tuple[str, ...]) -> Summary:
         loaded, policy, mission = self._loaded, self._loaded.bundle.policy, self._loaded.bundle.mission

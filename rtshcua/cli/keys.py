@@ -156,6 +156,27 @@ def approver(
 
 
 @app.command()
+def boundary(
+    vehicle: Vehicles = None,
+    passphrase_file: RootPassphrase = None,
+    own_passphrase_file: OwnPassphrase = None,
+    as_json: AsJson = False,
+) -> ExitCode:
+    """Make a key for the enforcement boundary, and the next version of the trust root, which names it.
+
+    `init` makes one; this is for a trust root without one. From then on each flight signs with it what was decided,
+    and a log without that signature does not verify.
+    """
+    return _added(
+        Duty.BOUNDARY,
+        lambda key: key.verification(vehicles=tuple(vehicle or (ANY,))),
+        passphrase_file,
+        own_passphrase_file,
+        as_json=as_json,
+    )
+
+
+@app.command()
 def mission(
     source: Annotated[str, typer.Argument(metavar="agent|operator", help="who proposes what it signs")],
     role: Annotated[list[str], typer.Option(help="a role that missions are for (repeatable)")],

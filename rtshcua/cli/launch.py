@@ -10,6 +10,7 @@ from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
+from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.runs import BUNDLE, LOG, RunFolder
@@ -26,6 +27,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.attesting import UNNAMED, BoundarySession, boundary_key
 from rtshcua.cli.configured import would_set
 from rtshcua.cli.faults import code_of, untrusted, words_of
 from rtshcua.cli.flight import Flight
@@ -129,6 +131,7 @@ class Launch:
     sortie: Sortied | None = None
     settings: Mapping[str, int] = field(default_factory=dict)
     wait_s: float | None = None
+    boundary_key: Path | None = None
 
 
 def launch(order: Launch) -> ExitCode:
@@ -154,6 +157,8 @@ def launch(order: Launch) -> ExitCode:
                     order, loaded, trust, log_kid, past, clock, interrupts, slack, transport, agents
                 )
             root, signed_root = trust.root, trust.signed
+            own_key, keyless = _boundary_key(order, root, loaded, clock)
+            _expect_boundary_key(keyless, resumed=not order.dry_run)
             loaded.preparation.owes(debts.left)
             signing = _sign(order, loaded, clock)
             stack.callback(signing.close)
@@ -196,6 +201,8 @@ def launch(order: Launch) -> ExitCode:
             _expect_current(lapsed, resumed=resumed)
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
+            _expect_boundary_key(keyless, resumed=resumed)
+            inside = BoundarySession(BoundaryStore(order.state, loaded.vehicle), own_key, aloft=resumed)
             told = trust.settle(resumed=resumed)
             run, elsewhere = _run_folder(order, loaded, bundle, clock, resumed=resumed)
             feed = view.enter_context(Feed(order.style))
@@ -204,7 +211,7 @@ def launch(order: Launch) -> ExitCode:
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
                 past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc, debts=debts,
                 lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, log_kid, loaded, clock),
-                simulated=simulation.told(order.speed, own=order.link is None),
+                simulated=simulation.told(order.speed, own=order.link is None), boundary=inside,
             )  # fmt: skip
             del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
             if refusal is not None:
@@ -213,7 +220,8 @@ def launch(order: Launch) -> ExitCode:
             if not resumed:
                 mark_opened(order.state, loaded, clock, flight)
             unsure = [UTC_NOTE] if utc.waits else []
-            for note in (*signing.notes, *filter(None, [told, elsewhere, past.note]), *unsure):
+            unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
+            for note in (*signing.notes, *filter(None, [told, elsewhere, past.note, unsigned, inside.note]), *unsure):
                 feed.post(Note(note))
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
@@ -229,6 +237,23 @@ def launch(order: Launch) -> ExitCode:
             feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _boundary_key(
+    order: Launch, root: TrustRoot, loaded: Loaded, clock: LinkClock
+) -> tuple[SigningKey | None, Refused | None]:
+    """The key that the boundary signs with, or why there is none."""
+    store, now_us = KeyStore(order.data), clock.now().utc_us
+    try:
+        return boundary_key(root, loaded.vehicle, now_us, store, order.boundary_key, order.passphrase_file), None
+    except Refused as refused:
+        return None, refused
+
+
+def _expect_boundary_key(keyless: Refused | None, *, resumed: bool) -> None:
+    """What is in the air comes down without one."""
+    if keyless is not None and not resumed:
+        raise keyless
 
 
 def _run_folder(

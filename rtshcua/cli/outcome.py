@@ -26,6 +26,7 @@ _EXITS = {
     "preparation": ExitCode.DECISION,
     "frames": ExitCode.DECISION,
     "anchor": ExitCode.ANCHOR,
+    "boundary": ExitCode.BOUNDARY,
 }
 
 

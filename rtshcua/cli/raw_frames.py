@@ -7,7 +7,7 @@ from pathlib import Path
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.report import Report
-from rtshcua.ground.auditor.frames import Frames
+from rtshcua.ground.auditor.frames import OTHERS, Frames
 from rtshcua.mavlink import tlog
 
 
@@ -56,7 +56,7 @@ class RawFrames:
 
     def _followed(self, report: Report) -> Report:
         found, count = self.frames.over(), self.frames.count
-        if found is not None:
+        if found is not None and not (found.slug == OTHERS and self._damaged is not None):
             return report._replace(failure=found)
         if self._damaged is not None:
             return _unproven(report, f"the raw frames from byte {self._damaged} on, where no frame can be read")

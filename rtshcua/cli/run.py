@@ -56,7 +56,10 @@ def run(
         typer.Option(help="the signed trust root, after those that lead to it (the key store's; repeatable)"),
     ] = None,
     log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
+    boundary_key: Annotated[
+        Path | None, typer.Option(help="the key that the enforcement boundary signs with (the key store's)")
+    ] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase of these keys")] = None,
     signing_key: LinkKey = None,
     unsigned_radio: UnsignedRadio = False,
     system: System = None,
@@ -153,6 +156,7 @@ def run(
             vehicle=vehicle,
             roots=tuple(root or ()),
             log_key=log_key,
+            boundary_key=boundary_key,
             passphrase_file=passphrase_file,
             data=data_folder(),
             state=state,

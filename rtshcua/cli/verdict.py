@@ -30,6 +30,7 @@ MEANINGS = {
     "preparation": "Parameters of the autopilot were set otherwise than their record says, or when they may not be.",
     "frames": "The raw frames show a command that the log does not: it went out without a record before it.",
     "anchor": "A witness outside saw another log: this one was rewritten or cut, by someone who held its keys.",
+    "boundary": "The enforcement boundary decided, accepted or sent something else, or did not sign that it did this.",
     "telemetry": "The raw frames beside the log are not those of this flight. The log itself is sound.",
     "tail": "The log was cut, or the program stopped while it wrote. What came after is not known.",
 }

@@ -31,6 +31,7 @@ class ExitCode(IntEnum):
         "a test, scenario, flight of a campaign or check of `qualify` fails, no test is found, or coverage is too low",
     )
     CRASHED = 14, "crashed", "the vehicle came down as no landing does; nothing more was sent to it"
+    BOUNDARY = 15, "boundary", "the log contradicts what the enforcement boundary signed, or lacks its signature"
     FAULT = 70, "fault", "an internal fault, never your input: please report it"
     FULL = 74, "io", "writing failed: disk full, device error, or a closed pipe"
     INTERRUPTED = (

@@ -5,7 +5,7 @@ The format is specified in docs/log-format.md.
 
 from base64 import b64encode
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final, Protocol
 from urllib.parse import quote
 
 from rtshcua.evidence.durability import SYNC_US, SYNCED, WRITTEN
@@ -29,9 +29,20 @@ from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.wire.keys import Duty, key_id
 from rtshcua.wire.request import NOTHING, Ref
 
+#: the effect that holds what the boundary signed of its own evidence (`wire.statement`), in base64
+BOUNDARY: Final = "boundary"
+
 #: How much later than `EPOCH_US` and `EPOCH_RECORDS` an epoch is sealed before anything else is recorded; a fifth.
 _LATE = 5
 _LATE_US, _LATE_RECORDS = EPOCH_US + EPOCH_US // _LATE, EPOCH_RECORDS + EPOCH_RECORDS // _LATE
+
+
+class Attest(Protocol):
+    """What signs how far the boundary's own evidence got; None where there is nobody to sign."""
+
+    def __call__(self, *, final: bool = False) -> bytes | None:
+        """The signed statement; after a `final` one there is no more."""
+        ...
 
 
 def origin_of(vehicle: str, boot: str) -> str:
@@ -46,9 +57,11 @@ class Recorder:
     once, by `genesis` or `recover`, and then let go: the rest is signed by epoch keys, for each of which `draw` gives
     32 secret random bytes. The caller's clock never goes back from call to call, its UTC and monotonic time go on
     alike, and its integers stay within 2**53 - 1: a verifier refuses a log where they do not.
+
+    `attest` signs for the boundary: its statement stands before each seal and before the close.
     """
 
-    __slots__ = ("_certify", "_draw", "_head", "_key", "_mode", "_origin", "_public", "_signed_us")
+    __slots__ = ("_certify", "_draw", "_head", "_key", "_mode", "_origin", "_public", "_signed_us", "attest")
 
     def __init__(self, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]) -> None:
         self._certify: Callable[[bytes], bytes] | None = certify
@@ -58,6 +71,7 @@ class Recorder:
         self._key: EpochKey | None = None
         self._origin = self._mode = ""
         self._signed_us = 0  # monotonic time of the last signed record
+        self.attest: Attest = nobody
 
     @classmethod
     def resumed(
@@ -213,6 +227,21 @@ class Recorder:
             )
         )
 
+    def attested(self, now: Now, *, final: bool = False) -> tuple[bytes, ...]:
+        """The line of what the boundary signs now; none where it signs nothing."""
+        statement = self.attest(final=final)
+        if statement is None:
+            return ()
+        return (self.effect(now, BOUNDARY, detail=b64encode(statement).decode()),)
+
+    def sealing(self, now: Now) -> tuple[bytes, ...]:
+        """The lines that end an epoch: what the boundary signs, and the seal."""
+        return (*self.attested(now), self.seal(now))
+
+    def closing(self, now: Now, *, ending: str, tlog: bytes | None) -> tuple[bytes, ...]:
+        """The lines that end the log: what the boundary signs at last, and the close."""
+        return (*self.attested(now, final=True), self.close(now, ending=ending, tlog=tlog))
+
     def seal(self, now: Now) -> bytes:
         """The end of an epoch: signed by its key, which is then dropped; it names the next one."""
         key, last = EpochKey(self._draw()), self._epoch_key()
@@ -270,6 +299,10 @@ class Recorder:
         certify, self._certify = self._certify, None
         self._key, self._signed_us = key, record.at_us
         return self._head.seal(record, self._origin, self._public, certify)
+
+
+def nobody(*, final: bool = False) -> None:
+    """Signs nothing."""
 
 
 def _approvals(context: Context) -> tuple[tuple[int, int, int, int, int], ...]:

@@ -40,7 +40,8 @@ _CHECKPOINT = b',"checkpoint":'  # no text holds it, for a quote inside a text s
 
 _FORM = (
     "the form and number of each record that is not signed itself, its clocks, that it stands where it may and its "
-    "epoch was sealed in time, and that decisions follow from what they record: `--audit`"
+    "epoch was sealed in time, that the boundary itself made what they tell of, and that decisions follow from what "
+    "they record: `--audit`"
 )
 _TREE = "that records are linked line by line and make up the signed tree: without `--fast`"
 

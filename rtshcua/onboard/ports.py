@@ -6,12 +6,13 @@ times are in us; `at_us` is monotonic.
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Final, Protocol, dataclass_transform
+from typing import Final, NamedTuple, Protocol, dataclass_transform
 
 import msgspec
 
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now
+from rtshcua.wire.keys import SigningKey
 
 
 @dataclass_transform(frozen_default=True)
@@ -266,6 +267,16 @@ Action = Dispatch | Release | Append | Announce | Expect | Reply | End
 
 
 # ---------------------------------------------------------------- the other side
+
+
+class BoundaryKey(NamedTuple):
+    """What a boundary signs its evidence with, the number of its session (0: it does not know), and the digest that it
+    kept of the one before; 32 zero octets where there was none.
+    """
+
+    key: SigningKey
+    session: int
+    before: bytes
 
 
 class Boundary(Protocol):

@@ -22,7 +22,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import Owed
-from rtshcua.onboard.ports import Action, Ending, Event, EvidenceSink, Interrupted
+from rtshcua.onboard.ports import Action, BoundaryKey, Ending, Event, EvidenceSink, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.fitting import fitting
@@ -141,7 +141,8 @@ class VirtualFlight:
     for the evidence than memory, and `vehicle` is one that was made already, with the clock that it lives by. What the
     vehicle says is heard every `tick_us`: a longer tick makes a flight cheaper, and what happens on it as much later.
     `before` is the hash of the last line of the vehicle's log before this one. `settings` are parameters that are set
-    before the flight, `owed` what earlier ones left to be put back, kept up to date as a file would be.
+    before the flight, `owed` what earlier ones left to be put back, kept up to date as a file would be. With `boundary`
+    the boundary signs its own evidence; it must where the root names a key for that.
     Raises ValueError for a bundle that is refused, and what `open_root` raises.
     """
 
@@ -154,6 +155,7 @@ class VirtualFlight:
         wait_us: int = 100_000, resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
         sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
         settings: Mapping[str, int] = MappingProxyType({}), owed: dict[str, Owed] | None = None,
+        boundary: BoundaryKey | None = None,
     ) -> None:  # fmt: skip
         policy, mission = claimed(bundle)
         utc_us = mission.issued_at_us + LATER_US if utc_us is None else utc_us
@@ -197,6 +199,10 @@ class VirtualFlight:
             ),
             SYNCED_FIRST,
         )
+        loaded.attestation.begin(boundary)
+        self.recorder.attest = loaded.attestation.statement
+        for line in self.recorder.attested(now):
+            self.sink.append(line, SYNCED_FIRST)
         self.events: list[Event] = []
         self.steps = 0
         self._wait_us = wait_us
@@ -245,14 +251,16 @@ class VirtualFlight:
     def close(self, ending: Ending) -> FlownFlight:
         """Sign and close the log of a flight that ended so; what came of it."""
         with suppress(OSError):
-            self.sink.append(self.recorder.close(self.clock.now(), ending=ending, tlog=None), SYNCED_FIRST)
+            for line in self.recorder.closing(self.clock.now(), ending=ending, tlog=None):
+                self.sink.append(line, SYNCED_FIRST)
             self.sink.close()
         return self.flown(ending, self.sink.lines, self.vehicle, self.steps, self.loaded, self._root_key)
 
     def _record(self, event: str, detail: str) -> None:
         now = self.clock.now()
         if self.recorder.overdue(now):
-            self.sink.append(self.recorder.seal(now), SYNCED_FIRST)
+            for line in self.recorder.sealing(now):
+                self.sink.append(line, SYNCED_FIRST)
         self.sink.append(self.recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST), SYNCED_FIRST)
 
     def _watch(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:

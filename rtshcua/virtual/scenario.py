@@ -26,7 +26,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.scenario import Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Dispatch, Ending, Event, Presented, Readings
+from rtshcua.onboard.ports import Action, BoundaryKey, Dispatch, Ending, Event, Presented, Readings
 from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
@@ -37,6 +37,7 @@ from rtshcua.virtual.triggers import Due, Triggers
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from rtshcua.wire import cose
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
+from rtshcua.wire.boundary_chain import START as START_DIGEST
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.recall import RecallDocument, sign_recall
 from rtshcua.wire.replacement import sign_replacement
@@ -71,6 +72,11 @@ class Keys:
     log: SigningKey
     approvals: Mapping[str, Sequence[SigningKey]]
     mission: SigningKey
+    boundary: SigningKey | None = None
+
+    def session(self, number: int, before: bytes) -> BoundaryKey | None:
+        """What the boundary signs with in its session of this number; None where the root asks for nothing."""
+        return None if self.boundary is None else BoundaryKey(self.boundary, number, before)
 
 
 def fly(
@@ -193,8 +199,9 @@ class _Flight:
 
         self._flight = VirtualFlight(
             bundle, vehicle, root=root, log_key=keys.log, utc_us=utc_us, wait_us=WAIT_US, tick_us=tick_us,
-            sink=lambda clock: _Sink(clock, full=False),
+            sink=lambda clock: _Sink(clock, full=False), boundary=keys.session(1, START_DIGEST),
         )  # fmt: skip
+        self._kept = self._flight.loaded.attestation.digest  # of the boundary's own evidence, as its store has it
         self._world = self._watch(self._flight.vehicle)
         self._utc_us = self._flight.clock.now().utc_us
         self._began_us = 0
@@ -458,15 +465,18 @@ class _Flight:
             return [], "replayed"
         full = self._is_full()
         before_hash = leaf_hash(self._lives[-1].lines[-1]).hex()
+        session = self._keys.session(len(self._lives) + 1, self._kept)
         try:
             flight = VirtualFlight(
                 self._bundle, root=self._root, log_key=self._keys.log, wait_us=WAIT_US, resumed=True, vehicle=vehicle,
                 sink=lambda clock: _Sink(clock, full=full), tick_us=self._tick_us, before=before_hash,
+                boundary=session,
             )  # fmt: skip
         except OSError as error:
             return [], str(error.strerror)
         except (Untrusted, ValueError) as error:
             return [], str(error)
+        self._kept = flight.loaded.attestation.digest
         self._begin_life(flight)
         return events, None
 

@@ -32,6 +32,7 @@ class Duty(StrEnum):
     APPROVAL = "approval"  # answers a `confirm`
     LOG = "log"  # signs evidence
     WITNESS = "witness"  # cosigns the checkpoints of logs, away from the vehicle
+    BOUNDARY = "boundary"  # signs what the enforcement boundary decided and let go ahead
 
     @property
     def label(self) -> bytes:

@@ -18,7 +18,8 @@ class Receipt(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_field
     """What became of a document: `slug` is `accepted` or why it was refused, `text` is for a person.
 
     Of an accepted approval: `step`, `role` (its number), `granted`, and `expires_us` (UTC). Of an accepted replacement:
-    `step`, the first that changed.
+    `step`, the first that changed. `evidence` is the boundary's digest (`boundary_chain`) after it; empty where no
+    boundary was asked.
     """
 
     kind: int
@@ -28,6 +29,7 @@ class Receipt(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_field
     role: int = -1
     granted: int = -1
     expires_us: int = 0
+    evidence: bytes = b""
 
     @property
     def accepted(self) -> bool:
@@ -43,7 +45,7 @@ def encode(receipt: Receipt) -> bytes:
 def decode(data: bytes) -> Receipt | Refusal:
     """Read a receipt. Raises nothing."""
     try:
-        receipt = msgspec.convert(artefact.unwrap(names.RECEIPT, data), Receipt)
+        receipt = msgspec.convert(artefact.unwrap(names.RECEIPT, data), Receipt, builtin_types=(bytes,))
     except (ArtefactError, msgspec.ValidationError) as error:
         return Refusal("malformed", str(error))
     return receipt if encode(receipt) == data else Refusal("malformed", "not the octets that this receipt encodes to")

@@ -1,7 +1,8 @@
 """Responses of `enforce`: a decision, with a permit where it grants one, or a refusal to decide.
 
 The body is one string of octets in a fixed layout, big-endian: status, outcome, reason number, step of section 4.1,
-clause number, target, `valid_until_us`, consumed, then the permit, if any. In a refusal all but the status is 0.
+clause number, target, `valid_until_us`, consumed, then the permit, if any, and last the digest of the boundary's own
+evidence after it (`boundary_chain`, paper symbol `d_ev`). In a refusal all but status and digest is 0.
 """
 
 from enum import IntEnum
@@ -16,6 +17,7 @@ from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Airspace, Policy, Rule
 from rtshcua.model.outcome import REASON_NUMBERS, WIRE_REASONS, Outcome, Reason
 from rtshcua.wire import artefact, names
+from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.permit import SIZE
 
 #: `target` where the decision names none: less than `-1 - rule` for any rule
@@ -46,7 +48,7 @@ class Answer(msgspec.Struct, frozen=True):
 
     `clause` counts through `shared_clauses`, then `own_clauses`. `target` is the number of a link of the fallback
     chain, or `-1 - rule` for the target of a degrade rule. `consumed` is what `decide` was told. `permit` is empty
-    unless one was granted.
+    unless one was granted. `evidence` is the boundary's digest after this answer, or an equal one before.
     """
 
     outcome: Outcome
@@ -57,6 +59,7 @@ class Answer(msgspec.Struct, frozen=True):
     valid_until_us: int
     consumed: int
     permit: bytes = b""
+    evidence: bytes = bytes(DIGEST_BYTES)
 
 
 def shared_clauses(policy: Policy) -> tuple[Rule | Airspace, ...]:
@@ -69,8 +72,8 @@ def own_clauses(contract: Contract) -> tuple[Clause, ...]:
     return (*contract.require, *contract.assume, *contract.maintain)
 
 
-def encode(answer: Answer) -> bytes:
-    """The octets of a decision."""
+def encode(answer: Answer, evidence: bytes | None = None) -> bytes:
+    """The octets of a decision, with its `evidence` or another in its place."""
     body = _HEAD.pack(
         _DECIDED,
         answer.outcome,
@@ -81,37 +84,37 @@ def encode(answer: Answer) -> bytes:
         answer.valid_until_us,
         answer.consumed,
     )
-    return (_WITH_PERMIT if answer.permit else _WITHOUT_PERMIT) + body + answer.permit
+    prefix = _WITH_PERMIT if answer.permit else _WITHOUT_PERMIT
+    return prefix + body + answer.permit + (answer.evidence if evidence is None else evidence)
 
 
-def encode_refusal(status: Status) -> bytes:
+def encode_refusal(status: Status, evidence: bytes = bytes(DIGEST_BYTES)) -> bytes:
     """The octets of a refusal to decide."""
-    return _WITHOUT_PERMIT + _HEAD.pack(status, 0, 0, 0, 0, 0, 0, 0)
+    return _WITHOUT_PERMIT + _HEAD.pack(status, 0, 0, 0, 0, 0, 0, 0) + evidence
 
 
 def decode(data: bytes) -> Answer | Status | Refusal:
     """Read a response; a refusal to decide is its status. Raises nothing."""
-    prefix = _WITHOUT_PERMIT if len(data) == len(_WITHOUT_PERMIT) + _HEAD.size else _WITH_PERMIT
-    start = len(prefix) + _HEAD.size
-    if not data.startswith(prefix) or len(data) - start != (SIZE if prefix is _WITH_PERMIT else 0):
+    prefix = _WITHOUT_PERMIT if len(data) == len(_WITHOUT_PERMIT) + _HEAD.size + DIGEST_BYTES else _WITH_PERMIT
+    start, end = len(prefix) + _HEAD.size, len(data) - DIGEST_BYTES
+    if not data.startswith(prefix) or end - start != (SIZE if prefix is _WITH_PERMIT else 0):
         return Refusal("malformed", f"not a response of version {names.RESPONSE.version}")
     status, outcome, reason, rule_step, *numbers = _HEAD.unpack_from(data, len(prefix))
     if status != Status.DECIDED:
         refused = Status(status) if status < len(Status) else None
-        if refused is None or data != encode_refusal(refused):
+        if refused is None or data != encode_refusal(refused, data[end:]):
             return Refusal("malformed", "a refusal with more than its status")
         return refused
     if outcome >= len(_OUTCOMES) or reason >= len(WIRE_REASONS):
         return Refusal("malformed", "an outcome or a reason that there is not")
     clause, target, valid_until_us, consumed = numbers
-    return Answer(
-        _OUTCOMES[outcome], WIRE_REASONS[reason], rule_step, clause, target, valid_until_us, consumed, data[start:]
-    )
+    said = _OUTCOMES[outcome], WIRE_REASONS[reason]
+    return Answer(*said, rule_step, clause, target, valid_until_us, consumed, data[start:end], data[end:])
 
 
 def _prefix(size: int) -> bytes:
     return artefact.wrap(names.RESPONSE, bytes(size))[:-size]
 
 
-_WITHOUT_PERMIT: Final = _prefix(_HEAD.size)
-_WITH_PERMIT: Final = _prefix(_HEAD.size + SIZE)
+_WITHOUT_PERMIT: Final = _prefix(_HEAD.size + DIGEST_BYTES)
+_WITH_PERMIT: Final = _prefix(_HEAD.size + SIZE + DIGEST_BYTES)

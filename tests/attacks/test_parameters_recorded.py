@@ -24,12 +24,12 @@ from virtual.shipped import shipped, simulated
 
 
 @cache
-def flown() -> tuple[tuple[bytes, ...], Entries]:
-    """A flight for which a parameter was set, and put back."""
+def flown(*, attested: bool = True) -> tuple[tuple[bytes, ...], Entries]:
+    """A flight for which a parameter was set, and put back; `attested`, by a boundary that signs."""
     bits = bits_of(80.0)
     assert bits is not None
     config = simulated("ardupilot", parameters=(("FENCE_ALT_MAX", 15.0),))
-    flight = Flight(shipped("short"), config, settings={"FENCE_ALT_MAX": bits})
+    flight = Flight(shipped("short"), config, settings={"FENCE_ALT_MAX": bits}, attested=attested)
     entries = kept(flight)
     return tuple(flight.fly().lines), entries
 
@@ -99,6 +99,11 @@ def test_a_write_to_a_vehicle_that_flies(message: Any) -> None:
 def test_a_log_that_lost_the_record_of_its_writes() -> None:
     lines, entries = flown()
     without = [line for line in lines if read(line).get("event") != "preparation"]
+    assert found(signed(without), entries) == "preparation/other-permit"
+    without = [line for line in without if read(line).get("event") != "permitted"]
+    assert found(signed(without), entries) == "boundary/differs"
+    lines, entries = flown(attested=False)
+    without = [line for line in lines if read(line).get("event") not in ("preparation", "permitted")]
     assert found(signed(without), entries) == "frames/unlisted-parameter"
 
 
@@ -107,7 +112,7 @@ def changed(number: int, detail: str) -> str | None:
     lines = list(flown()[0])
     listed = [at for at, line in enumerate(lines) if read(line).get("event") == "preparation"]
     lines[listed[number]] = edit(lines[listed[number]], detail=detail)
-    return found(signed(lines), ())
+    return found(signed(lines), flown()[1])
 
 
 @rows(("number", "detail", "slug"), [
@@ -118,17 +123,17 @@ def changed(number: int, detail: str) -> str | None:
     (0, "set GF_ACTION from 2 to 4", "preparation/value"),
     (0, "set FENCE_RADIUS from 50 to 1000000", "preparation/value"),
     (0, "set RTL_ALT from 1500 to 0", "preparation/value"),
-    (0, "restore RTL_ALT from 1500 to 0", None),
+    (0, "restore RTL_ALT from 1500 to 0", "preparation/other-permit"),
     (0, "set GF_MAX_HOR_DIST from 50 to 1e39", "preparation/malformed"),
     (0, "restore GF_MAX_HOR_DIST from -1e39 to 50", "preparation/malformed"),
-    (0, "restore FENCE_RADIUS from 300 to 50", None),
+    (0, "restore FENCE_RADIUS from 300 to 50", "preparation/other-permit"),
     (0, "set FENCE_RADIUS", "preparation/malformed"),
     (0, "set FENCE_RADIUS from a to b", "preparation/malformed"),
     (0, "set FENCE_RADIUS from nan to 1", "preparation/malformed"),
     (0, "set ", "preparation/malformed"),
     (0, "", "preparation/malformed"),
     (1, "restore FENCE_ALT_MAX from 80 to 16", "preparation/other-value"),
-    (1, "restore FENCE_ALT_MAX from 80 to 15, FENCE_TYPE from 7 to 7", None),
+    (1, "restore FENCE_ALT_MAX from 80 to 15, FENCE_TYPE from 7 to 7", "preparation/other-permit"),
 ])  # fmt: skip
 def test_what_a_record_lists_makes_sense(number: int, detail: str, slug: str | None) -> None:
     assert changed(number, detail) == slug
@@ -150,7 +155,7 @@ def test_the_audit_and_the_gate_accept_the_same(name: str) -> None:
 
 
 def test_nothing_is_listed_while_a_command_is_under_way() -> None:
-    lines = list(flown()[0])
+    lines = [line for line in flown(attested=False)[0] if read(line).get("event") != "permitted"]
     first = next(at for at, line in enumerate(lines) if read(line).get("event") == "preparation")
     sent = next(at for at, line in enumerate(lines) if read(line).get("event") == "dispatched")
     moved = lines.pop(first)

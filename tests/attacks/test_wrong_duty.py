@@ -20,6 +20,7 @@ ARTEFACTS = {
     Duty.APPROVAL: names.APPROVAL,
     Duty.LOG: names.LOG,
     Duty.WITNESS: names.RECEIPT,  # in earnest it signs no envelope
+    Duty.BOUNDARY: names.STATEMENT,
 }
 KEYS = {
     duty: SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=True) for number, duty in enumerate(Duty)

@@ -142,6 +142,20 @@ def _envelope(envelope: bytes, root: Root, duty: str, vehicle: str, now_us: int)
     return payload, keys[0]
 
 
+def payload_of(envelope: bytes, duty: str, content: str, keys: list[bytes]) -> bytes:
+    """What one of these public keys of a duty signed. Raises `Untrusted`."""
+    protected, payload, signature, kid = _parts(envelope, content)
+    public = next((each for each in keys if key_id(duty, each) == kid), None)
+    if public is None or not holds(public, signature, _signed(protected, duty, payload)):
+        raise Untrusted(f"not signed by a key of duty {duty}")
+    return payload
+
+
+def whole(data: bytes) -> object:
+    """The one item of canonical CBOR. Raises `Untrusted`."""
+    return _whole(data)
+
+
 def _body(payload: bytes) -> dict:
     match _whole(payload):
         case ["rtshcua/root", 2, {**body}] if set(body) - {"revoked"} == _ROOT_FIELDS:

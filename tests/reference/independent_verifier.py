@@ -14,6 +14,7 @@ from urllib.parse import quote
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).parent.parent))
 
+from reference.independent_boundary import Boundary, Disputed
 from reference.independent_note import Broken, claimed, cosigned, ident, notes_of, read_note
 from reference.independent_records import LONGEST, SIGNED, Malformed, canonical, parse, unbase64
 from reference.independent_root import Root, Untrusted, check_bundle, holds, key_id, open_root
@@ -24,7 +25,9 @@ _ANCHORED = "anchored"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a log: `closed`, `incomplete`, `broken`, `untrusted` or `anchor`; `line` is the first bad one."""
+    """What became of a log: `closed`, `incomplete`, `broken`, `untrusted`, `anchor` or `boundary`; `line` is the first
+    bad one.
+    """
 
     kind: str
     why: str = ""
@@ -104,6 +107,8 @@ class Walk:
         self.signed_seq = self.signed_us = 0
         self.at_us = self.low = 0
         self.base: tuple[int, int] = (0, 0)
+        self.boundary: Boundary | None = None
+        self.disputed: tuple[str, int] | None = None
 
     def verdict(self, rest: bytes, anchors: Iterable[bytes] = (), witnesses: int | None = None) -> Verdict:
         """What becomes of the log if these octets are what is still to be read of it."""
@@ -121,6 +126,8 @@ class Walk:
             anchored = self.anchored([*self.notes, *notes_of(anchors)], witnesses)
         except Broken as error:
             return Verdict("anchor", str(error), None, self.seq)
+        if self.disputed is not None:
+            return Verdict("boundary", *self.disputed, self.seq, anchored)
         return Verdict(kind, "", None, self.seq, anchored)
 
     def line(self, line: bytes) -> None:
@@ -141,6 +148,7 @@ class Walk:
             self._signed(line, record)
         else:
             self._epoch(record)
+        self._attested(record)
         if record.get("event") == _ANCHORED:
             self.notes.append(record["detail"])
         self.prev = leaf(line)
@@ -149,6 +157,15 @@ class Walk:
         self.octets += len(line)
         self.seq += 1
         self.roots[self.seq] = self.tree.root()
+
+    def _attested(self, record: dict) -> None:
+        if self.boundary is None:
+            self.boundary = Boundary(record, self.trust)
+        elif self.disputed is None:
+            try:
+                self.boundary.line(record)
+            except Disputed as error:
+                self.disputed = str(error), self.seq
 
     def _trust(self, record: dict) -> None:
         self.genesis = record

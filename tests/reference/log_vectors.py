@@ -17,8 +17,12 @@ if __package__ in (None, ""):
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from msgspec.structs import replace
 
+from reference.attested_flight import attested
 from reference.forgery import LOG_KEY, flight, public_of, read, resealed, seed_of
+from reference.independent_boundary import Boundary
 from reference.independent_note import read_note
+from reference.independent_records import unbase64
+from reference.independent_root import open_root
 from reference.independent_verifier import leaf, merkle
 from reference.resealing import Fields, line_of
 from rtshcua.wire.keys import ANY, Duty, SigningKey
@@ -175,6 +179,15 @@ def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
         stranger = SigningKey.from_seed(b"\x77" * 32, duty=Duty(duty), development=True)
         forged = log(genesis(bundle=bundle(own, **{duty: stranger})), close(10))
         yield f"bundle_{duty}", f"3: the {duty} signed by a stranger", forged
+    own_evidence = list(attested())
+    number = next(n for n, line in enumerate(own_evidence) if read(line)["type"] == "decision")
+    altered = line_of(read(own_evidence[number]) | {"valid_until_us": 0})
+    lie = [*own_evidence[:number], altered, *own_evidence[number + 1 :]]
+    yield "boundary_altered", "7: a decision altered by the holder of the log key", resealed(lie, seed_of)
+    lie = [*own_evidence[:1], *own_evidence[2:]]
+    yield "boundary_unsigned", "7: no statement before the first entry", resealed(lie, seed_of)
+    lie = [line for n, line in enumerate(own_evidence) if n != len(own_evidence) - 2]
+    yield "boundary_cut", "7: no final statement", resealed(lie, seed_of)
     yield "second_genesis", "1: a genesis that is not line 0", log(genesis(), genesis(), close(10))
 
 
@@ -187,6 +200,16 @@ def _with_key(lines: list[bytes], epoch: int) -> list[bytes]:
     """The first epoch sealed by the key of another."""
     own = read(lines[0])["next_key"]
     return resealed(lines, lambda public: (epoch + 1).to_bytes(32) if public == own else seed_of(public))
+
+
+def digests(lines: list[bytes]) -> list[str]:
+    """D(0), D(1), ... of the boundary's own evidence."""
+    first, *rest = map(read, lines)
+    trust = open_root(unbase64(first["root"]), case.KEYS[Duty.ROOT].public, first["utc_us"])
+    boundary = Boundary(first, trust)
+    for record in rest:
+        boundary.line(record)
+    return [digest.hex() for digest in boundary.digests]
 
 
 def expected(lines: list[bytes]) -> Fields:
@@ -217,6 +240,7 @@ def made() -> dict[str, bytes]:
     odd = log(genesis(vehicle=ODD, bundle=bundle(ODD)), effect(10), close(20))
     logs = {
         "closed": (list(flight()), "closed", 0),
+        "attested": (list(attested()), "closed", 0),
         "sealed": (sealed(), "closed", 0),
         "named": (odd, "closed", 0),
         "recovered": (whole, "closed", 0),
@@ -231,6 +255,7 @@ def made() -> dict[str, bytes]:
         name: {"verdict": verdict, "anchored": size} | expected([line for line in lines if line.endswith(b"\n")])
         for name, (lines, verdict, size) in logs.items()
     }
+    of["attested"]["boundary"] = digests(list(attested()))
     rejected = {}
     for name, why, lines in _rejected():
         rejected[name] = why
@@ -238,6 +263,10 @@ def made() -> dict[str, bytes]:
     keys = {
         "root": {"public": case.KEYS[Duty.ROOT].public.hex(), "kid": case.KEYS[Duty.ROOT].kid.hex()},
         "log": {"seed": LOG_KEY.private.private_bytes_raw().hex(), "public": LOG_KEY.public.hex()},
+        "boundary": {
+            "seed": case.BOUNDARY_KEY.private.private_bytes_raw().hex(),
+            "public": case.BOUNDARY_KEY.public.hex(),
+        },
         "epochs": [{"seed": n.to_bytes(32).hex(), "public": public_of(n.to_bytes(32)).hex()} for n in range(1, 13)],
         "witnesses": {n: {"seed": s.hex(), "public": public_of(s).hex()} for n, s in WITNESSES.items()},
     }

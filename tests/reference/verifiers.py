@@ -20,7 +20,7 @@ ROOT_KEY = case.KEYS[Duty.ROOT].public
 WORDS = {
     Verdict.VERIFIED: ("closed",),
     Verdict.INCOMPLETE: ("incomplete",),
-    Verdict.FAILED: ("broken", "untrusted", "anchor"),
+    Verdict.FAILED: ("broken", "untrusted", "anchor", "boundary"),
 }
 #: findings of things that docs/log-format.md says nothing about: what the records and the bundle mean
 OF_MEANING = (
@@ -73,12 +73,14 @@ def agree(data: bytes, audit: Audit, pinned: bytes = ROOT_KEY) -> None:
     word = independent(data, pinned)
     if slug.startswith(OF_FORM_OF_BUNDLES):
         assert word in ("closed", "incomplete", "untrusted"), (word, report.failure)
+    elif slug.startswith("boundary/"):
+        assert word == "boundary", (word, report.failure)
     elif slug.startswith(OF_MEANING):
         assert word in ("closed", "incomplete"), (word, report.failure)
     else:
         assert word in WORDS[report.verdict], (word, report.failure)
     if quick_accepts(data, pinned):
-        unasked = slug.startswith((*OF_MEANING, *OF_FORM_OF_BUNDLES, *OF_FORM))
+        unasked = slug.startswith((*OF_MEANING, *OF_FORM_OF_BUNDLES, *OF_FORM, "boundary/"))
         assert report.verdict is Verdict.VERIFIED or unasked, report.failure
     else:
         assert report.verdict is not Verdict.VERIFIED

@@ -34,7 +34,12 @@ SOURCES = {
 }
 WIND_OF_ARDUPILOT = SignalSource("WIND", ("speed",), 1_000, 1, ())
 
-KEYS = {duty: SigningKey.from_seed(bytes([n]) * 32, duty=duty, development=True) for n, duty in enumerate(Duty)}
+KEYS = {
+    duty: SigningKey.from_seed(bytes([n]) * 32, duty=duty, development=True)
+    for n, duty in enumerate(Duty)
+    if duty is not Duty.BOUNDARY
+}
+BOUNDARY_KEY = SigningKey.from_seed(bytes([0xB0]) * 32, duty=Duty.BOUNDARY, development=True)
 
 
 def _projection() -> Projection:
@@ -114,8 +119,8 @@ def seal(of: Mission, under: Policy | None = None, keys: Mapping[Duty, SigningKe
     )
 
 
-def root(issued_at_us: int = flat.ISSUED) -> tuple[TrustRoot, bytes]:
-    """The development root that names the keys, and its signed bytes."""
+def root(issued_at_us: int = flat.ISSUED, *, boundary: bool = False) -> tuple[TrustRoot, bytes]:
+    """The development root that names the keys, and its signed bytes; with `boundary` that of the boundary too."""
     made = TrustRoot(
         version=1, development=True, issued_at_us=issued_at_us, expires_at_us=issued_at_us + YEAR_US,
         keys=tuple(
@@ -127,7 +132,8 @@ def root(issued_at_us: int = flat.ISSUED) -> tuple[TrustRoot, bytes]:
                 person="ada" if duty is Duty.APPROVAL else "",
             )
             for duty, key in KEYS.items()
-        ),
+        )
+        + ((BOUNDARY_KEY.verification(vehicles=(ANY,)),) if boundary else ()),
     )  # fmt: skip
     return made, made.sign(KEYS[Duty.ROOT])
 

@@ -4,6 +4,7 @@ from typing import Any
 
 from reference.verifiers import agree
 from rtshcua.ground.auditor.audit import Audit
+from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.flight import FlownFlight, VirtualFlight
 from rtshcua.wire.keys import Duty
@@ -24,12 +25,17 @@ class Flown(FlownFlight):
 
 
 class Flight(VirtualFlight):
-    """One flight under the development root of `case`."""
+    """One flight under the development root of `case`; `attested`, by a boundary that signs its own evidence."""
 
     flown = Flown
 
     def __init__(
-        self, bundle: bytes, config: SimulationConfig, *, utc_us: int = UTC_US, tick_us: int = TICK_US, **more: Any
-    ) -> None:
-        _, root = case.root()
-        super().__init__(bundle, config, root=root, log_key=case.KEYS[Duty.LOG], utc_us=utc_us, tick_us=tick_us, **more)
+        self, bundle: bytes, config: SimulationConfig, *, utc_us: int = UTC_US, tick_us: int = TICK_US,
+        attested: bool = True, **more: Any,
+    ) -> None:  # fmt: skip
+        _, root = case.root(boundary=attested)
+        if attested:
+            more.setdefault("boundary", BoundaryKey(case.BOUNDARY_KEY, 1, bytes(32)))
+        super().__init__(
+            bundle, config, root=root, log_key=case.KEYS[Duty.LOG], utc_us=utc_us, tick_us=tick_us, **more,
+        )  # fmt: skip

@@ -1,5 +1,7 @@
 """Flights of scenarios with the keys of the tests."""
 
+from dataclasses import replace
+
 from rtshcua.model.faults import Fault
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import AtTime, Expectation, Expected, Incident, Scenario, Start, When
@@ -11,7 +13,9 @@ from rtshcua.wire.keys import Duty
 from virtual import case
 
 CALM = Start()
-KEYS = Keys(case.KEYS[Duty.LOG], {"supervisor": (case.KEYS[Duty.APPROVAL],)}, case.KEYS[Duty.MISSION])
+KEYS = Keys(
+    case.KEYS[Duty.LOG], {"supervisor": (case.KEYS[Duty.APPROVAL],)}, case.KEYS[Duty.MISSION], case.BOUNDARY_KEY
+)
 
 
 def incident(at_s: float, fault: Fault) -> Incident:
@@ -36,7 +40,10 @@ def fast(policy: Policy, **fields: object) -> SimulationConfig:
     return fitting(policy, land_mm_s=case.LAND_MM_S, **low, **fields)
 
 
-def flown(of: Scenario, flavour: str = "px4", *, bundle: bytes | None = None, seed: int = 1) -> ScenarioFlown:
-    """A flight of it: up, a leg, and home, unless another bundle is given."""
+def flown(
+    of: Scenario, flavour: str = "px4", *, bundle: bytes | None = None, seed: int = 1, attested: bool = True
+) -> ScenarioFlown:
+    """A flight of it: up, a leg, and home, unless another bundle is given. `attested`, by a boundary that signs."""
     flies = case.seal(case.mission(case.low_steps())) if bundle is None else bundle
-    return fly(flies, case.root()[1], KEYS, of, flavour, seed, chosen=fast)
+    keys = KEYS if attested else replace(KEYS, boundary=None)
+    return fly(flies, case.root(boundary=attested)[1], keys, of, flavour, seed, chosen=fast)

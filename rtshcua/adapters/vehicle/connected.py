@@ -152,9 +152,10 @@ class ConnectedVehicle:
         return now_us
 
     def _send(self, frames: Sequence[bytes]) -> None:
-        if self._peer is None or not frames:
+        """Send frames, and keep them: also those that find nobody any more, for they passed the gate."""
+        if not frames:
             return
-        for frame in frames:
+        for frame in frames if self._peer is not None else ():
             self._transport.send(frame, self._peer)
         utc_us = self._clock.now().utc_us
         self._unkept += [(utc_us, frame) for frame in frames]

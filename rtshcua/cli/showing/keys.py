@@ -89,6 +89,9 @@ def speaks(key: VerificationKey) -> str:
     if key.duty is Duty.WITNESS:
         until = "" if key.expires_us is None else f", until {utc(key.expires_us)}"
         return f"cosigns logs of {_any(key.vehicles, 'vehicle')}{until}"
+    if key.duty is Duty.BOUNDARY:
+        until = "" if key.expires_us is None else f", until {utc(key.expires_us)}"
+        return f"signs what was decided, on {_any(key.vehicles, 'vehicle')}{until}"
     if key.duty is Duty.APPROVAL:
         until = "" if key.expires_us is None else f", until {utc(key.expires_us)}"
         return f"{key.person} in person as {key.roles[0]}, on {_any(key.vehicles, 'vehicle')}{until}"

@@ -3,15 +3,16 @@
 8. trust: the root under the pinned key, the log key's duty, the bundle under that root (`trust`)
 9. the bundle is the one that the caller knows of, if there is one
 10. anchors: what witnesses cosigned is what the log holds (`rtshcua.evidence.witnessing.anchors`)
-11. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
+11. what the records tell of is what the boundary made and signed for (`rtshcua.evidence.attested`)
+12. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
     ruled out by the states that the records hold (`observed`)
-12. documents: each approval, recall, replacement and cancellation is verified again, and no decision read another
+13. documents: each approval, recall, replacement and cancellation is verified again, and no decision read another
     (`documents`)
-13. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
+14. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
     `none`
 
-Of several flaws the first of these is told: of the genesis and its trust, of the log itself, of its anchors, of what
-its records mean. For a log that is not whole proves nothing, whatever its records say.
+Of several flaws the first of these is told: of the genesis and its trust, of the log itself, of its anchors, of the
+boundary's own evidence, of what its records mean. For a log that is not whole proves nothing, whatever its records say.
 
 What no log can prove: that the state it records is what the vehicle's sensors saw, and that the temporal monitors said
 what follows from all observations, of which the log has those at which something was decided.
@@ -20,6 +21,7 @@ what follows from all observations, of which the log has those at which somethin
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from rtshcua.evidence.attested import BoundaryEvidence
 from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.records import AnyRecord, Decision, Effect, Genesis
@@ -68,6 +70,8 @@ class Auditor:
         self._untrusted: Finding | None = None
         self._contradicted: Finding | None = None
         self._suspect: Finding | None = None
+        self._boundary: BoundaryEvidence | None = None
+        self._unattested: Finding | None = None
 
     def take(self, line: bytes) -> bool:
         """Takes the next line; False when no further one would change the result."""
@@ -82,6 +86,8 @@ class Auditor:
             return True  # what another root vouches for may be sound in itself: it is read on, for how long it lasted
         if self._contradicted is None and (flaw := self._witnessed(record)):
             self._contradicted = flaw.at(record.seq, verifier.offset - len(line))
+        if self._unattested is None and self._boundary is not None and not isinstance(record, Genesis):
+            self._unattested = self._attested(self._boundary, record, verifier.offset - len(line))
         if self._suspect is None and self._meaning is not None and (flaw := self._meaning.check(record)):
             self._suspect = flaw.at(record.seq, verifier.offset - len(line))
         return True
@@ -91,6 +97,7 @@ class Auditor:
         if isinstance(basis, Flaw):
             return basis
         self._basis = basis
+        self._boundary = BoundaryEvidence(basis.root, genesis)
         if self._derive:
             self._meaning = Meaning(basis, genesis.mode, self._frames)
         self._anchors = anchors_of(basis, genesis)
@@ -99,6 +106,15 @@ class Auditor:
             if flaw is not None and self._contradicted is None:
                 self._contradicted = flaw.at(0, 0)
         return None
+
+    def _attested(self, boundary: BoundaryEvidence, record: AnyRecord, offset: int) -> Finding | None:
+        before = boundary.last
+        found = boundary.check(record, offset)
+        said = boundary.last
+        if found is None and said is not before and said is not None and self._frames is not None:
+            assert isinstance(record, Effect)
+            self._frames.stated(said.frames, said.left, record, final=said.final)
+        return found
 
     def _witnessed(self, record: AnyRecord) -> Flaw | None:
         assert self._anchors is not None
@@ -128,12 +144,17 @@ class Auditor:
         anchored = self._anchors.finish(report.records)
         if isinstance(anchored, Flaw):
             return failing(report, anchored.at(report.records, self._verifier.offset))
+        if self._unattested is not None:
+            return failing(report, self._unattested)
         if self._suspect is not None:
             return failing(report, self._suspect)
         return self._claimed(with_anchors(report, anchored))
 
     def _claimed(self, report: Report) -> Report:
         assert self._basis is not None
+        assert self._boundary is not None
+        seen, unseen = self._boundary.claims()
+        report = report._replace(proven=(*report.proven, *seen), unproven=(*report.unproven, *unseen))
         if self._meaning is None:
             unproven = (*report.unproven, Claim("decisions", _NOT_DERIVED))
             return trusted(report._replace(unproven=unproven), self._basis)

@@ -7,6 +7,9 @@ not harmless (`sent`) must be part (`obeyed`) of a command whose `dispatched` re
 One that sets a parameter must be listed by a record before it, with its value, and the vehicle stand on the ground.
 Frames of others, which came over the same link, are theirs to answer for.
 
+Where the boundary signs its own evidence, the commands among them are just those that passed its gate, in this order
+(`wire.boundary_chain`): each statement says how many there were, and their digest.
+
 Frames carry UTC, records UTC too, both of one clock that never goes back: their order is exact, but for frames and
 records of the same microsecond, whose order among themselves nobody can tell and which count for either.
 
@@ -29,6 +32,7 @@ from rtshcua.mavlink import enums
 from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
 from rtshcua.mavlink.modes import KNOWN
 from rtshcua.mavlink.parameters import bits_of
+from rtshcua.wire.boundary_chain import START, after_frame
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
 
 #: who we are
@@ -63,6 +67,68 @@ class _Running(NamedTuple):
     record: int
 
 
+class _Stated(NamedTuple):
+    """How many frames had passed the gate, their digest, and the record that says so."""
+
+    passed: int
+    digest: bytes
+    record: int
+
+
+#: the slug of frames that are not those that passed the boundary's gate
+OTHERS: Final = "boundary/frames"
+
+
+class _Passed:
+    """The commands among the frames, held against what the boundary stated. What is kept is bounded by an epoch."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._digests = {0: START}  # by how many there were, since the last statement
+        self._awaited: list[_Stated] = []  # of which not all frames came by
+        self._last: _Stated | None = None
+        self._final = False
+
+    def frame(self, octets: bytes) -> Finding | None:
+        """One command more."""
+        digest = after_frame(self._digests[self._count], octets)
+        self._count += 1
+        if self._last is not None:
+            self._digests[self._count] = digest
+            return self._compared()
+        self._digests = {self._count: digest}
+        return None
+
+    def stated(self, stated: _Stated, *, final: bool) -> Finding | None:
+        """What the boundary signed next."""
+        self._last, self._final = stated, final
+        self._awaited.append(stated)
+        return self._compared()
+
+    def over(self) -> Finding | None:
+        """There are no more frames."""
+        if self._awaited:
+            text = (
+                f"{self._awaited[0].passed - self._count} frames that passed the boundary's gate by then are not there"
+            )
+            return Flaw(OTHERS, text).at(self._awaited[0].record)
+        if self._last is not None and self._final and self._count > self._last.passed:
+            text = f"{self._count - self._last.passed} commands were sent that did not pass the boundary's gate"
+            return Flaw(OTHERS, text).at(self._last.record)
+        return None
+
+    def _compared(self) -> Finding | None:
+        while self._awaited and self._awaited[0].passed <= self._count:
+            stated = self._awaited.pop(0)
+            digest = self._digests.get(stated.passed)
+            if digest != stated.digest:
+                text = "the commands among the frames are not those that passed the boundary's gate up to then"
+                found = "" if digest is None else digest.hex()
+                return Flaw(OTHERS, text, found, stated.digest.hex()).at(stated.record)
+            self._digests = {count: each for count, each in self._digests.items() if count >= stated.passed}
+        return None
+
+
 class Frames:
     """Follows a log and the frames that lie beside it, in step. `entries` are (UTC us, frame) as they were kept.
 
@@ -88,6 +154,7 @@ class Frames:
         self._record = 0
         self._suspect: _Suspect | None = None
         self._finding: Finding | None = None
+        self._passed = _Passed()
 
     def begin(self, basis: Basis) -> None:
         """The log was found to rest on this."""
@@ -108,12 +175,19 @@ class Frames:
             self._running, self._ended = None, (running, record.utc_us)
         self._record = record.seq
 
+    def stated(self, count: int, digest: bytes, record: Effect, *, final: bool) -> None:
+        """Takes note of what the boundary signed: so many commands passed its gate, of this digest."""
+        if self._finding is None:
+            self._finding = self._passed.stated(_Stated(count, digest, record.seq), final=final)
+
     def over(self) -> Finding | None:
         """The first frame that should not be, once the log is over."""
         if self._finding is None:
             self._until(None)
             if self._suspect is not None:
                 self._finding = _unrecorded(self._suspect)
+        if self._finding is None:
+            self._finding = self._passed.over()
         return self._finding
 
     def _dispatched(self, record: Effect) -> None:
@@ -175,6 +249,7 @@ class Frames:
             self._set(frame, entry)
             return
         self.count += 1
+        self._finding = self._finding or self._passed.frame(entry.octets)
         if self._suspect is not None or self._finding is not None:
             return
         running, ended = self._running, self._ended

@@ -14,6 +14,8 @@ from rtshcua.ground.auditor.cover import DISPATCHED
 from rtshcua.mavlink.parameters import bits_of
 
 PREPARATION: Final = "preparation"
+#: what the boundary permitted of it
+PERMITTED: Final = "permitted"
 _DONE: Final = frozenset({"prepared", "not-prepared", DISPATCHED})
 #: what is set of an autopilot: to one of these values,
 _VALUES: Final = {
@@ -48,6 +50,7 @@ class ListedParameters:
         self.count = 0
         self._before: dict[str, float] = {}
         self._running: int | None = None
+        self._asked = ""  # what the last preparation listed
 
     def check(self, record: Effect) -> Flaw | None:
         """What is wrong with an effect, or None."""
@@ -57,8 +60,12 @@ class ListedParameters:
             self._running = record.token
         elif record.token == self._running:
             self._running = None
+        if record.event == PERMITTED and record.detail != self._asked:
+            text = "the boundary permitted other parameters than the record before it lists"
+            return Flaw("preparation/other-permit", text, record.detail, self._asked)
         if record.event != PREPARATION:
             return None
+        self._asked = record.detail
         if self._running is not None:
             text = "parameters were to be set while a command was under way"
             return Flaw("preparation/in-flight", text, record.detail)

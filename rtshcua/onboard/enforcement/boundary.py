@@ -1,10 +1,14 @@
 """The enforcement boundary in this process: `enforce` decides one request and issues what the decision grants.
 
 It holds what a runtime must not be trusted with: the verified bundle, the session (`decision.session`), and the key of
-the permits. Bytes go in and bytes come out, so that an isolated process or a trusted world can take its place.
+the permits. Bytes go in and bytes come out, so that an isolated process or a trusted world can take its place. Whatever
+it answers it chains first (`wire.boundary_chain`); an answer about a step that equals the one before is counted there.
 """
 
+from hashlib import sha256
 from typing import Final
+
+from msgspec.structs import replace
 
 from rtshcua.decision.links import DEGRADE
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
@@ -15,9 +19,10 @@ from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import Context, Now
-from rtshcua.model.outcome import Outcome
+from rtshcua.model.outcome import REASON_NUMBERS, Outcome
 from rtshcua.onboard.enforcement.executor import Commands
-from rtshcua.wire import response
+from rtshcua.wire import boundary_chain, response
+from rtshcua.wire.boundary_chain import BoundaryChain, Tag
 from rtshcua.wire.permit import AGAIN, LINK_VALID_US, Permit, seal
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
@@ -28,6 +33,7 @@ from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, encode, 
 CLOCKS_PART_US: Final = 3_000_000
 _Numbers = dict[Clause | Rule | Airspace, int]
 _ALLOW: Final = Outcome.ALLOW  # an enumeration's attributes are slow to find
+_REASONS: Final = {reason.value: number for reason, number in REASON_NUMBERS.items()}  # by slug: its own hash is slow
 
 
 class PermitIssuer:
@@ -57,8 +63,9 @@ class SoftwareBoundary:
     """
 
     def __init__(
-        self, policy: PreparedPolicy, in_force: InForce, commands: Commands, vehicle: str, key: bytes, *, enforced: bool
-    ) -> None:
+        self, policy: PreparedPolicy, in_force: InForce, commands: Commands, vehicle: str, key: bytes,
+        chain: BoundaryChain, *, enforced: bool,
+    ) -> None:  # fmt: skip
         self._policy = policy
         self._in_force = in_force
         self._session = Session(policy, in_force, enforced=enforced)
@@ -66,6 +73,8 @@ class SoftwareBoundary:
         self._vehicle = vehicle
         self._version = policy.policy.version  # latched: a newer policy comes with another bundle, after landing
         self._issuer = PermitIssuer(key)
+        self._chain = chain
+        self._last: tuple[object, ...] = ()  # the last answer about a step, as far as one that equals it is counted
         self._enforced = enforced
         self._slots = policy.policy.slots
         self._monitors = len(policy.monitors)
@@ -75,23 +84,42 @@ class SoftwareBoundary:
         self._ahead_us: int | None = None  # UTC less monotonic time, as it was first told
 
     def enforce(self, request: bytes) -> bytes:
-        """Decide one request. Hostile bytes get a refusal; nothing is raised and nothing is remembered of them."""
+        """Decide one request. Hostile bytes get a refusal; nothing is raised, and of them nothing but their digest is
+        remembered.
+        """
         asked = decode(request, self._slots, self._monitors)
         if isinstance(asked, Refusal):
-            return encode_refusal(Status.MALFORMED)
+            return self._refuse(Status.MALFORMED, request)
         now_us = asked.now.monotonic_us
         # a release to come would move the deadline
         if not self._now_us <= now_us >= asked.released_us or not self._keeps_time(asked.now):
-            return encode_refusal(Status.MALFORMED)
+            return self._refuse(Status.MALFORMED, request)
         self._now_us = now_us
         ref = asked.ref
         refused = self._session.refusal(ref)
         if refused is not None:
-            return encode_refusal(refused)
+            return self._refuse(refused, request)
         # nor was anything released before it was here
         if asked.kind == STEP and asked.released_us < self._in_force.received_us(asked.step):
-            return encode_refusal(Status.MALFORMED)
-        return encode(self._step(asked) if asked.kind == STEP else self._link(asked, ref))
+            return self._refuse(Status.MALFORMED, request)
+        answer = self._step(asked) if asked.kind == STEP else self._link(asked, ref)
+        return encode(answer, self._chained(request, asked, answer))
+
+    def _refuse(self, status: Status, request: bytes) -> bytes:
+        payload = boundary_chain.undecided(status, sha256(request).digest())
+        return encode_refusal(status, self._chain.add(Tag.UNDECIDED, payload))
+
+    def _chained(self, request: bytes, asked: Request, answer: Answer) -> bytes:
+        """The digest of the boundary's own evidence, with this answer in it."""
+        reason = _REASONS[answer.reason._value_]
+        payload = boundary_chain.decided(
+            request, answer.outcome, reason, answer.rule_step, answer.target, answer.valid_until_us, answer.consumed
+        )
+        if asked.kind == STEP:
+            last, self._last = self._last, (asked.step, answer.outcome, reason, answer.clause, answer.target)
+            if last == self._last and not answer.permit:
+                return self._chain.repeat(payload)
+        return self._chain.add(Tag.DECIDED, payload)
 
     def consider(self, document: bytes, now: Now) -> None:
         """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick."""
@@ -103,17 +131,26 @@ class SoftwareBoundary:
         `released` steps were released, as far as the runtime knows; more were if they were asked for here. An answer
         about a step whose id is used up comes too late.
         """
+        receipt = self._taken(document, now, released)
+        if receipt.accepted:
+            payload = boundary_chain.document(receipt.kind, receipt.step, now, sha256(document).digest())
+            evidence = self._chain.add(Tag.DOCUMENT, payload)
+        else:
+            evidence = self._chain.decline(document)
+        return encode_receipt(replace(receipt, evidence=evidence))
+
+    def _taken(self, document: bytes, now: Now, released: int) -> Receipt:
         if now.monotonic_us < self._now_us:
-            return encode_receipt(Receipt(UNKNOWN, "time-went-back", "it came before the last request"))
+            return Receipt(UNKNOWN, "time-went-back", "it came before the last request")
         if not self._keeps_time(now):
-            return encode_receipt(Receipt(UNKNOWN, "time-of-day-set", "its time of day is not that of requests before"))
+            return Receipt(UNKNOWN, "time-of-day-set", "its time of day is not that of requests before")
         self._now_us = now.monotonic_us
         receipt = self._session.take(document, now, released)
         self._commands.called_off = self._in_force.called_off
         if receipt.kind == REPLACEMENT and receipt.accepted:
             self._commands.replace(self._in_force.bundle.mission)
             self._own = self._own_numbers()
-        return encode_receipt(receipt)
+        return receipt
 
     def _keeps_time(self, now: Now) -> bool:
         """Whether UTC went on as monotonic time did. What has expired would be good again for whoever sets it back, and

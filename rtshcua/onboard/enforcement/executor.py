@@ -5,7 +5,7 @@ checks, in this order: the MAC; that the permit was not used; that it is not lat
 still the one that flies; that a step waits for its turn, and never follows a recall, or a return or a landing that a
 fallback began;
 and that chains go forward only. A standing permit is good for each of its links once, and for the contingency's last
-`AGAIN` times more.
+`AGAIN` times more. What it sends, and what it refuses, it chains (`wire.boundary_chain`).
 """
 
 from collections.abc import Sequence
@@ -18,6 +18,8 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Dispatch
+from rtshcua.wire import boundary_chain
+from rtshcua.wire.boundary_chain import BoundaryChain, Tag
 from rtshcua.wire.permit import AGAIN, Permit, open_permit
 from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
@@ -108,10 +110,12 @@ class Executor:
     `frames` is the gate that the vehicle's adapter sends through: the frames of what was dispatched last may pass it.
     """
 
-    def __init__(self, key: bytes, commands: Commands) -> None:
+    def __init__(self, key: bytes, commands: Commands, chain: BoundaryChain | None = None) -> None:
         self._key = key
         self._commands = commands
-        self.frames = FrameSession()
+        self._chain = chain or BoundaryChain()
+        self._frames = FrameSession()
+        self._frames.chain = self._chain
         self._used: set[int] = set()
         self._prepared: set[int] = set()  # the serials of preparations that were begun
         self._step = -1  # the last step that was sent,
@@ -124,15 +128,32 @@ class Executor:
         self._homeward = False  # a link began a return or a landing,
         self._final = False  # and it was one of the contingency
 
+    @property
+    def frames(self) -> FrameSession:
+        """The gate."""
+        return self._frames
+
+    @frames.setter
+    def frames(self, frames: FrameSession) -> None:
+        """Another gate in its place: what it lets out is chained here."""
+        frames.chain = self._chain
+        self._frames = frames
+
     def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
         """What to send for a permit at a monotonic time, or why nothing is sent."""
         permit = open_permit(sealed, self._key)
-        if permit is None:
-            return FORGED
-        return self._dispatch(permit, now_us)
+        return self._chained(FORGED if permit is None else self._dispatch(permit, now_us), now_us)
 
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
         """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
+        return self._chained(self._stand_in(sealed, kind, link, now_us), now_us)
+
+    def _chained(self, found: Dispatch | Refusal, now_us: int) -> Dispatch | Refusal:
+        if isinstance(found, Refusal):
+            self._chain.add(Tag.REFUSED, boundary_chain.refused(found.slug, now_us))
+        return found
+
+    def _stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
         permit = open_permit(sealed, self._key)
         if permit is None:
             return FORGED
@@ -153,17 +174,22 @@ class Executor:
         the ground, until `prepared`, a dispatch, or its time is over.
         """
         permit = open_preparation(sealed, self._key)
-        if permit is None:
-            return FORGED
+        refused = FORGED if permit is None else self._unprepared(permit, now_us)
+        if permit is None or refused is not None:
+            assert refused is not None
+            self._chain.add(Tag.UNPREPARED, boundary_chain.unprepared(refused.slug))
+            return refused
+        self._chain.add(Tag.PREPARED, boundary_chain.prepared(permit.writes, restoring=permit.restoring))
+        self._prepared.add(permit.serial)
+        self.frames.prepare(permit.writes, permit.not_after_us)
+        return permit
+
+    def _unprepared(self, permit: Preparation, now_us: int) -> Refusal | None:
         if permit.serial in self._prepared:
             return USED
         if now_us > permit.not_after_us:
             return LATE
-        if not self.frames.stands(now_us):
-            return NOT_DOWN
-        self._prepared.add(permit.serial)
-        self.frames.prepare(permit.writes, permit.not_after_us)
-        return permit
+        return None if self.frames.stands(now_us) else NOT_DOWN
 
     def prepared(self) -> None:
         """What was to be set is set, or was given up."""
@@ -185,6 +211,8 @@ class Executor:
         else:
             self._follow(permit, command.kind in _HOMEWARD)
         self._last = permit.serial
+        payload = boundary_chain.sent(permit.kind, permit.step, permit.link, permit.serial, now_us)
+        self._chain.add(Tag.SENT, payload)
         self.frames.open(command, permit.not_after_us)
         return Dispatch(command, permit.not_after_us, needs_record=permit.kind == STEP)
 

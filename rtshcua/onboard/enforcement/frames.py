@@ -4,7 +4,9 @@ Every frame that an adapter wants to send goes through `seal`, and only what `se
 that the executor dispatches opens a session for its one command; until that command ends, frames that carry it out
 pass, no others. A preparation opens it for the parameters that it lists, each with its value, on the ground alone.
 Housekeeping passes always. Whatever is on neither list (`allow_list`) is refused. With a signer each
-frame that passes is signed; the key is the signer's, and nothing else can use it.
+frame that passes is signed; the key is the signer's, and nothing else can use it. Frames that carry out a command are
+chained as they pass, without their signature (`wire.boundary_chain`), and what is refused is counted there. The others
+are not: they move nothing, heartbeats and questions are most of what is sent, and parameters have a permit each.
 
 A rule needs to know which autopilot it speaks to and how high its home lies. Both are read here from frames that came
 in (`observe`), never asked of the adapter that wants to send. With a key, those frames were verified first.
@@ -23,6 +25,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement import allow_list
 from rtshcua.onboard.enforcement.allow_list import Frame, read_frame
 from rtshcua.onboard.ports import Command
+from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.preparation import ParameterWrite
 
 #: who we are, in the vehicle's own system, and whom we speak to
@@ -97,6 +100,8 @@ class FrameSession:
     """The gate that frames leave by. Opened and closed by the executor alone."""
 
     def __init__(self) -> None:
+        #: where what leaves is chained
+        self.chain = BoundaryChain()
         self._signer: Signer | None = None
         self._session: _Session | None = None
         self._here: tuple[int, int] | None = None  # 1e-7 degree
@@ -170,18 +175,23 @@ class FrameSession:
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
         """The octets to send for a frame at a monotonic time, or why it is not sent."""
-        refusal = self._refuse(frame, now_us)
-        if refusal is not None:
-            return refusal
-        return frame if self._signer is None else self._signer.sign(frame, now_us)
+        judged = self._judge(frame, now_us)
+        if isinstance(judged, Refusal):
+            self.chain.stop(frame)
+            return judged
+        sealed = frame if self._signer is None else self._signer.sign(frame, now_us)
+        if judged:
+            self.chain.leave(frame)
+        return sealed
 
-    def _refuse(self, octets: bytes, now_us: int) -> Refusal | None:
+    def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
+        """Why a frame does not leave, or else whether it carries out a command."""
         # 1. it is what it will be taken for: one frame, from us, to the autopilot that was heard, and to nobody else
         frame = read_frame(octets)
         if frame is None:
             return NOT_ONE_FRAME
         if not self._system:  # a vehicle may wait to be spoken to; what we are is all that it is told then
-            return None if allow_list.is_greeting(frame) and frame.component == OURS else NO_VEHICLE
+            return False if allow_list.is_greeting(frame) and frame.component == OURS else NO_VEHICLE
         if (frame.system, frame.component) != (self._system, OURS):
             return NOT_OURS
         target = frame.target
@@ -192,16 +202,16 @@ class FrameSession:
             return FORCED_ARMING
         # 3. always, or before the flight
         if allow_list.is_housekeeping(frame):
-            return None
+            return False
         setting = allow_list.written(frame, bytewise=is_bytewise(self._autopilot))
         if setting is not None and setting in self._prepared and now_us <= self._prepared_us:
-            return None if self.stands(now_us) else NOT_DOWN
+            return False if self.stands(now_us) else NOT_DOWN
         if allow_list.is_of_fence(frame, self._types):
-            return AFTER_START if self._started or self._armed else None
+            return AFTER_START if self._started or self._armed else False
         if setting is not None:
             return NOT_LISTED
         # 4. what is permitted now
-        return self._refuse_motion(frame, now_us)
+        return self._refuse_motion(frame, now_us) or True
 
     def _refuse_motion(self, frame: Frame, now_us: int) -> Refusal | None:
         session = self._session

@@ -16,10 +16,12 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.attestation import Attestation
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.executor import Commands, Executor
 from rtshcua.onboard.enforcement.preparation import PreparationIssuer
 from rtshcua.onboard.ports import Boundary
+from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.bundle import Bundle, open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.trust import TrustRoot
@@ -37,7 +39,9 @@ class Mode(StrEnum):
 
 
 class Loaded(msgspec.Struct, frozen=True):
-    """A bundle in force: the boundary and the executor that share the session key, and the verified parts."""
+    """A bundle in force: the boundary and the executor, which share the session key and the chain that `attestation`
+    signs, and the verified parts.
+    """
 
     boundary: Boundary
     executor: Executor
@@ -46,6 +50,7 @@ class Loaded(msgspec.Struct, frozen=True):
     vehicle: str
     mode: Mode
     preparation: PreparationIssuer
+    attestation: Attestation
 
     @property
     def bundle(self) -> Bundle:
@@ -106,16 +111,21 @@ def load(
         return Refusal("malformed", f"the {what}")
     issuer = PreparationIssuer(session_key, settings)
     in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
-    return session(in_force, policy, vehicle, mode, session_key, issuer)
+    return session(in_force, policy, vehicle, mode, session_key, issuer, bundle=bundle)
 
 
 def session(
     in_force: InForce, policy: PreparedPolicy, vehicle: str, mode: Mode, session_key: bytes,
-    issuer: PreparationIssuer | None = None,
+    issuer: PreparationIssuer | None = None, *, bundle: bytes = b"",
 ) -> Loaded:  # fmt: skip
-    """A session of a verified and prepared bundle, nothing of it decided yet. Without an `issuer` nothing is set."""
+    """A session of a verified and prepared bundle, nothing of it decided yet. Without an `issuer` nothing is set, and
+    without the octets of the bundle nothing that it signs fits a log.
+    """
     commands = Commands(policy.policy, in_force.bundle.mission)
     enforced = mode is not Mode.NONE
-    boundary = SoftwareBoundary(policy, in_force, commands, vehicle, session_key, enforced=enforced)
+    chain = BoundaryChain()
+    boundary = SoftwareBoundary(policy, in_force, commands, vehicle, session_key, chain, enforced=enforced)
     issuer = issuer or PreparationIssuer(session_key, {})
-    return Loaded(boundary, Executor(session_key, commands), in_force, policy, vehicle, mode, issuer)
+    attestation = Attestation(chain, in_force.flight, bundle, enforced=enforced)
+    executor = Executor(session_key, commands, chain)
+    return Loaded(boundary, executor, in_force, policy, vehicle, mode, issuer, attestation)

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterable
 from functools import partial
+from hashlib import sha256
 
 from rtshcua.decision.durability import confirmed, durability_of
 from rtshcua.model.decision import Decision, Decisive
@@ -104,12 +105,11 @@ class Admission:
         phase, remaining_us = self._queue.phase, self._remaining.us
         invocation = None if kind == CONTINGENCY_LINK else self._in_force.invocations[step].invocation
         binding = self._in_force.bundle.policy_digest if invocation is None else invocation.binding
-        data = self._loaded.boundary.enforce(
-            encode(Request(kind, step, link, binding, now, state, released_us, phase, remaining_us))
-        )
-        answer = decode(data)
+        asked_for = encode(Request(kind, step, link, binding, now, state, released_us, phase, remaining_us))
+        answer = decode(self._loaded.boundary.enforce(asked_for))
         if not isinstance(answer, Answer):
-            text = answer.name.lower() if isinstance(answer, Status) else answer.text
+            digest = sha256(asked_for).hexdigest()
+            text = f"{answer.name.lower()} {digest}" if isinstance(answer, Status) else answer.text
             self._journal.effect(now, "undecided", ref, detail=text)
             return None
         asked = invocation if kind == STEP else None

@@ -61,7 +61,7 @@ class Journal:
     def record(self, line: Callable[[], bytes], now: Now, durability: int, *, awaited: bool) -> Iterable[Action]:
         """One record, in the telling of something; `line` asks the recorder for it."""
         if self.recorder.overdue(now):
-            yield self._seal(now)
+            yield from self._seal(now)
         yield Append(line(), durability, awaited)
 
     def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: Detail = "") -> None:
@@ -102,9 +102,12 @@ class Journal:
             else:
                 actions.append(entry)
         if not ended and self.recorder.due(now) and not any(isinstance(action, Dispatch) for action in actions):
-            actions.append(self._seal(now))
+            actions += self._seal(now)
         return actions
 
-    def _seal(self, now: Now) -> Append:
+    def _seal(self, now: Now) -> Iterable[Append]:
         """End an epoch. Nothing waits for a seal, but it is on the disk soon: its checkpoint may be shown around."""
-        return Append(self.recorder.seal(now), SYNCED_FIRST, awaited=False)
+        *statements, seal = self.recorder.sealing(now)
+        for line in statements:
+            yield Append(line, WRITTEN, awaited=False)
+        yield Append(seal, SYNCED_FIRST, awaited=False)

@@ -78,8 +78,23 @@ def test_listing_says_what_each_key_is_trusted_for(capsys: pytest.CaptureFixture
         ("approval", ["operator"], ["operator"], []),
         ("log", [], [], []),
         ("witness", [], [], []),
+        ("boundary", [], [], []),
     ]
     assert all(Path(key["file"]).is_file() for key in listed["keys"])
+
+
+def test_a_boundary_key_is_made_for_a_root_without_one(capsys: pytest.CaptureFixture[str]) -> None:
+    app.main(["keys", "init"])
+    store = KeyStore(data_folder())
+    made = store.signing_key(Duty.BOUNDARY)
+    assert app.main(["keys", "revoke", made.kid.hex()]) == ExitCode.OK
+    assert app.main(["keys", "boundary", "--vehicle", "quad-07"]) == ExitCode.OK
+    (named,) = open_root(store.root(), pinned=store.pin(), now_us=0).keys_for(Duty.BOUNDARY).values()
+    assert named.public == store.signing_key(Duty.BOUNDARY).public != made.public
+    assert named.vehicles == ("quad-07",)
+    capsys.readouterr()
+    app.main(["keys", "list"])
+    assert "signs what was decided, on vehicle quad-07" in capsys.readouterr().out
 
 
 def test_show_gives_the_pin(capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,6 +23,7 @@ def test_codes_and_slugs_never_change() -> None:
         12: "anchor",
         13: "tests",
         14: "crashed",
+        15: "boundary",
         70: "fault",
         74: "io",
         130: "interrupted",

@@ -157,3 +157,16 @@ def test_a_log_can_name_the_one_before(recorder: Recorder, now: Callable[[int], 
     )
     assert json.loads(line)["before"] == "a" * 64
     assert json.loads(recorder.close(now(1), ending="refused", tlog=None))["tlog"] is None
+
+
+def test_what_the_boundary_signs_stands_before_each_seal_and_the_close(
+    recorder: Recorder, begin: Callable[[], bytes], now: Callable[[int], Now]
+) -> None:
+    begin()
+    (seal,) = recorder.sealing(now(1))
+    assert (json.loads(seal)["type"], recorder.attested(now(1))) == ("seal", ())
+    recorder.attest = lambda *, final=False: b"last" if final else b"so far"
+    statement, seal = map(json.loads, recorder.sealing(now(2)))
+    assert (statement["event"], statement["detail"], seal["type"]) == ("boundary", "c28gZmFy", "seal")
+    statement, close = map(json.loads, recorder.closing(now(3), ending="completed", tlog=None))
+    assert (statement["event"], statement["detail"], close["type"]) == ("boundary", "bGFzdA==", "close")

@@ -9,12 +9,19 @@ import pytest
 from reference import independent_verifier
 from reference.log_vectors import FOLDER, made
 from reference.verifiers import agree
+from rtshcua.evidence.attested import BoundaryEvidence
+from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import Tree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, parse, split
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import Genesis
 from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.rooted import rooted
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
 from rtshcua.ground.auditor.audit import audit
+from rtshcua.wire.boundary_chain import START
+from rtshcua.wire.trust import TrustRoot
 from virtual.rows import rows
 
 FILES = made()
@@ -95,7 +102,22 @@ def test_leaves_roots_and_checkpoints(name: str) -> None:
 def test_what_no_verifier_accepts(name: str) -> None:
     lines = lines_of(f"rejected/{name}")
     assert audit(lines, ROOT_KEY).report.failure is not None
-    assert independent_verifier.verify(b"".join(lines), ROOT_KEY).kind in ("broken", "untrusted")
+    assert independent_verifier.verify(b"".join(lines), ROOT_KEY).kind in ("broken", "untrusted", "boundary")
+
+
+def test_the_boundary_s_digests() -> None:
+    first, *rest = map(read, lines_of("attested"))
+    assert isinstance(first, Genesis)
+    root = rooted(first, ROOT_KEY)
+    assert isinstance(root, TrustRoot)
+    evidence = BoundaryEvidence(root, first)
+    digests = [START.hex()]
+    for record in rest:
+        assert not isinstance(record, Flaw)
+        assert evidence.check(record, 0) is None
+        if evidence.digest.hex() != digests[-1]:
+            digests.append(evidence.digest.hex())
+    assert digests == EXPECTED["attested"]["boundary"]
 
 
 def test_the_anchored_part() -> None:

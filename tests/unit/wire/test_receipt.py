@@ -11,7 +11,7 @@ from virtual.rows import rows
 INTEGERS = st.integers(-(1 << 63), (1 << 63) - 1)
 
 
-@given(st.builds(Receipt, INTEGERS, st.text(), st.text(), INTEGERS, INTEGERS, INTEGERS, INTEGERS))
+@given(st.builds(Receipt, INTEGERS, st.text(), st.text(), INTEGERS, INTEGERS, INTEGERS, INTEGERS, st.binary()))
 def test_what_is_encoded_is_decoded(receipt: Receipt) -> None:
     assert decode(encode(receipt)) == receipt
 
@@ -21,7 +21,19 @@ def test_no_other_bytes_are_one(data: bytes) -> None:
     assert isinstance(decode(data), Refusal)
 
 
-@rows("body", [1, (), (1,), (1, "a"), (1, 2, "b"), (1, "a", "b", 1, 1, 1, 1, 1), (1, "a", "b")])
+@rows(
+    "body",
+    [
+        1,
+        (),
+        (1,),
+        (1, "a"),
+        (1, 2, "b"),
+        (1, "a", "b", 1, 1, 1, 1, b"", 1),
+        (1, "a", "b"),
+        (1, "a", "b", 1, 1, 1, 1, ""),
+    ],
+)
 def test_other_bodies_are_none(body: object) -> None:
     assert isinstance(decode(artefact.wrap(names.RECEIPT, body)), Refusal)
 

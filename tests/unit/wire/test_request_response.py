@@ -11,12 +11,15 @@ from rtshcua.wire.permit import SIZE, Permit
 from rtshcua.wire.response import Answer, Status
 from virtual.rows import rows
 
-ANSWER = Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, 4, 1, 9_000, 0, b"p" * SIZE)
+ANSWER = Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, 4, 1, 9_000, 0, b"p" * SIZE, b"d" * 32)
 
 
 @pytest.mark.parametrize("answer", [ANSWER, replace(ANSWER, permit=b"")])
 def test_an_answer_with_and_without_a_permit_is_read_back(answer: Answer) -> None:
     assert response.decode(response.encode(answer)) == answer
+    other = response.encode(answer, b"e" * 32)
+    assert response.decode(other) == replace(answer, evidence=b"e" * 32)
+    assert other == response.encode(answer)[:-32] + b"e" * 32  # it stands last
 
 
 def test_clauses_are_numbered_from_the_rules_over_the_airspace_to_the_contract() -> None:
@@ -41,6 +44,7 @@ def test_what_is_encoded_is_read_back(outcome: Outcome, reason: Reason, number: 
 @pytest.mark.parametrize("status", [status for status in Status if status])
 def test_a_refusal_is_its_status(status: Status) -> None:
     assert response.decode(response.encode_refusal(status)) is status
+    assert response.decode(response.encode_refusal(status, b"e" * 32)) is status
 
 
 PLAIN = response.encode(Answer(Outcome.ALLOW, Reason.ADMITTED, 8, -1, -2, 0, 0))
@@ -48,21 +52,21 @@ REFUSAL = response.encode_refusal(Status.NOT_CURRENT)
 
 
 def changed(data: bytes, at: int, octet: int) -> bytes:
-    """`data` with another octet at an offset of its body of 21 octets."""
-    start = len(data) - 21 + at
+    """`data` with another octet at an offset of its body of 21 octets, before the digest."""
+    start = len(data) - 53 + at
     return data[:start] + bytes([octet]) + data[start + 1 :]
 
 
 @rows(
     ("data", "text"),
     [
-        (b"", "not a response of version 1"),
-        (PLAIN + b"\0", "not a response of version 1"),
-        (PLAIN[:-1], "not a response of version 1"),
-        (PLAIN + b"p" * SIZE, "not a response of version 1"),
-        (response.encode(ANSWER)[:-1], "not a response of version 1"),
-        (cbor.encode(("rtshcua/response", 2, bytes(21))), "not a response of version 1"),
-        (artefact.wrap(names.RESPONSE, 1), "not a response of version 1"),
+        (b"", "not a response of version 2"),
+        (PLAIN + b"\0", "not a response of version 2"),
+        (PLAIN[:-1], "not a response of version 2"),
+        (PLAIN + b"p" * SIZE, "not a response of version 2"),
+        (response.encode(ANSWER)[:-1], "not a response of version 2"),
+        (cbor.encode(("rtshcua/response", 1, bytes(53))), "not a response of version 2"),
+        (artefact.wrap(names.RESPONSE, 1), "not a response of version 2"),
         (changed(PLAIN, 1, len(Outcome)), "an outcome or a reason that there is not"),
         (changed(PLAIN, 2, len(Reason)), "an outcome or a reason that there is not"),
         (changed(REFUSAL, 0, len(Status)), "a refusal with more than its status"),

@@ -23,7 +23,9 @@ def denied_in_the_air() -> tuple[bytes, ...]:
     cells = (inspect.arguments[0], 35 * M, *inspect.arguments[2:])
     changed = replace(inspect, arguments=cells, plan=replace(inspect.plan, altitude=35 * M))
     steps = (*mission.invocations[:2], changed, *mission.invocations[3:])
-    return tuple(Flight(case.seal(replace(mission, invocations=steps)), case.simulated("px4")).fly().lines)
+    return tuple(
+        Flight(case.seal(replace(mission, invocations=steps)), case.simulated("px4"), attested=False).fly().lines
+    )
 
 
 def decisions(lines: tuple[bytes, ...], kind: int) -> list[int]:
@@ -133,7 +135,8 @@ def test_a_step_that_was_not_used_up_may_be_asked_for_again() -> None:
     """A battery that is unknown defers the take-off; it is decided again, with its id still fresh."""
     lines = tuple(
         Flight(
-            case.seal(case.mission(case.short_steps())), case.simulated("px4", faults=(BatteryLevel(0, 3_000),))
+            case.seal(case.mission(case.short_steps())), case.simulated("px4", faults=(BatteryLevel(0, 3_000),)),
+            attested=False,
         ).fly().lines
     )  # fmt: skip
     first = decisions(lines, 0)[0]

@@ -1,0 +1,84 @@
+"""The boundary's key and its sessions, for a flight: what it signs its own evidence with."""
+
+from contextlib import suppress
+from pathlib import Path
+
+from rtshcua.adapters.files.boundary import BoundaryStore, DamagedState
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.faults import code_of, untrusted
+from rtshcua.cli.refused import Refused
+from rtshcua.cli.unlock import unlock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.onboard.ports import BoundaryKey
+from rtshcua.wire.boundary_chain import START
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import TrustRoot, key_refusal
+from rtshcua.wire.untrusted import Untrusted
+
+_HELP = "`--boundary-key` gives one that it names; `rtshcua keys boundary` makes it"
+#: what is said of a flight that nothing inside signs
+UNNAMED = "the trust root names no boundary key for it: what is decided is not signed inside (`rtshcua keys boundary`)"
+
+
+def boundary_key(
+    root: TrustRoot, vehicle: str, now_us: int, store: KeyStore, path: Path | None, passphrase_file: Path | None
+) -> SigningKey | None:
+    """The key that the boundary signs with; None where the root asks for none. Raises `Refused`."""
+    named = root.keys_for(Duty.BOUNDARY)
+    good = {kid for kid, key in named.items() if key_refusal(key, vehicle=vehicle, now_us=now_us) is None}
+    if not good:
+        return None
+    try:
+        key = unlock(store, Duty.BOUNDARY, path=path, passphrase_file=passphrase_file)
+    except Untrusted as error:
+        raise Refused(code_of(error.slug), *untrusted(error)) from None
+    except FileNotFoundError as error:
+        text = f"the trust root asks for what the boundary signs, and its key is not here: `{error.filename}`"
+        raise Refused(ExitCode.INPUT, "no-boundary-key", text, _HELP) from None
+    if key.kid not in good:
+        text = f"the trust root names no boundary key {key.kid.hex()} for `{vehicle}`: nobody could verify the log"
+        raise Refused(ExitCode.UNTRUSTED, "unknown-key", text, _HELP)
+    return key
+
+
+class BoundarySession:
+    """One flight's session of a boundary, with or without a key. `note` is what there is to tell of it."""
+
+    def __init__(self, store: BoundaryStore, key: SigningKey | None, *, aloft: bool) -> None:
+        """Raises `Refused`, and OSError, where nobody knows which session came before; but not for a vehicle that is
+        `aloft`, which comes down whatever the state folder says.
+        """
+        self.note = ""
+        self._store = store
+        self._aloft = aloft
+        self.key = None if key is None else BoundaryKey(key, *self._next())
+
+    def _next(self) -> tuple[int, bytes]:
+        try:
+            kept = self._store.kept()
+        except (DamagedState, OSError) as error:
+            if self._aloft:
+                self.note = f"{error}; it is brought down all the same"
+                return 0, START
+            if isinstance(error, OSError):
+                raise
+            help = "without that file the boundary begins to count anew, and no log shows that it did not before"
+            raise Refused(ExitCode.INPUT, "damaged", str(error), help) from None
+        return kept.session + 1, kept.digest
+
+    def begun(self, digest: bytes) -> None:
+        """The session began. Raises OSError where that cannot be kept; not for a vehicle that is `aloft`."""
+        try:
+            self._keep(digest)
+        except OSError:
+            if not self._aloft:
+                raise
+
+    def ended(self, digest: bytes) -> None:
+        """It ended in order. Where that cannot be kept, the next one takes it for broken off."""
+        with suppress(OSError):
+            self._keep(digest)
+
+    def _keep(self, digest: bytes) -> None:
+        if self.key is not None:
+            self._store.keep(self.key.session, digest)

@@ -1,0 +1,344 @@
+"""The boundary's own evidence, held against the records: each decision, document and dispatch that the log tells of,
+and no other, in this order (docs/log-format.md, section 7).
+
+The digests of `wire.boundary_chain` are worked out again from the records. The boundary's statements, signed by a key
+that the runtime does not need to have, say how far it got, and mark each entry: so the first record that is not the
+boundary's is named, whoever holds the log key. Where the trust root names no boundary key, nothing is looked at.
+"""
+
+import re
+from collections.abc import Callable
+from hashlib import sha256
+from struct import error as struct_error
+from typing import Final, NamedTuple
+
+from rtshcua.evidence.chain import BOUNDARY
+from rtshcua.evidence.finding import Claim, Finding, Flaw
+from rtshcua.evidence.note import octets
+from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
+from rtshcua.evidence.recovery import RECOVERED
+from rtshcua.mavlink.parameters import bits_of
+from rtshcua.model.flat.limits import MAX_MONITORS, MAX_SLOTS
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.outcome import WIRE_REASONS, Outcome
+from rtshcua.wire import boundary_chain, receipt, request, statement
+from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS, Tag
+from rtshcua.wire.digest import DIGEST_BYTES
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.preparation import MOST, ParameterWrite
+from rtshcua.wire.request import Request
+from rtshcua.wire.response import Status
+from rtshcua.wire.statement import Statement, counted
+from rtshcua.wire.trust import TrustRoot, key_refusal
+from rtshcua.wire.untrusted import Untrusted
+
+UNENFORCED: Final = "none"
+_REASONS: Final = {reason.value: number for number, reason in enumerate(WIRE_REASONS)}
+_OUTCOMES: Final = {outcome.name.lower(): int(outcome) for outcome in Outcome}
+_STATUSES: Final = {status.name.lower(): int(status) for status in Status if status}
+_DOCUMENTS: Final = {
+    "approval": receipt.APPROVAL, "recall": receipt.RECALL, "replacement": receipt.REPLACEMENT,
+    "cancellation": receipt.CANCELLATION,
+}  # fmt: skip
+_UNDECIDED: Final = re.compile(r"([a-z_]+) ([0-9a-f]{64})")
+_HEX: Final = re.compile(r"(?:[0-9a-f]{2})*")
+_WRITES: Final = re.compile(r"(set|restore) ([^,]++(?:, [^,]++)*+)")
+_WRITE: Final = re.compile(r"([A-Z0-9_]{1,16}) from (\S+) to (\S+)", re.ASCII)
+_NONE: Final = Claim(
+    "boundary", "what the boundary itself saw: no key of duty `boundary` in the trust root speaks for this vehicle"
+)
+
+_MOVED: Final = "the boundary made no such entry here: this was altered, invented or moved, or one before was left out"
+
+_DIFFERS: Final = Flaw("boundary/differs", _MOVED)
+_INVENTED: Final = Flaw(
+    "boundary/invented", "the boundary signed how far it got, and made no entry after that for this"
+)
+
+#: tag and payload of what the boundary made of something
+Entry = tuple[Tag, bytes]
+
+
+class _Pending(NamedTuple):
+    """An entry that no statement spoke of yet: the record that tells of it, where that begins, and the digest."""
+
+    record: int
+    offset: int
+    digest: bytes
+
+
+class BoundaryEvidence:
+    """Takes the records of one log after its genesis, in their order; what it keeps is bounded by an epoch."""
+
+    def __init__(self, root: TrustRoot, genesis: Genesis) -> None:
+        keys = root.keys_for(Duty.BOUNDARY)
+        refusal = {kid: key_refusal(key, vehicle=genesis.vehicle, now_us=genesis.utc_us) for kid, key in keys.items()}
+        self._keys = {kid: key for kid, key in keys.items() if refusal[kid] is None}
+        #: whether the log must have it
+        self.asked = bool(self._keys)
+        self._flight = bytes.fromhex(genesis.boot)
+        self._enforced = genesis.mode != UNENFORCED
+        self._bundle = sha256(octets(genesis.bundle) or b"").digest()
+        #: the boundary's, as far as the records tell
+        self.digest = boundary_chain.START
+        self._count = 0
+        self._pending: list[_Pending] = []
+        self._ahead: list[bytes] = []  # marks of entries that the last statement speaks of, and no record yet
+        #: the last statement
+        self.last: Statement | None = None
+        self._stated = False  # in this epoch
+        self._recovered = False
+
+    def check(self, record: AnyRecord, offset: int) -> Finding | None:
+        """What the boundary's evidence says against the next record, which begins at an octet of the log, or against
+        one before it; None where nothing does.
+        """
+        if not self.asked:
+            return None
+        if isinstance(record, Effect) and record.event == BOUNDARY:
+            found = self._stated_by(record)
+            return found.at(record.seq, offset) if isinstance(found, Flaw) else found
+        if isinstance(record, Decision | Effect):
+            return self._entered(record, offset)
+        flaw = None
+        if isinstance(record, Seal | Close):
+            flaw = self._sealed(record)
+        self._recovered = self._recovered or isinstance(record, Recover)
+        self._stated = False
+        return None if flaw is None else flaw.at(record.seq, offset)
+
+    # -------------------------------------------------------- what the log tells of
+
+    def _entered(self, record: Decision | Effect, offset: int) -> Finding | None:
+        entry = entry_of(record)
+        if entry is None:
+            return None
+        if isinstance(entry, Flaw):
+            return entry.at(record.seq, offset)
+        last = self.last
+        if last is None:
+            return _unsigned("before this").at(record.seq, offset)
+        if last.final:
+            return _INVENTED.at(record.seq, offset)
+        self.digest = boundary_chain.following(self.digest, *entry)
+        self._count += 1
+        if self._count > last.count:
+            self._pending.append(_Pending(record.seq, offset, self.digest))
+            return None
+        mark = self._ahead.pop(0) if self._ahead else self.digest[:MARK_BYTES]
+        if self.digest[:MARK_BYTES] == mark and (self._count < last.count or self.digest == last.digest):
+            return None
+        return _DIFFERS.at(record.seq, offset)
+
+    # -------------------------------------------------------- what the boundary signed
+
+    def _stated_by(self, record: Effect) -> Finding | Flaw | None:
+        try:
+            said = statement.open_statement(octets(record.detail) or b"", self._keys)
+        except Untrusted as error:
+            return Flaw(f"boundary/{error.slug}", f"what the boundary should have signed is not to be trusted: {error}")
+        return self._out_of_place(said) or self._marked(said)
+
+    def _out_of_place(self, said: Statement) -> Flaw | None:
+        if said.flight != self._flight:
+            text = "the boundary signed this in another flight"
+            return Flaw("boundary/other-flight", text, said.flight.hex(), self._flight.hex())
+        last = self.last
+        if last is None:
+            payload = boundary_chain.begin(
+                said.session, said.before, self._flight, self._bundle, enforced=self._enforced
+            )
+            self.digest, self._count = boundary_chain.following(boundary_chain.START, Tag.BEGIN, payload), 1
+            if said.marks[:MARK_BYTES] == self.digest[:MARK_BYTES]:
+                return None
+            return Flaw("boundary/beginning", "the boundary's session did not begin with this flight, bundle and mode")
+        if (said.session, said.before) != (last.session, last.before):
+            text = "the boundary signed this in another session"
+            return Flaw("boundary/other-session", text, str(said.session), str(last.session))
+        if (
+            last.final
+            or said.count < last.count
+            or any(now < then for now, then in zip(counted(said), counted(last), strict=True))
+        ):
+            text = "it is older than what the boundary signed before, or follows the last that it signs"
+            return Flaw("boundary/replayed", text, str(said.count), f"at least {last.count}")
+        if self._count < last.count:
+            return _omitted(last.count - self._count)
+        return None
+
+    def _marked(self, said: Statement) -> Finding | Flaw | None:
+        """Hold the entries since the last statement against this one."""
+        before = 0 if self.last is None else self.last.count
+        new = said.count - before
+        marks = [said.marks[at : at + MARK_BYTES] for at in range(0, len(said.marks), MARK_BYTES)]
+        if len(marks) != min(new, MOST_MARKS):
+            text = (
+                "it does not mark each entry since the statement before: one between was left out, or this one is older"
+            )
+            return Flaw("boundary/missing", text)
+        if self.last is None:
+            marks, new = marks[1:], new - 1
+        pending, self._pending = self._pending, []
+        self.last, self._stated = said, True
+        for number, entry in enumerate(pending):
+            if number >= new:
+                return _INVENTED.at(entry.record, entry.offset)
+            if number < len(marks) and entry.digest[:MARK_BYTES] != marks[number]:
+                return _DIFFERS.at(entry.record, entry.offset)
+        self._ahead = marks[len(pending) :]
+        if self._count == said.count and self.digest != said.digest:
+            text = "what the records before tell of is not what the boundary made"
+            return Flaw("boundary/differs", text, self.digest.hex(), said.digest.hex())
+        return None
+
+    def _sealed(self, record: Seal | Close) -> Flaw | None:
+        last = self.last
+        if isinstance(record, Close) and self._recovered and record.ending == RECOVERED:
+            return None
+        if last is None or not self._stated or self._pending:
+            return _unsigned("at the end of this epoch")
+        if isinstance(record, Seal):
+            return None
+        if not last.final:
+            return Flaw(
+                "boundary/not-ended", "the boundary did not sign that it ends here: what came after was cut off"
+            )
+        return _omitted(last.count - self._count) if self._count < last.count else None
+
+    # -------------------------------------------------------- what that proves
+
+    def claims(self) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
+        """What was proven of a log in which nothing was found, and what was not."""
+        last = self.last
+        if not self.asked:
+            return (), (_NONE,)
+        if last is None:
+            return (), (Claim("boundary", "what the boundary itself saw: the log breaks off before it signed"),)
+        text = (
+            f"session {last.session} of the boundary signed for {last.count - 1} decisions, documents and dispatches: "
+            f"they are those that stand here, in this order; besides, {last.frames} frames left and {last.stopped} "
+            f"were refused, {last.repeated} answers repeated one and {last.declined} documents were refused"
+        )
+        proven = (Claim("boundary", text),)
+        if last.final:
+            return proven, ()
+        return proven, (Claim("boundary", "what the boundary made after its last signature: it broke off"),)
+
+
+def _unsigned(when: str) -> Flaw:
+    return Flaw("boundary/missing", f"the boundary did not sign its own evidence {when}: its statement was left out")
+
+
+def _omitted(count: int) -> Flaw:
+    entries = "entry" if count == 1 else "entries"
+    text = f"the boundary made {count} {entries} before this that no record tells of: they were left out"
+    return Flaw("boundary/omitted", text)
+
+
+def entry_of(record: Decision | Effect) -> Entry | Flaw | None:
+    """What the boundary made of what a record tells of; None where it had no part in that."""
+    if isinstance(record, Decision):
+        text = "no boundary makes such a decision: a field of it is none that there is"
+        return _decided(record) or Flaw("boundary/record", text)
+    make = _EFFECTS.get(record.event)
+    if make is None:
+        return None
+    text = f"a record `{record.event}` that does not say what the boundary made"
+    return make(record) or Flaw("boundary/record", text, record.detail)
+
+
+def _decided(record: Decision) -> Entry | None:
+    outcome, reason, binding = _OUTCOMES.get(record.outcome), _REASONS.get(record.reason), _hex(record.binding)
+    state, given = record.state, record.context
+    if outcome is None or reason is None or len(binding) != DIGEST_BYTES:
+        return None
+    if len(state.values) > MAX_SLOTS or len(state.monitors) > MAX_MONITORS or len(state.ages) != len(state.values):
+        return None
+    now = Now(record.at_us, record.utc_us, record.utc_error_us)
+    asked = Request(
+        record.kind, record.step, record.link, binding, now, State(state.values, state.ages, state.monitors),
+        given.released_us, given.phase, given.remaining_us,
+    )  # fmt: skip
+    return _packed(
+        Tag.DECIDED,
+        lambda: boundary_chain.decided(
+            request.encode(asked),
+            outcome,
+            reason,
+            record.rule_step,
+            record.target_link,
+            record.valid_until_us,
+            given.consumed,
+        ),
+    )
+
+
+def _hex(text: str) -> bytes:
+    return bytes.fromhex(text) if _HEX.fullmatch(text) else b""
+
+
+def _packed(tag: Tag, payload: Callable[[], bytes]) -> Entry | None:
+    """The entry of a payload; None where a number of it does not fit."""
+    try:
+        return tag, payload()
+    except struct_error:
+        return None
+
+
+def _undecided(record: Effect) -> Entry | None:
+    said = _UNDECIDED.fullmatch(record.detail)
+    status = None if said is None else _STATUSES.get(said[1])
+    if said is None or status is None:
+        return None
+    return Tag.UNDECIDED, boundary_chain.undecided(status, bytes.fromhex(said[2]))
+
+
+def _document(record: Effect) -> Entry | None:
+    data = octets(record.detail)
+    if data is None:
+        return None
+    kind, now = _DOCUMENTS[record.event], Now(record.at_us, record.utc_us, record.utc_error_us)
+    return _packed(Tag.DOCUMENT, lambda: boundary_chain.document(kind, record.step, now, sha256(data).digest()))
+
+
+def _sent(record: Effect) -> Entry | None:
+    kind, step, link = record.ref
+    return _packed(Tag.SENT, lambda: boundary_chain.sent(kind, step, link, record.token, record.at_us))
+
+
+def _refused(record: Effect) -> Entry | None:
+    return Tag.REFUSED, boundary_chain.refused(record.detail, record.at_us)
+
+
+def _permitted(record: Effect) -> Entry | None:
+    listed = _WRITES.fullmatch(record.detail)
+    writes = [] if listed is None else [_write(text) for text in listed[2].split(", ")]
+    found = [each for each in writes if each is not None]
+    if listed is None or len(found) != len(writes) or len(found) > MOST:
+        return None
+    return Tag.PREPARED, boundary_chain.prepared(found, restoring=listed[1] == "restore")
+
+
+def _write(text: str) -> ParameterWrite | None:
+    said = _WRITE.fullmatch(text)
+    if said is None:
+        return None
+    try:
+        before, value = bits_of(float(said[2])), bits_of(float(said[3]))
+    except ValueError:
+        return None
+    return None if before is None or value is None else ParameterWrite(said[1], before, value)
+
+
+def _not_permitted(record: Effect) -> Entry | None:
+    return Tag.UNPREPARED, boundary_chain.unprepared(record.detail)
+
+
+_EFFECTS: Final[dict[str, Callable[[Effect], Entry | None]]] = {
+    **dict.fromkeys(_DOCUMENTS, _document),
+    "undecided": _undecided,
+    "dispatched": _sent,
+    "refused": _refused,
+    "permitted": _permitted,
+    "not-permitted": _not_permitted,
+}

@@ -1,0 +1,50 @@
+"""The boundary's signature over its own evidence: who signs, and what is kept of one session for the next.
+
+In mode `software` the key is in this process, and so in reach of whoever takes it over.
+"""
+
+from hashlib import sha256
+
+from rtshcua.onboard.ports import BoundaryKey
+from rtshcua.wire import boundary_chain
+from rtshcua.wire.boundary_chain import BoundaryChain, Tag
+from rtshcua.wire.statement import Statement, sign
+
+
+class Attestation:
+    """Signs how far one boundary's chain got. Nothing is signed before it has begun, or without a key."""
+
+    def __init__(self, chain: BoundaryChain, flight: bytes, bundle: bytes, *, enforced: bool) -> None:
+        self._chain = chain
+        self._flight = flight
+        self._bundle = sha256(bundle).digest()
+        self._enforced = enforced
+        self._key: BoundaryKey | None = None
+        self._over = False
+
+    @property
+    def digest(self) -> bytes:
+        """The digest to keep for the next session, 32 octets."""
+        return self._chain.digest
+
+    def begin(self, key: BoundaryKey | None) -> None:
+        """The flight's log begins. Raises RuntimeError for a second time: a chain has one beginning."""
+        if self._key is not None:
+            raise RuntimeError("the boundary's session has begun already")
+        if key is None:
+            return
+        self._key = key
+        payload = boundary_chain.begin(key.session, key.before, self._flight, self._bundle, enforced=self._enforced)
+        self._chain.add(Tag.BEGIN, payload)
+
+    def statement(self, *, final: bool = False) -> bytes | None:
+        """A signed statement, None without a key or after the final one."""
+        key, chain = self._key, self._chain
+        if key is None or self._over:
+            return None
+        self._over = final
+        said = Statement(
+            self._flight, key.session, key.before, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
+            chain.repeated, chain.declined, chain.stopped, chain.aside, final,
+        )  # fmt: skip
+        return sign(said, key.key)

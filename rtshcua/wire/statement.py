@@ -1,0 +1,75 @@
+"""What the boundary signs of its own evidence (`boundary_chain`): so far it got, and whether it ends there.
+
+A COSE_Sign1 by a key of duty `boundary`, around an artefact whose body is the fields below in their order.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+import msgspec
+
+from rtshcua.wire import artefact, cose, names
+from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS
+from rtshcua.wire.digest import DIGEST_BYTES
+from rtshcua.wire.document import FLIGHT_BYTES
+from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
+from rtshcua.wire.untrusted import Untrusted
+
+#: the largest statement, in octets
+MAX_STATEMENT: Final = 2048
+
+
+class StatementError(Untrusted):
+    """A statement that is refused: `malformed`."""
+
+
+class Statement(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """How far the boundary got in a flight (its id, 16 octets).
+
+    `session` counts the sessions of one boundary, 0 where it does not know; `before` is the digest that it kept of the
+    one before, 32 zero octets where there is none. `digest` is the one after `count` entries, and `marks` the first
+    octets of the digests after each entry since the statement before, of the first `MOST_MARKS` of them. `left` is the
+    digest of so many `frames` that carry out commands, `aside` that of what is only counted: `repeated` answers,
+    `declined` documents and `stopped` frames. After a `final` one there is no more.
+    """
+
+    flight: bytes
+    session: int
+    before: bytes
+    count: int
+    digest: bytes
+    marks: bytes
+    frames: int
+    left: bytes
+    repeated: int
+    declined: int
+    stopped: int
+    aside: bytes
+    final: bool
+
+
+def counted(said: Statement) -> tuple[int, int, int, int]:
+    """What of a statement only ever grows, besides its entries."""
+    return said.frames, said.repeated, said.declined, said.stopped
+
+
+def sign(statement: Statement, key: SigningKey) -> bytes:
+    """The signed statement. Raises `WrongDuty`."""
+    payload = artefact.pack(names.STATEMENT, statement)
+    return cose.sign1(payload, key=key, duty=Duty.BOUNDARY, content_type=names.STATEMENT.content_type)
+
+
+def open_statement(data: bytes, keys: Mapping[bytes, VerificationKey]) -> Statement:
+    """What one of the keys (by `kid`) signed. Raises `EnvelopeError`, `ArtefactError` and `StatementError`."""
+    opened = cose.open1(
+        data, keys=keys, duty=Duty.BOUNDARY, content_type=names.STATEMENT.content_type, limit=MAX_STATEMENT
+    )
+    said = artefact.unpack(names.STATEMENT, opened.payload, Statement, StatementError, "statement of a boundary")
+    digests = {len(said.before), len(said.digest), len(said.left), len(said.aside)}
+    numbers = (said.session, said.count, *counted(said))
+    fits = len(said.marks) % MARK_BYTES == 0 and len(said.marks) <= MARK_BYTES * MOST_MARKS
+    if len(said.flight) != FLIGHT_BYTES or digests != {DIGEST_BYTES} or not fits:
+        raise StatementError("malformed", "a flight, a digest or a mark of it is not as long as they are")
+    if min(numbers) < 0:
+        raise StatementError("malformed", "a number of it is below 0")
+    return said

@@ -1,0 +1,279 @@
+"""Threat: whoever took over the runtime, with the log key, every epoch key and all other keys on board but the
+boundary's, writes the log anew. The lies are whole in themselves: numbered, linked, sealed and signed. Each is named at
+the first record that is not what the boundary made.
+"""
+
+from base64 import b64decode, b64encode
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from reference.attested_flight import attested, second
+from reference.forgery import LOG_KEY, edit, expect, prove, read, signed, sound
+from rtshcua.cli.outcome import exit_code_of
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire import artefact, cose, names
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.statement import Statement, open_statement, sign
+from virtual import case
+from virtual.rows import rows
+
+LINES = attested()
+KINDS = [(read(line)["type"], read(line).get("event", "")) for line in LINES]
+KEYS = {case.BOUNDARY_KEY.kid: case.BOUNDARY_KEY.verification()}
+
+
+def where(event: str) -> list[int]:
+    """The numbers of the records of an event, or of a type."""
+    return [number for number, kind in enumerate(KINDS) if event in kind]
+
+
+DECISIONS, SENT, STATEMENTS, SEALS = where("decision"), where("dispatched"), where("boundary"), where("seal")
+(APPROVAL,) = where("approval")
+CLOSE = len(LINES) - 1
+
+
+def said(number: int) -> Statement:
+    """What a statement says."""
+    return open_statement(b64decode(read(LINES[number])["detail"]), KEYS)
+
+
+def stating(number: int, envelope: bytes) -> bytes:
+    """Another statement in the place of one."""
+    return edit(LINES[number], detail=b64encode(envelope).decode())
+
+
+def changed(number: int, line: bytes) -> list[bytes]:
+    return [*LINES[:number], line, *LINES[number + 1 :]]
+
+
+def without(*numbers: int) -> list[bytes]:
+    return [line for number, line in enumerate(LINES) if number not in numbers]
+
+
+def moment(number: int) -> dict[str, Any]:
+    """When a record was written."""
+    return {name: read(LINES[number])[name] for name in ("at_us", "utc_us", "utc_error_us")}
+
+
+def entry_after(number: int) -> int:
+    """The next record that the boundary made an entry for."""
+    return next(each for each in range(number + 1, CLOSE) if each in (*DECISIONS, *SENT, APPROVAL))
+
+
+def test_the_true_log_is_whole_and_says_what_the_boundary_signed_for() -> None:
+    report = sound(LINES).report
+    (claim,) = [claim for claim in report.proven if claim.slug == "boundary"]
+    assert claim.text.startswith("session 1 of the boundary signed for 10 decisions, documents and dispatches")
+    assert "1 were refused, 30 answers repeated one and 1 documents were refused" in claim.text
+    assert "boundary" not in {claim.slug for claim in report.unproven}
+    assert signed(LINES) == list(LINES)  # the attacker's tool writes nothing else than the truth of the truth
+
+
+# ---------------------------------------------------------------- altered
+
+
+@rows("number", DECISIONS)
+def test_an_outcome_is_altered(number: int) -> None:
+    outcome = "deny" if read(LINES[number])["outcome"] == "allow" else "allow"
+    assert expect(signed(changed(number, edit(LINES[number], outcome=outcome)))) == ("boundary/differs", number)
+
+
+#: by the field of a decision, what it might be said to have been
+FIELDS: dict[str, Any] = {
+    "reason": "state/violated", "rule_step": 7, "target_link": 0, "valid_until_us": 1, "step": 2, "kind": 1, "link": 0,
+    "binding": "00" * 32,
+}  # fmt: skip
+
+
+@rows(("field", "value"), list(FIELDS.items()))
+def test_a_field_of_a_decision_is_altered(field: str, value: object) -> None:
+    number = DECISIONS[1]
+    assert expect(signed(changed(number, edit(LINES[number], **{field: value})))) == ("boundary/differs", number)
+
+
+def test_a_state_that_decides_alike_is_altered() -> None:
+    """The decision derives again from it, so that nothing else could tell."""
+    number = DECISIONS[0]
+    state = read(LINES[number])["state"]
+    ages = [state["ages"][0] + 1, *state["ages"][1:]]
+    lie = edit(LINES[number], state=state | {"ages": ages})
+    assert expect(signed(changed(number, lie))) == ("boundary/differs", number)
+
+
+@rows("field", ["released_us", "phase", "remaining_us", "consumed"])
+def test_a_context_is_altered(field: str) -> None:
+    number = DECISIONS[0]
+    context = read(LINES[number])["context"]
+    lie = edit(LINES[number], context=context | {field: context[field] + 1})
+    assert expect(signed(changed(number, lie))) == ("boundary/differs", number)
+
+
+def test_a_dispatch_is_altered() -> None:
+    number = SENT[0]
+    for field in ("token", "step", "link", "kind"):
+        lie = edit(LINES[number], **{field: read(LINES[number])[field] + 1})
+        assert expect(signed(changed(number, lie))) == ("boundary/differs", number)
+
+
+def test_what_no_boundary_makes() -> None:
+    number = DECISIONS[0]
+    for lie in ({"binding": "00"}, {"reason": "of/mine"}, {"kind": -1}, {"valid_until_us": (1 << 53) - 1, "kind": 300}):
+        assert expect(signed(changed(number, edit(LINES[number], **lie)))) == ("boundary/record", number)
+
+
+# ---------------------------------------------------------------- left out, moved, invented
+
+
+@rows("number", [*DECISIONS, *SENT[:-1], APPROVAL])
+def test_a_record_is_left_out(number: int) -> None:
+    after = entry_after(number)
+    assert expect(signed(without(number))) == ("boundary/differs", after - 1)
+
+
+def test_the_last_dispatch_is_left_out() -> None:
+    statement = next(each for each in STATEMENTS if each > SENT[-1])
+    slug, record = expect(signed(without(SENT[-1])))
+    assert (slug, record) == ("boundary/omitted", next(each for each in STATEMENTS if each > statement) - 1)
+
+
+def test_all_of_a_leg_is_left_out_with_its_effects() -> None:
+    assert expect(signed(without(*range(APPROVAL, SENT[2] + 1)))) == (
+        "boundary/differs", DECISIONS[-1] - (SENT[2] + 1 - APPROVAL),
+    )  # fmt: skip
+
+
+def test_two_records_are_exchanged() -> None:
+    first, other = DECISIONS[1], DECISIONS[2]
+    lines = list(LINES)
+    lines[first], lines[other] = lines[other], lines[first]
+    assert expect(signed(lines)) == ("boundary/differs", first)
+
+
+@rows("number", [DECISIONS[0], SENT[0], APPROVAL, SENT[-1]])
+def test_a_record_is_there_twice(number: int) -> None:
+    twice = [*LINES[: number + 1], LINES[number], *LINES[number + 1 :]]
+    slug, record = expect(signed(twice))
+    assert (slug, record) in (("boundary/differs", number + 1), ("boundary/invented", number + 1))
+
+
+@rows("after", [0, 1])
+def test_a_decision_is_invented_at_the_end_of_an_epoch(after: int) -> None:
+    place = STATEMENTS[-2] + after
+    made_up = edit(LINES[DECISIONS[-1]], **moment(place))
+    lines = [*LINES[:place], made_up, *LINES[place:]]
+    assert expect(signed(lines)) == (("boundary/missing", place + 1) if after else ("boundary/invented", place))
+
+
+def test_a_refused_permit_is_invented() -> None:
+    made_up = edit(LINES[SENT[0]], event="refused", token=-1, detail="permit/late")
+    lines = [*LINES[: SENT[0]], made_up, *LINES[SENT[0] :]]
+    assert expect(signed(lines)) == ("boundary/differs", SENT[0])
+
+
+# ---------------------------------------------------------------- statements
+
+
+def test_a_refused_frame_is_denied() -> None:
+    """What is only counted stands in the statement alone: to count otherwise is to sign."""
+    number = STATEMENTS[-1]
+    lie = replace(said(number), stopped=0)
+    payload = artefact.pack(names.STATEMENT, lie)
+    true = cose.unverified(b64decode(read(LINES[number])["detail"]))
+    forged = sign(lie, SigningKey.from_seed(b"f" * 32, duty=Duty.BOUNDARY, development=True))
+    assert expect(signed(changed(number, stating(number, forged)))) == ("boundary/unknown-key", number)
+    kept = cose.sign1(payload, key=case.BOUNDARY_KEY, duty=Duty.BOUNDARY, content_type=names.STATEMENT.content_type)
+    kept = kept[:-64] + true.signature
+    assert expect(signed(changed(number, stating(number, kept)))) == ("boundary/bad-signature", number)
+
+
+def test_the_log_key_signs_for_the_boundary() -> None:
+    number = STATEMENTS[2]
+    payload = artefact.pack(names.STATEMENT, said(number))
+    forged = cose.sign1(payload, key=LOG_KEY, duty=Duty.LOG, content_type=names.STATEMENT.content_type)
+    assert expect(signed(changed(number, stating(number, forged)))) == ("boundary/unknown-key", number)
+    assert expect(signed(changed(number, edit(LINES[number], detail="no base64")))) == ("boundary/malformed", number)
+
+
+@rows("number", STATEMENTS[1:-1])
+def test_a_statement_is_left_out(number: int) -> None:
+    seal = next(each for each in SEALS if each > number)
+    assert expect(signed(without(number))) == ("boundary/missing", seal - 1)
+
+
+def test_all_statements_are_left_out() -> None:
+    assert expect(signed(without(*STATEMENTS))) == ("boundary/missing", DECISIONS[0] - 1)
+    assert expect(signed(without(STATEMENTS[0]))) == ("boundary/missing", DECISIONS[0] - 1)
+
+
+def test_an_older_statement_is_replayed() -> None:
+    newer, older = STATEMENTS[2], STATEMENTS[1]
+    replayed = edit(LINES[newer], detail=read(LINES[older])["detail"])
+    assert expect(signed(changed(newer, replayed)))[0] == "boundary/missing"  # its marks are of entries before
+    first = edit(LINES[newer], detail=read(LINES[STATEMENTS[0]])["detail"])
+    assert expect(signed(changed(newer, first))) == ("boundary/replayed", newer)
+    empty = STATEMENTS[-2]  # nothing happened in its epoch, and so it marks nothing
+    idle = edit(LINES[STATEMENTS[-1]], detail=read(LINES[empty])["detail"])
+    assert expect(signed(changed(STATEMENTS[-1], idle))) == ("boundary/not-ended", CLOSE)
+
+
+def test_the_end_is_cut_off_and_closed() -> None:
+    for seal in SEALS:
+        close = edit(LINES[CLOSE], **moment(seal))
+        assert expect(signed([*LINES[:seal], close])) == ("boundary/not-ended", seal)
+
+
+def test_the_end_is_cut_off_and_the_true_end_put_behind_it() -> None:
+    cut = SEALS[1]
+    end = [edit(line, **moment(cut)) for line in LINES[STATEMENTS[-1] :]]
+    assert expect(signed([*LINES[:cut], *end])) == ("boundary/missing", cut)  # it marks none of what was cut off
+
+
+def test_a_session_goes_on_after_its_end() -> None:
+    twice = [*LINES[:-1], edit(LINES[-2], detail=read(LINES[-2])["detail"]), LINES[-1]]
+    assert expect(signed(twice)) == ("boundary/replayed", CLOSE)
+    more = [*LINES[:-1], edit(LINES[SENT[0]], **moment(CLOSE)), LINES[-1]]
+    assert expect(signed(more)) == ("boundary/invented", CLOSE)
+
+
+# ---------------------------------------------------------------- two flights
+
+
+def test_the_records_of_another_session() -> None:
+    other = second()
+    assert "session 2 of the boundary" in str(sound(other).report.proven)
+    seal = SEALS[0]
+    assert read(other[seal])["type"] == "seal"
+    assert expect(signed([*LINES[: seal + 1], *other[seal + 1 :]])) == ("boundary/other-session", STATEMENTS[2])
+    statement = STATEMENTS[1]
+    spliced = changed(statement, edit(LINES[statement], detail=read(other[statement])["detail"]))
+    assert expect(signed(spliced)) == ("boundary/other-session", statement)
+
+
+def test_another_flight() -> None:
+    """Its id is the genesis': the attacker signs that one too, but not the boundary's statements."""
+    genesis = edit(LINES[0], boot="11" * 16)
+    assert expect(signed([genesis, *LINES[1:]])) == ("boundary/other-flight", STATEMENTS[0])
+
+
+def test_another_mode() -> None:
+    lines = [edit(line, mode="none") if "mode" in read(line) else line for line in LINES]
+    assert expect(signed(lines)) == ("boundary/beginning", STATEMENTS[0])
+
+
+# ---------------------------------------------------------------- what cannot be told from one log
+
+
+@pytest.mark.parametrize("seal", SEALS[1:2])
+def test_a_log_cut_off_and_called_a_crash_says_what_is_not_shown(seal: int) -> None:
+    """The holder of the log key ends it as recovery does. The next session names what this one kept."""
+    close = edit(LINES[CLOSE], **moment(seal), ending="recovered")
+    head = edit(LINES[seal], type="recover", discarded_bytes=0, discarded_digest="00" * 32)
+    report = prove(signed([*LINES[:seal], head, close])).report
+    assert report.failure is None, report.failure
+    assert ("boundary", "what the boundary made after its last signature: it broke off") in report.unproven
+
+
+def test_it_has_an_exit_code_of_its_own() -> None:
+    assert exit_code_of("boundary/missing") is ExitCode.BOUNDARY == 15

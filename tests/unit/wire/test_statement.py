@@ -1,0 +1,55 @@
+"""Statements of a boundary: one encoding, one duty, and nothing out of range."""
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.wire import artefact, cose, names
+from rtshcua.wire.keys import Duty, SigningKey, WrongDuty
+from rtshcua.wire.statement import MAX_STATEMENT, Statement, open_statement, sign
+from rtshcua.wire.untrusted import Untrusted
+from virtual.rows import rows
+
+KEY = SigningKey.from_seed(b"b" * 32, duty=Duty.BOUNDARY)
+KEYS = {KEY.kid: KEY.verification()}
+SAID = Statement(
+    b"f" * 16, 1, bytes(32), 2, b"d" * 32, b"m" * 16, 3, b"l" * 32, 4, 5, 6, b"a" * 32, final=False
+)  # fmt: skip
+
+
+def slug(data: bytes) -> str:
+    with pytest.raises(Untrusted) as refused:
+        open_statement(data, KEYS)
+    return refused.value.slug
+
+
+def test_what_is_signed_is_read_back() -> None:
+    assert open_statement(sign(SAID, KEY), KEYS) == SAID
+    whole = replace(SAID, marks=b"m" * 1024, count=(1 << 63) - 1, final=True)
+    assert open_statement(sign(whole, KEY), KEYS) == whole
+    assert len(sign(whole, KEY)) < MAX_STATEMENT
+
+
+def test_no_key_of_another_duty_signs_one() -> None:
+    with pytest.raises(WrongDuty):
+        sign(SAID, SigningKey.from_seed(b"b" * 32, duty=Duty.LOG))
+
+
+@rows(
+    "fields",
+    [
+        {"flight": b"f" * 15}, {"before": b""}, {"digest": b"d" * 31}, {"left": b""}, {"aside": b"a" * 33},
+        {"marks": b"m" * 7}, {"marks": b"m" * 1032}, {"session": -1}, {"count": -1}, {"frames": -1},
+        {"repeated": -1}, {"declined": -1}, {"stopped": -1},
+    ],
+)  # fmt: skip
+def test_what_is_out_of_range_is_malformed(fields: dict[str, object]) -> None:
+    assert slug(sign(replace(SAID, **fields), KEY)) == "malformed"
+
+
+def test_other_bodies_are_malformed() -> None:
+    for body in (1, [], [*artefact.unwrap(names.STATEMENT, artefact.pack(names.STATEMENT, SAID)), 1]):  # type: ignore[misc]
+        payload = artefact.wrap(names.STATEMENT, body)
+        content = names.STATEMENT.content_type
+        assert slug(cose.sign1(payload, key=KEY, duty=Duty.BOUNDARY, content_type=content)) == "malformed"
+    assert slug(b"") == "malformed"
+    assert slug(b"x" * (MAX_STATEMENT + 1)) == "malformed"

@@ -59,6 +59,7 @@ def test_it_measures_what_flew(flavour: str) -> None:
     """The figures are the simulated vehicle's own: it flies at 5 m/s, returns at 30 m, and is silenced thrice."""
     flown, checks = right(flavour)
     assert checks["return/height"].found == pytest.approx(30_000, abs=500)
+    assert checks["return/across"].found == pytest.approx(29_500, abs=600)
     assert checks["fly/speed"].found == pytest.approx(4_800, abs=300)
     leg = flown.observed.sortie("leg")
     assert leg is not None
@@ -82,6 +83,7 @@ WRONG: tuple[tuple[Callable[[VirtualVehicle], None], str, str, str], ...] = (
     (wrong.slow_climb, "px4", "climb", "climb/speed"),
     (wrong.fast_leg, "ardupilot", "leg", "fly/speed"),
     (wrong.return_that_does_not_move, "px4", "leg", "return/home"),
+    (wrong.return_that_does_not_climb, "ardupilot", "leg", "return/across"),
     (wrong.landing_that_does_not_descend, "ardupilot", "climb", "land/down"),
     (wrong.answers_that_never_come, "ardupilot", "climb", "answers/come"),
     (wrong.answers_that_come_late, "px4", "climb", "answers/late"),

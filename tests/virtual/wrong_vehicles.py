@@ -150,6 +150,11 @@ def return_that_does_not_move(vehicle: VirtualVehicle) -> None:
     body.return_home = body.hold
 
 
+def return_that_does_not_climb(vehicle: VirtualVehicle) -> None:
+    """Whatever its parameters say."""
+    _of(vehicle).vehicle.handling.return_height = lambda handling, away, up: up
+
+
 def landing_that_does_not_descend(vehicle: VirtualVehicle) -> None:
     body = _of(vehicle).vehicle
     body.land_here = body.hold

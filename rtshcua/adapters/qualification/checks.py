@@ -24,6 +24,7 @@ from rtshcua.adapters.vehicle.effects import STILL, apart
 from rtshcua.adapters.vehicle.manoeuvre import RESULTS, RETRY_US
 from rtshcua.adapters.vehicle.streams import AT_TIMES, SLOW
 from rtshcua.adapters.vehicle.supervision import Brakes
+from rtshcua.decision.volume import SHORT, cone
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.onboard.ports import Ending
@@ -319,6 +320,7 @@ def _ends(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[Qualifi
         lambda flown, _: flown.samples[0],
     )
     yield _highest(observed, vehicle)
+    yield _lowest_across(observed, vehicle)
     yield _ended(
         observed, "land/down", "climb", MotionKind.LAND, limit,
         f"lands within {_metres(limit)} of where it began to, and disarms", lambda _, samples: samples[0],
@@ -353,6 +355,26 @@ def _highest(observed: ObservedQualification, vehicle: Vehicle) -> Qualification
     highest = max(each.height for each in samples)
     expected = f"no higher than {_metres(limit)} (`return at {vehicle.return_altitude / 1_000:g} m`)"
     return _check(slug, highest <= limit, expected, _metres(highest), limit, highest, _MM)
+
+
+def _lowest_across(observed: ObservedQualification, vehicle: Vehicle) -> QualificationCheck:
+    """Of a return that begins outside of the cone over home: how low it is between its climb and its descent."""
+    slug, flown = "return/across", observed.sortie("leg")
+    expected, clear = "flies home at the declared height", vehicle.position_error + _ENDS
+    command = None if flown is None else next((each for each in flown.commands if each.kind == MotionKind.HOME), None)
+    samples = [] if flown is None or command is None else _while(flown, command)
+    if flown is None or not vehicle.return_altitude or not samples:
+        why = _why(observed, "leg") if vehicle.return_altitude else "the policy declares no `return at`"
+        return _unchecked(slug, expected, why)
+    start, home = samples[0], flown.samples[0]
+    between = [each for each in samples if min(_across(each, start), _across(each, home)) > clear]
+    if _across(start, home) <= cone(vehicle.return_altitude) + vehicle.position_error or not between:
+        return _unchecked(slug, expected, "it returned from so near home that it may be low")
+    limit = max(vehicle.return_altitude, start.height) - SHORT
+    lowest = min(each.height for each in between)
+    expected = f"no lower than {_metres(limit)} (`return at {vehicle.return_altitude / 1_000:g} m`)"
+    advice = "what is proved of the way home does not hold: look at its cone over home (docs/flying/returns.md)"
+    return _check(slug, lowest >= limit, expected, _metres(lowest), limit, lowest, _MM, advice)
 
 
 # ---------------------------------------------------------------- answers

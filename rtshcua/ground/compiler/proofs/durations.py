@@ -22,6 +22,7 @@ from rtshcua.decision.flying import (
     over_ground,
     rising_us,
     sinking_us,
+    slower,
 )
 from rtshcua.decision.prepare import PreparedInvocation, PreparedLink
 from rtshcua.decision.values import TRUE, interval
@@ -186,10 +187,12 @@ def _links(ground: Ground, step: Step, invocation: PreparedInvocation, starts: S
     high = max(volume.height[1] for volume in volumes)
     degrades = [rule.target for rule in invocation.candidates.degrades]
     for chain in (degrades, invocation.chain, ground.prepared.contingency):
-        reach = (distance, low, high)
+        reach, so_far = (distance, low, high), slowest
         for link in chain:
-            reach, time_us = _link_us(ground, link, *reach, slowest)
+            reach, time_us = _link_us(ground, link, *reach, so_far)
             contract = ground.prepared.policy.contracts[link.link.skill]
+            asks = contract.motion.speed >= 0 and contract.motion.kind == MotionKind.FLY
+            so_far = slower(so_far, link.link.arguments[contract.motion.speed] if asks else 0)
             allowed = link.link.limit_us or contract.duration_us
             name = f"`{contract.name}`, a link of this step's chains,"
             if link is not chain[-1] and 0 < allowed < time_us:

@@ -230,3 +230,30 @@ def test_whatever_does_not_go_as_planned_ends_it() -> None:
     ended = leg(7_000, 4 * S)
     ended.ending = "stood-down"
     assert "stood-down" in (ends_after(ended) or "")
+
+
+def returned(from_mm: int, *heights: int) -> ObservedSortie:
+    """A return from so far north, at 12 m, with these heights on its way, each a metre nearer than the one before."""
+    way = [Sample(20 * S + at * S, place(from_mm - 6 * M - at * M), 0, up, 4 * M, 0) for at, up in enumerate(heights)]
+    samples = [Sample(0, place(0), 0, 0, 0, 0), Sample(19 * S, place(from_mm), 0, 12 * M, 0, 0), *way]
+    samples += [Sample(40 * S, place(0), 0, 5 * M, 0, -M)]
+    home = ObservedCommand(MotionKind.HOME, "return_home", 19 * S, 0, True, 19 * S, 50 * S, "succeeded")
+    return ObservedSortie("leg", samples, [home], ending="completed", down=True)
+
+
+@pytest.mark.parametrize(
+    ("from_mm", "heights", "outcome"),
+    [
+        (40 * M, (30 * M, 29 * M, 28 * M), HELD),
+        (40 * M, (30 * M, 27_990, 30 * M), FAILED),
+        (12_900, (12 * M,), UNCHECKED),  # within 10 m, and 3 m of position error
+        (14 * M, (12 * M,), FAILED),
+        (40 * M, (), UNCHECKED),
+    ],
+)
+def test_how_low_a_return_flies_across(from_mm: int, heights: tuple[int, ...], outcome: CheckOutcome) -> None:
+    assert checks(BRAKED, returned(from_mm, *heights))["return/across"].outcome == outcome
+
+
+def test_without_a_declared_height_a_return_is_not_looked_at() -> None:
+    assert checks(POLICY, returned(40 * M, 12 * M))["return/across"].outcome == UNCHECKED

@@ -97,6 +97,22 @@ def test_a_link_is_proved_from_the_farthest_place_of_the_step(link: str, expecte
     assert [message for code, message in found(text) if code == "E0804"] == expected
 
 
+@rows(("speed", "expected"), [(3, []), (1, ["E0804"])])
+def test_a_return_counts_the_speed_of_the_link_before_it(speed: int, expected: list[str]) -> None:
+    """220 m, and 50 m that home may be away: at 1 m/s it takes longer than a return may."""
+    chain = f"near(47.39974 N, 8.54559 E, 20 m, {speed} m/s), return_home, emergency_land"
+    near = skill(
+        "near(aim: position, top: altitude in 5 m .. 50 m, pace: speed in 1 m/s .. 8 m/s)",
+        motion="fly to aim at top speed pace", fallback="return_home, emergency_land", lasts="at most 10 min",
+    )  # fmt: skip
+    away = skill(f"away({EAST})", motion="fly to aim at top", fallback=chain, **LONG)
+    rules = policy(contingency="emergency_land")
+    text = program(near, away, rules, mission(UP, "away(47.39970 N, 8.54559 E, 20 m)", HOME))
+    late = [(code, message) for code, message in found(text) if code == "E0804"]
+    assert [code for code, _ in late] == expected
+    assert all(message.startswith("`return_home`, a link of this step's chains") for _, message in late)
+
+
 @pytest.mark.parametrize("top", ["6 m", "45 m"])
 def test_the_nearest_height_that_is_in_time_is_named(top: str) -> None:
     """100 m north of home, and down or up at 1 m/s or 1.5 m/s from 20 m."""

@@ -204,7 +204,7 @@ class Ways:
     ) -> Stretch | None:
         """The part of the way from somewhere on a leg that leaves the airspace; `returns` is who flies home on it."""
         limit = 0 if returns is None else near_home(returns)
-        near = returns is not None and _comes_near(leg, limit)
+        near = returns is not None and returns.return_altitude > 0 and _comes_near(leg, limit)
         stretches = _stretches(leg, flown, to, returns, near=near)
         found = next((each for each in stretches if not self._keeps(each, airspace)), None)
         (ax, ay), (bx, by) = leg

@@ -10,13 +10,12 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store.writing import replace_inside
 from rtshcua.cli.bounds import bounds_dict, bounds_told
-from rtshcua.cli.faults import untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.replacing import Replacing, replace_with
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.stdout import out
-from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
+from rtshcua.cli.unlock import another_key, check_trusted, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.compiler.pins import Pins
 from rtshcua.ground.compiler.sign import sign
@@ -107,12 +106,14 @@ def compile(
     try:
         signers = (
             unlock(store, Duty.POLICY, path=policy_key, passphrase_file=passphrase_file),
-            unlock_for(store, compiled.mission, path=mission_key, passphrase_file=passphrase_file),
+            unlock_for(
+                store, compiled.mission, path=mission_key, passphrase_file=passphrase_file, policy=compiled.policy
+            ),
         )
         data = sign(compiled.policy, compiled.mission, policy_key=signers[0], mission_key=signers[1])
         check_trusted(store, signers[1], compiled.policy, compiled.mission)
     except Untrusted as error:
-        return findings.end(untrusted(error))
+        return findings.end(another_key(error, compiled.policy, compiled.mission))
     replace_inside(target, data)
     if not as_json:
         out(_told(compiled.policy, compiled.mission, target))

@@ -188,7 +188,7 @@ def mission(
 ) -> ExitCode:
     """Make a mission key for one source, bound to roles and policies, and the next version of the trust root.
 
-    `rtshcua compile --mission-key FILE` signs with it.
+    `rtshcua compile` signs with the first key of the store that may, or with that of `--mission-key FILE`.
     """
     if source not in PROPOSERS:
         return fail(ExitCode.USAGE, f"`{source}` proposes no missions", f"accepted: {' or '.join(PROPOSERS)}")

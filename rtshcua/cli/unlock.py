@@ -1,18 +1,22 @@
 """Signing keys for commands: from the key store or a file, with a passphrase asked for only where one is needed."""
 
 import sys
+from contextlib import suppress
 from getpass import getpass
 from pathlib import Path
 
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, KeyStoreError, read_key, whose
 from rtshcua.adapters.store.reading import exposed
+from rtshcua.cli.faults import untrusted
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
-from rtshcua.wire.bundle import check_proposer
+from rtshcua.wire.bundle import BundleError, check_proposer
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import open_root
+from rtshcua.wire.untrusted import Untrusted
 
 #: octets of a passphrase, in a file
 _LONGEST = 4096
@@ -36,11 +40,33 @@ def unlock(
 
 
 def unlock_for(
-    store: KeyStore, mission: Mission, *, path: Path | None = None, passphrase_file: Path | None = None
+    store: KeyStore,
+    mission: Mission,
+    *,
+    path: Path | None = None,
+    passphrase_file: Path | None = None,
+    policy: Policy | None = None,
 ) -> SigningKey:
-    """The mission key that is for what this mission's source proposes; of the store's keys no other would do."""
+    """The mission key that is for what this mission's source proposes; under a `policy`, the first of the store's keys
+    that may sign it, if one may.
+    """
+    if path is None and policy is not None:
+        path = _fitting(store, policy, mission)
     source = next((SourceKind(each.source).name.lower() for each in mission.invocations), PROPOSERS[0])
     return unlock(store, Duty.MISSION, path=path, passphrase_file=passphrase_file, whose=source)
+
+
+def _fitting(store: KeyStore, policy: Policy, mission: Mission) -> Path | None:
+    if not store.exists():
+        return None
+    root = open_root(store.root(), pinned=store.pin(), now_us=0)
+    paths = store.paths(root)
+    for kid, key in root.keys_for(Duty.MISSION).items():
+        if kid in paths and paths[kid].is_file():
+            with suppress(BundleError):
+                check_proposer(key, policy, mission.invocations, now_us=0)
+                return paths[kid]
+    return None
 
 
 def unlock_person(
@@ -83,6 +109,16 @@ def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mis
     named = root.keys_for(Duty.MISSION).get(key.kid)
     if named is not None:
         check_proposer(named, policy, mission.invocations, now_us=0)
+
+
+def another_key(error: Untrusted, policy: Policy, mission: Mission) -> Refusal:
+    """Why a mission key may not sign a mission, with what makes one that may."""
+    if error.slug not in ("wrong-source", "wrong-role", "key-other-policy") or not mission.invocations:
+        return untrusted(error)
+    first = mission.invocations[0]
+    source, role = SourceKind(first.source).name.lower(), policy.roles[first.role]
+    make = f"`rtshcua keys mission {source} --role {role} --policy {policy.name}` makes one that may"
+    return Refusal(error.slug, str(error), make)
 
 
 def read_passphrase(path: Path) -> bytes:

@@ -199,3 +199,33 @@ def test_check_needs_no_keys_and_writes_nothing(
     assert main(["check", sources[0], "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["diagnostics"] == []
     assert names(here) == []
+
+
+def test_the_key_of_the_store_that_may_sign_a_mission_signs_it(
+    checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Those of `keys init` speak for the operator alone; of none that may, it is said what makes one."""
+    text = """import "lib:policies/site.rts"
+import "lib:skills/takeoff.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+role technician
+policy shift version 1 {
+  permit takeoff by role technician through agent
+  permit return_home, emergency_land by any
+  airspace inside city
+  contingency return_home, emergency_land
+}
+mission lift under shift@1 on quad {
+  proposed by agent openclaw for role technician
+  phase departure { takeoff(altitude = 20 m) }
+  phase recovery { return_home() }
+}
+"""
+    (here / "lift.rts").write_text(text, encoding="utf-8")
+    assert main(["compile", "lift.rts", *AT]) == ExitCode.UNTRUSTED
+    assert "`rtshcua keys mission agent --role technician --policy shift` makes one that may" in capsys.readouterr().err
+    assert main(["keys", "mission", "agent", "--role", "technician", "--policy", "shift"]) == ExitCode.OK
+    assert main(["compile", "lift.rts", *AT]) == ExitCode.OK
+    source = str(checkout / "missions" / "short.rts")
+    assert main(["compile", source, "-o", "short.bundle", *AT]) == ExitCode.OK

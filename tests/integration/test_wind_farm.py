@@ -1,0 +1,86 @@
+"""The wind farm of `examples`: a project of several missions, with shifts, approvals and towers to stay out of."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from rtshcua.campaign.flights import Field
+from rtshcua.cli import app
+from rtshcua.cli.sources import read_sources
+from rtshcua.cli.table import COMMANDS
+from rtshcua.cli.testing.running import ISSUED_AT_US
+from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.ground.testing.suite import scenarios
+from rtshcua.mavlink import dialect
+from rtshcua.virtual import development
+from rtshcua.virtual.expectations import expectations
+from rtshcua.virtual.flight import LATER_US
+from rtshcua.virtual.judge import judge
+
+FARM = Path(__file__).resolve().parents[2] / "examples" / "wind_farm"
+FLIGHTS = re.findall(r'(?m)^scenario "(.*)"', (FARM / "tests" / "flights.rts").read_text(encoding="utf-8"))
+#: flown each time, for it is the shortest; the others take as long as ten tests
+SHORT = "the substation on a Saturday"
+
+
+@pytest.fixture
+def farm(monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(FARM)
+    return FARM
+
+
+def flight(name: str) -> ScenarioFlight:
+    found = scenarios(read_sources([Path("tests/flights.rts")]).program, dialect.load(), ISSUED_AT_US, LATER_US)
+    assert not has_errors(found.diagnostics)
+    return next(each for each in found.found if each.scenario.name == name)
+
+
+def test_it_passes_check_and_its_tests_reach_nine_in_ten(farm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.main(["check", "missions"]) == 0, capsys.readouterr().err
+    assert app.main(["test", "--coverage", "--fail-under", "90", "tests/farm.rts"]) == 0, capsys.readouterr().out
+
+
+def test_the_day_decides_whether_the_substation_may_be_flown_over(
+    farm: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def codes(when: str) -> set[str]:
+        app.main(["check", "--at", when, "missions/substation.rts"])
+        return set(re.findall(r"error\[(E\d+)\]", capsys.readouterr().err))
+
+    assert codes("2026-11-28T09:00:00Z") == set()
+    assert codes("2026-11-30T09:00:00Z") == {"E0508"}  # a working day
+    assert codes("2026-11-29T09:00:00Z") == {"E0718"}  # nobody is on shift
+
+
+def test_every_tower_is_kept_out_of(farm: Path) -> None:
+    policy = (farm / "policies" / "farm.rts").read_text(encoding="utf-8")
+    (airspace,) = re.findall(r"(?m)^  airspace .*$", policy)
+    assert re.findall(r"tower_\d", airspace) == [f"tower_{number}" for number in range(1, 7)]
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=() if each == SHORT else pytest.mark.soak) for each in FLIGHTS]
+)
+def test_it_flies_as_its_scenarios_say(farm: Path, name: str) -> None:
+    chosen = flight(name)
+    policy, start = chosen.policy.lowered.policy, chosen.scenario.start
+    assert start.utc_us is not None
+    mission = development.flies_at(chosen.mission, start.utc_us)
+    field = Field.of(policy, mission, mission.issued_at_us)
+    for flavour in chosen.scenario.flavours:
+        was = field.flown(chosen.scenario, flavour, 1)
+        verdict = judge(was)
+        assert verdict.failures == (), flavour
+        assert [each.found for each in expectations(was, verdict) if not each.met] == [], flavour
+
+
+def test_the_page_names_commands_and_sources_that_there_are() -> None:
+    page = (FARM / "README.md").read_text(encoding="utf-8")
+    lines = [shlex.split(line, comments=True) for line in page.splitlines() if line.startswith("rtshcua ")]
+    assert len(lines) > 12
+    assert {words[1] for words in lines} <= {command.name for command in COMMANDS}
+    for path in (word for words in lines for word in words if word.endswith(".rts")):
+        assert (FARM / path).is_file(), path

@@ -78,7 +78,7 @@ def prove(
         limit = own or skill.duration
         assert limit is not None
         nearer = _nearer(ground, step, invocation, starts[0].height, takes, min(fits, contract.duration_us))
-        _too_long(ground, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer)
+        _too_long(ground, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest.speed)
     energy = charge(speeds, time_us)
     # of a return the mission's bound counts the way home, if that is more
     home = invocation.invocation.plan.kind == MotionKind.HOME
@@ -198,7 +198,7 @@ def _links(ground: Ground, step: Step, invocation: PreparedInvocation, starts: S
             if link is not chain[-1] and 0 < allowed < time_us:
                 declared = ground.context.symbols.skills[contract.name].duration
                 limit = ground.span(link.link) if link.link.limit_us or declared is None else declared.span
-                _too_long(ground, step, name, contract, time_us, allowed, limit)
+                _too_long(ground, step, name, contract, time_us, allowed, limit, slowest=slowest)
                 return
 
 
@@ -239,7 +239,12 @@ def _too_long(
     allowed: int,
     limit: Span,
     nearer: _Fix | None = None,
+    slowest: int = 0,
 ) -> None:
+    speeds = _speeds(ground)
+    goes_on = ""
+    if contract.motion.kind == MotionKind.HOME and 0 < slowest < speeds.homeward:
+        goes_on = f", at {display(slowest, Dimension.SPEED)}, the slowest that a step asks for"
     size = named_at(ground.context.report, ground.context.symbols.skills[contract.name], limit)
     enough = display(-(-time_us // _SECOND) * _SECOND, Dimension.DURATION)
     longer = "let it last longer" if size is None else f"write `sizes {contract.name}({size} = {enough})`"
@@ -252,7 +257,7 @@ def _too_long(
         if over >= _SECOND
         else f"{lasts}, and {what} takes up to "
         f"{display(-(-over // _MILLISECOND) * _MILLISECOND, Dimension.DURATION)} longer",
-        help=f"fly a shorter path, or faster, or {longer}; {_counted(ground)}",
+        help=f"fly a shorter path, or faster, or {longer}; {_counted(ground)}{goes_on}",
         labels=[(limit, "declared here"), *_declared(ground)],
         fix=nearer,
         amount=time_us,

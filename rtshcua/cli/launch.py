@@ -165,6 +165,7 @@ def launch(order: Launch) -> ExitCode:
             _hear(order, loaded, signing)
             driver = _driver(order, loaded, slack, signing)
             driver.prepares = not order.dry_run and bool(order.settings or debts.left)
+            driver.left = None if past is None else past.left(bundle, loaded)
             transport = transport or _open(order.link)
             vehicle = ConnectedVehicle(transport, driver, clock, tape.keep)
             stack.callback(vehicle.close)

@@ -4,8 +4,12 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rtshcua.adapters.files.last_log import Earlier, LastLog
+from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.files.recovery import alone, recover
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.cli.recover import signer_of
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.left import Left, left_by
 from rtshcua.wire.keys import SigningKey
 
 #: the effect that says, in the signed log, what there was to tell of the one before
@@ -39,6 +43,17 @@ class Past:
         """The run folder of the flight before, if that did not end its log."""
         log = self._earlier.broken_off
         return None if log is None else log.parent
+
+    def left(self, bundle: bytes, loaded: Loaded) -> Left | None:
+        """What a run of this bundle left the vehicle doing, if the log before is of one; None: nobody knows."""
+        log = self._earlier.log
+        if log is None:
+            return None
+        try:
+            with open_regular(log) as file:
+                return left_by(lines(file), bundle, loaded.bundle.policy, loaded.bundle.mission)
+        except OSError:
+            return None
 
     def begin(self, log: Path, *, aloft: bool = False) -> None:
         """The next log was made, and nothing is in it yet; nobody recovers it before `end`. Raises OSError where that

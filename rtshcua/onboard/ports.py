@@ -41,7 +41,8 @@ class Readings(Event, frozen=True):
 class Ready(Event, frozen=True):
     """The vehicle is connected, its estimator has a position and it would accept arming, or it flies already.
 
-    `others`: it flies, and in a way that nothing of ours makes it fly (the name of a mode, or `landing`).
+    `others`: it flies, and in a way that nothing of ours makes it fly (the name of a mode, `landing`, `another
+    target`, or what an earlier run told).
     """
 
     others: str = ""
@@ -58,6 +59,17 @@ class Sent(Event, frozen=True):
     """The first frame of command `token` went out at `at_us`: what admission and dispatch took is measured with it."""
 
     token: int
+
+
+class Obeyed(Event, frozen=True):
+    """The vehicle was seen to do command `token`, or another leg of it: its mode shows, and its target where it names
+    one. What it was told before is in force no more.
+
+    `target` is what it says that it flies to: latitude and longitude in 1e-7 degree, mm above mean sea level.
+    """
+
+    token: int
+    target: tuple[int, int, int] | None = None
 
 
 class Succeeded(Event, frozen=True):

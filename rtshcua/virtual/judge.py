@@ -25,7 +25,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import hypot, inf, sqrt
+from math import cos, hypot, inf, radians, sqrt
 from typing import Any, Final, NamedTuple
 
 import msgspec
@@ -318,6 +318,10 @@ _QUIET: Final = frozenset({0, 20, 21, 40, 43, 47, 51, 111, 253})
 _SETTINGS: Final = frozenset({"PARAM_SET", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_CLEAR_ALL"})
 _FENCE: Final = 1
 _NOWHERE: Final = 0x7FFFFFFF
+_REPOSITION: Final = 192
+_MM: Final = 11.132  # in 1e-7 degree
+#: mm: two places that a report of the autopilot's target does not tell apart, by what the estimator makes of them
+_SAME_MM: Final = 1_000
 _ASKS: Final = frozenset({401, 511, 512})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
 #: what DO_SET_MODE is a part of, by its parameters 2 and 3
@@ -390,13 +394,14 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     follows is an exception. So it is where a pilot stops what stands already, told so by us.
     """
     times = [sample.at_us for sample in flown.samples]
-    found, latest, crossed, holds = list[Failure](), None, False, False
+    found, latest, crossed = list[Failure](), None, False
+    last: tuple[Frame, frozenset[MotionKind]] | None = None  # of ours that was obeyed before
     for frame, kinds in motion:
         at = bisect_left(times, frame.sent_us)
         since_us = flown.samples[at].taken_over_us if at < len(times) else None
         if since_us is None or (frame.heard_us or frame.sent_us) <= since_us:
             if frame.heard_us is not None:
-                holds = kinds == {MotionKind.HOLD}
+                last = frame, kinds
             crossed = crossed or (since_us is not None and frame.heard_us == since_us)  # at that very moment
             continue
         after_us = frame.sent_us - since_us
@@ -407,10 +412,25 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
             continue
         text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
         lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
-        stood = holds and excuses.paused_at(since_us) and _is_still(flown.samples[bisect_left(times, since_us)])
+        then = flown.samples[bisect_left(times, since_us)]
+        stood = excuses.paused_at(since_us) and then.in_air and _is_still(then) and _ends_at(last, then)
         cause = "crossed" if crossed else "unseen" if stood else "ground" if lands else None
         found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us, cause))
     return found, latest
+
+
+def _ends_at(last: tuple[Frame, frozenset[MotionKind]] | None, sample: Sample) -> bool:
+    """Whether what stands still there has come to the end of what it was told: to stop there, to climb, or a leg."""
+    if last is None:
+        return False
+    frame, kinds = last
+    if kinds in ({MotionKind.HOLD}, {MotionKind.CLIMB}):
+        return True
+    message = dialect.MAVLink(None).decode(bytearray(frame.octets))
+    if getattr(message, "command", None) != _REPOSITION:
+        return False
+    north, east = (message.x - sample.latitude) * _MM, (message.y - sample.longitude) * _MM
+    return hypot(north, east * cos(radians(sample.latitude / 1e7))) <= _SAME_MM
 
 
 def _name(frame: Frame) -> str:

@@ -26,6 +26,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.scenario import Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.left import left_by
 from rtshcua.onboard.ports import Action, BoundaryKey, Dispatch, Ending, Event, Presented, Readings
 from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
@@ -443,12 +444,14 @@ class _Flight:
         clock = VirtualClock(Now(START.monotonic_us, self._utc_us + self._stepped_us, START.utc_error_us))
         clock.elapsed_us = before.clock.elapsed_us
         self._world.advance(clock.elapsed_us)  # what was said before it listened, nobody heard
-        policy = before.loaded.policy.policy
+        bundle = before.loaded.bundle
+        policy = bundle.policy
         vehicle = VirtualVehicle(
             policy, self._configs[-1], clock, FrameSession(), manoeuvres=manoeuvres(packs_of(policy.sources)),
             tick_us=self._tick_us,
         )  # fmt: skip
         self._connect(vehicle, self._world)
+        vehicle.driver.left = left_by(self._lives[-1].lines, self._bundle, policy, bundle.mission)
         events: list[Event] = []
 
         def hear(until_us: int, enough: Callable[[], object]) -> None:

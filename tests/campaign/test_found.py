@@ -2,10 +2,12 @@
 
 import json
 
+import pytest
+
 from campaign.flying import flown
 from campaign.test_wrong import at, of, slugs
 from rtshcua.model import faults
-from rtshcua.model.faults import Way
+from rtshcua.model.faults import Fault, Mode, Way
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
 
@@ -66,3 +68,71 @@ def test_who_stands_down_on_a_stuck_mode_is_excused() -> None:
     was = flown(of("ardupilot", at(41.2, faults.MessageStuck(0, "HEARTBEAT", 4 * S))))
     assert (was.ending, slugs(was)) == ("stood-down", set())
     assert {each.cause for each in judge(was).exceptions} == {"report"}
+
+
+#: when something of each kind flies in the field's mission: kind, and seconds, by flavour
+FLIES = {
+    ("px4", "climb"): 5, ("px4", "leg"): 13, ("px4", "cover"): 30, ("px4", "hold"): 43, ("px4", "home"): 48,
+    ("ardupilot", "climb"): 5, ("ardupilot", "leg"): 13, ("ardupilot", "cover"): 30, ("ardupilot", "hold"): 40,
+    ("ardupilot", "home"): 46,
+}  # fmt: skip
+PAUSE, GOTO, HOME = (
+    faults.PilotPause(0),
+    faults.PilotGoto(0, -20_000, -20_000, 10_000),
+    faults.PilotMode(0, Mode.RETURN),
+)
+#: of which so many are flown at each `make test`
+_OFTEN = {("px4", "climb", PAUSE), ("px4", "leg", PAUSE), ("ardupilot", "leg", GOTO), ("ardupilot", "cover", HOME)}
+
+
+@pytest.mark.parametrize(
+    ("flavour", "kind", "does"),
+    [
+        pytest.param(
+            flavour, kind, does, id=f"{flavour} {kind} {type(does).__name__}",
+            marks=[] if (flavour, kind, does) in _OFTEN else [pytest.mark.soak],
+        )
+        for flavour, kind in FLIES
+        for does in (PAUSE, GOTO, HOME)
+        # ArduCopter reports no pause, PX4 none of what stands already, and nobody notices a mode that it is in
+        if not (does is PAUSE and (flavour == "ardupilot" or kind == "hold")) and not (does is HOME and kind == "home")
+    ],
+)  # fmt: skip
+def test_who_takes_it_over_while_the_runtime_is_dead_is_not_flown_over(flavour: str, kind: str, does: Fault) -> None:
+    """Its mode was one of ours, so the run that was begun again took it for its own."""
+    at_s = FLIES[flavour, kind]
+    was = flown(of(flavour, at(at_s, faults.RuntimeKilled(0, 3 * S)), at(at_s + 1, does)))
+    assert was.samples[-1].taken_over_by == "pilot"
+    assert (was.ending, slugs(was), judge(was).exceptions) == ("stood-down", set(), ())
+
+
+def test_a_return_that_is_paused_as_it_begins_is_not_taken_for_the_hold_before_it() -> None:
+    """Nothing says yet that it was obeyed; the place is the hold's, but for centimetres."""
+    was = flown(of("px4", at(44.58, faults.RuntimeKilled(0, 200_000)), at(44.8, PAUSE)))
+    assert was.samples[-1].taken_over_by == "pilot"
+    assert (was.ending, slugs(was)) == ("stood-down", set())
+
+
+@pytest.mark.parametrize(
+    ("flavour", "kind"),
+    [pytest.param(*each, marks=[] if each[1] in ("leg", "hold") else [pytest.mark.soak]) for each in FLIES],
+)
+def test_a_run_that_is_begun_again_brings_down_what_nobody_else_flies(flavour: str, kind: str) -> None:
+    was = flown(of(flavour, at(FLIES[flavour, kind], faults.RuntimeKilled(0, 3 * S))))
+    assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
+
+
+def test_what_gets_there_only_after_the_restart_is_not_a_takeover() -> None:
+    """The hold of the recall was still on its way when the process died: its mode showed later, as if somebody chose
+    it, and it was left there.
+    """
+    late, call = at(19, faults.LinkDelay(0, 900_000)), at(20, faults.Recall(0))
+    was = flown(of("ardupilot", late, call, at(20.1, faults.RuntimeKilled(0, 500_000))))
+    assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
+
+
+@pytest.mark.parametrize(("flavour", "at_s"), [("px4", 38.283), ("ardupilot", 35.447)])
+def test_a_leg_that_gets_there_after_the_stop_left_is_not_a_takeover(flavour: str, at_s: float) -> None:
+    """A slow link, as radios are: the run stood down in the air, and nobody else was there."""
+    was = flown(of(flavour, at(1.5, faults.LinkDelay(0, 400_000)), at(at_s, faults.Recall(0))))
+    assert (was.ending, slugs(was), was.samples[-1].in_air) == ("recalled", set(), False)

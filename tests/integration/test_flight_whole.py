@@ -147,7 +147,7 @@ def test_summary_names_the_autopilot(watched: Flown, signed: Flown) -> None:
 
 def test_each_decision_is_written_before_it_is_acted_on(flown: Flown) -> None:
     kinds = [(r["type"], r.get("event") or r.get("outcome")) for r in flown.run.log() if r.get("step") == 1]
-    assert kinds == [("decision", "allow"), ("effect", "dispatched"), ("effect", "succeeded")]
+    assert kinds == [("decision", "allow"), *[("effect", each) for each in ("dispatched", "obeyed", "succeeded")]]
 
 
 def test_sim_ends_cleanly_after_it_served_a_run(signed: Flown) -> None:

@@ -98,6 +98,15 @@ ARDUPILOT = AutopilotFlavour(
     estimator="EKF_STATUS_REPORT",
     natural=frozenset(),
     ours=frozenset({CopterMode.GUIDED, CopterMode.BRAKE, CopterMode.RTL}),
+    shows={
+        MotionKind.CLIMB: _GUIDED,
+        MotionKind.FLY: _GUIDED,
+        MotionKind.COVER: _GUIDED,
+        MotionKind.HOLD: _BRAKE,
+        MotionKind.HOME: frozenset({CopterMode.RTL}),
+        MotionKind.LAND: frozenset({CopterMode.LAND}),
+    },
+    aims=_GUIDED,
     mode_within_us=200_000,  # HEARTBEAT is streamed at twice that rate
     returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
     limits=(

@@ -35,12 +35,14 @@ class _Kept(msgspec.Struct):
 
 class Earlier(NamedTuple):
     """The log before the next one: the hash of its last line, None where there is none or it is not known; what there
-    is to tell of it, empty where all is as it should be; and where it lies, if its flight had not ended it.
+    is to tell of it, empty where all is as it should be; where it lies, if its flight had not ended it; and where it
+    lies, if it may be believed.
     """
 
     last: str | None
     note: str = ""
     broken_off: Path | None = None
+    log: Path | None = None
 
 
 class LastLog:
@@ -57,9 +59,9 @@ class LastLog:
             return Earlier(None, f"it is not known which log came before: `{self.path}`: {_words(error)}")
         if known is None:
             return Earlier(None)
-        if known.last is not None:
-            return Earlier(known.last)
         log = Path(known.log)
+        if known.last is not None:
+            return Earlier(known.last, log=log)
         try:
             return _told(log, known.before, recover(log))._replace(broken_off=log)
         except (OSError, InUse) as error:
@@ -105,9 +107,10 @@ def _told(log: Path, before: str | None, done: Recovered) -> Earlier:
     found = done.found
     if done.done:
         text = f"the log before, `{log}`, was not closed: it is recovered, {found.records} records of it are kept"
-        return Earlier(done.last, text if not found.discarded else f"{text}, {found.discarded} octets discarded")
+        note = text if not found.discarded else f"{text}, {found.discarded} octets discarded"
+        return Earlier(done.last, note, log=log)
     if found.state is State.CLOSED:
-        return Earlier(done.last)
+        return Earlier(done.last, log=log)
     if found.state is State.UNBEGUN:
         return Earlier(before)
     reason = "" if found.reason is None else f" (record {found.reason.record}: {found.reason.text})"

@@ -15,9 +15,6 @@ from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
 
-#: mm: how far from where it is it may say that it takes off, or that it will come to stand;
-_TAKES_OFF, _STOPS = 20_000, 10_000
-_STOPS_S = 3  # and how many seconds' way further, and what braking at 1 m/s^2 takes, if it moves
 _HOLD = frozenset({Px4Mode.HOLD})
 
 
@@ -49,7 +46,7 @@ def _climb(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
     own = frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD})
     takeoff = messages.command(system, messages.TAKEOFF, NAN, 0, 0, NAN, NAN, NAN, amsl / 1_000)
     rises = flavour.climbing(height)
-    above = ExpectedTarget(seen.latitude, seen.longitude, amsl, _TAKES_OFF)
+    above = ExpectedTarget(seen.latitude, seen.longitude, amsl, flavour.TAKES_OFF)
     begun = effects.in_mode(Px4Mode.TAKEOFF)
     return [
         flavour.entering(system, Px4Mode.HOLD),
@@ -61,10 +58,7 @@ def _climb(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
 
 def _stop(seen: ObservedVehicle, system: int) -> Stage:
     """Not DO_SET_MODE: in Hold already, flying to a place, PX4 acknowledges that and flies on (vehicles.md 5)."""
-    speed = seen.speed or 0
-    within = _STOPS + _STOPS_S * speed + speed * speed // 2_000
-    here = ExpectedTarget(seen.latitude, seen.longitude, None, within) if seen.located else None
-    stop = messages.stop_here(system)
+    stop, here = messages.stop_here(system), flavour.stopping(seen)
     return Stage(stop, messages.REPOSITION, None, _HOLD, flavour.MODE_US, powered=True, target=here, stops=True)
 
 
@@ -76,6 +70,15 @@ PX4 = AutopilotFlavour(
     estimator="ESTIMATOR_STATUS",
     natural=frozenset({(Px4Mode.TAKEOFF, Px4Mode.HOLD)}),
     ours=frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD, Px4Mode.RETURN}),
+    shows={
+        MotionKind.CLIMB: frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD}),  # armed in Hold, and in Hold again above
+        MotionKind.FLY: _HOLD,
+        MotionKind.COVER: _HOLD,
+        MotionKind.HOLD: _HOLD,
+        MotionKind.HOME: frozenset({Px4Mode.RETURN}),
+        MotionKind.LAND: frozenset({Px4Mode.LAND}),
+    },
+    aims=frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD}),
     mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
     limits=(

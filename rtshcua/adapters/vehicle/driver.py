@@ -13,6 +13,7 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.preflight import Preflight
+from rtshcua.adapters.vehicle.restart import arrives, flown_by, modes_of
 from rtshcua.adapters.vehicle.source_time import EACH_US, SourceTime
 from rtshcua.adapters.vehicle.streams import AT_TIMES, IN_THE_AIR, PATIENCE_US, StreamPlan, StreamRequests, plan_streams
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
@@ -28,6 +29,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.frames import OURS, Gate
+from rtshcua.onboard.left import Left
 from rtshcua.onboard.ports import Command, Event, Said
 
 HEARTBEAT_US = 1_000_000
@@ -103,6 +105,8 @@ class Driver:
         self._asked_utc_us = 0
         #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
         self.resumes = False
+        #: and what that run may have left it doing; None: nobody knows
+        self.left: Left | None = None
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
         self._others: str | None = None  # what showed that somebody else flies it: nothing of ours is begun any more
@@ -237,7 +241,7 @@ class Driver:
         if self._others is not None:  # also where this was on its way while the takeover showed
             return [ports.Failed(now_us, command.token, "taken-over", self._others)], []
         self.link.begin()
-        before = frozenset[int]() if self._manoeuvre is None else self._manoeuvre.modes
+        before = modes_of(self.left, flavour) if self._manoeuvre is None else self._manoeuvre.modes
         own = self._manoeuvres.get(f"{flavour.name}.{command.skill}")  # else it is flown as any skill of its kind
         way = own or self._manoeuvres.get(flavour.name, flavour.stages)
         try:
@@ -368,7 +372,9 @@ class Driver:
         mode, flavour = self.seen.mode, self.flavour
         if self._manoeuvre is not None or self._released or not self.seen.airborne or mode is None or flavour is None:
             return
-        if before not in (None, mode) and (before, mode) not in flavour.natural:
+        if before in (None, mode) or (before, mode) in flavour.natural:
+            return
+        if not arrives(self.left, flavour, before, mode):
             self._others = flavour.mode_name(mode)
             events.append(ports.TakenOver(now_us, self._others))
 
@@ -435,12 +441,16 @@ class Driver:
 
     def _flown_by_others(self) -> str:
         """How it flies already, if nothing of ours would make it; what lands is left to it."""
-        seen, flavour = self.seen, self.flavour
+        seen, flavour, left = self.seen, self.flavour, self.left
         if not self._flies or flavour is None or seen.mode is None:
             return ""
         if seen.landing:
             return "landing"
-        return "" if seen.mode in flavour.ours else flavour.mode_name(seen.mode)
+        if seen.mode not in flavour.ours:
+            return flavour.mode_name(seen.mode)
+        if left is None or any(f"{flavour.name}.{each.command.skill}" in self._manoeuvres for each in left.in_force):
+            return ""  # nobody knows in which modes a pack's own way flies
+        return flown_by(left, flavour, seen)
 
     def _is_ready(self, now_us: int) -> bool:
         """In the air it need not be fit to arm, but what brings it home is chosen by what is known of it. So it must

@@ -20,6 +20,10 @@ ARM_US: Final = 8_000_000
 SAME: Final = 3_000
 #: and after that: each target of each recorded flight was reported to the same digit until the next command came
 KEPT: Final = 500
+#: mm: how far from where it is it may say that it takes off, or that it will come to stand;
+TAKES_OFF: Final = 20_000
+_STOPS: Final = 10_000
+_STOPS_S: Final = 3  # and how many seconds' way further, and what braking at 1 m/s^2 takes, if it moves
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +42,18 @@ class ExpectedTarget:
     level: int = SAME
     told: bool = True
 
+    @property
+    def place(self) -> Reported:
+        """The place; of a height that may be any, 0."""
+        return self.latitude, self.longitude, self.amsl or 0
+
     def as_reported(self, reported: Reported) -> "ExpectedTarget":
         """What is expected once it was reported: just that."""
         return replace(self, latitude=reported[0], longitude=reported[1], amsl=reported[2], within=KEPT, level=KEPT)
+
+    def is_given(self, reported: Reported) -> bool:
+        """Whether a report is of a place that we gave, and that was not reported before."""
+        return self.within == SAME and self.amsl is not None and self.as_reported(self.place).matches(reported)
 
     def matches(self, reported: Reported) -> bool:
         """Whether a report is of this target."""
@@ -114,7 +127,9 @@ class AutopilotFlavour:
     """An autopilot: its name, the names of its modes, how it is made to do each kind of motion, and its own ways.
 
     `estimator` is the message in which its estimator reports. `natural` are changes of mode (from, to) that it makes
-    in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay.
+    in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay, `shows`
+    those that it is in, armed, that was told to do a kind of motion and nothing since, however far it came; `aims` are
+    those in which it names the target that it was given.
     `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
     top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
     there, `limits` groups of such that lower or lift a return. `critical_acts`: a critical state in the air says that a
@@ -129,6 +144,8 @@ class AutopilotFlavour:
     estimator: str
     natural: frozenset[tuple[int, int]]
     ours: frozenset[int]
+    shows: Mapping[int, frozenset[int]]
+    aims: frozenset[int]
     mode_within_us: int
     returns: tuple[ReturnAltitude, ...]
     limits: tuple[tuple[ReturnLimit, ...], ...]
@@ -143,6 +160,13 @@ class AutopilotFlavour:
 
 
 # ---------------------------------------------------------------- what both fly alike
+
+
+def stopping(seen: ObservedVehicle) -> ExpectedTarget | None:
+    """Where it may say that it will come to stand, told to stop now; None while it is not known where it is."""
+    speed = seen.speed or 0
+    within = _STOPS + _STOPS_S * speed + speed * speed // 2_000
+    return ExpectedTarget(seen.latitude, seen.longitude, None, within) if seen.located else None
 
 
 def entering(system: int, mode: Px4Mode | CopterMode) -> Stage:

@@ -10,12 +10,12 @@ from typing import Final
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.effects import apart, still
-from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, Stage
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.supervision import MODE_BEATS, NEVER, Brakes, BrakingWatch, StageProgress, TargetWatch
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Command, Event, Failed, Succeeded, TakenOver
+from rtshcua.onboard.ports import Command, Event, Failed, Obeyed, Succeeded, TakenOver
 
 RETRY_US = 1_000_000
 RETRIES = 5
@@ -241,9 +241,13 @@ class Manoeuvre:
         self._held_us: int | None = None
         self._stands: tuple[int, int] | None = None
         self._before = before if seen.mode is None else before | {seen.mode}
+        self._began_in = seen.mode
         self._modes: frozenset[int] = frozenset()
         self._was_landing = seen.landing
         self._taken = False
+        self._aimed = False  # the frame is out that says where to go, or to go nowhere,
+        self._named: ExpectedTarget | None = None  # and it was seen to be obeyed, by this target of ours that it named
+        self._shown = False  # or by its mode
         self._accepted: tuple[int, int] | None = None  # when the present stage was, and after how many heartbeats
         self._changed = False  # something was sent, or another stage begun: what that does is still to be looked at
         self.over = False
@@ -266,9 +270,11 @@ class Manoeuvre:
     def advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         """Messages to send and events, after something was observed or time went by."""
         self._changed = False
-        out = self._advance(seen, now_us)
+        send, events = self._advance(seen, now_us)
+        if self._is_newly_obeyed(seen):
+            events = [Obeyed(now_us, self.token, seen.target if self._aids.targets.compares else None), *events]
         self.due_us = now_us if self._changed else self._due_us(seen, now_us)
-        return out
+        return send, events
 
     def _advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         how = self._taken_over(seen)
@@ -326,6 +332,7 @@ class Manoeuvre:
         target = self._left[0].target
         if target is not None or self._command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
             self._aids.targets.expect(target, seen)
+            self._aimed = True
         if self._left[0].spare and self._is_done(seen):
             return []  # the next one may leave at once
         self._aids.query.sent()
@@ -436,6 +443,21 @@ class Manoeuvre:
             self._accepted = seen.up_us, seen.beats
         accepted_us, beats = self._accepted
         return seen.up_us - accepted_us > TAKEN_BACK_US and seen.beats - beats >= MODE_BEATS
+
+    def _is_newly_obeyed(self, seen: ObservedVehicle) -> bool:
+        """Whether it shows now, and did not before, that the vehicle does this, and not what it was told before.
+
+        By its target, each time that it names another of ours; where it names none, once by its mode: that is another
+        one now, or the same and was accepted.
+        """
+        targets = self._aids.targets
+        if not self._aimed or self._waits or self._taken or seen.mode not in self._modes:
+            return False
+        if targets.compares:
+            before, self._named = self._named, targets.named or self._named
+            return self._named is not before
+        before_it, self._shown = self._shown, self._shown or seen.mode != self._began_in or self._commander.accepted
+        return self._shown and not before_it
 
     def _failure(self, seen: ObservedVehicle) -> str | None:
         """Why the present stage cannot be waited for any longer, as a slug."""

@@ -154,6 +154,11 @@ class TargetWatch:
         """Whether there is a target of ours of which the autopilot's report is worth waiting for."""
         return self._expected is not None and self._expected.told
 
+    @property
+    def named(self) -> ExpectedTarget | None:
+        """The present target as the vehicle named it; None before it did."""
+        return self._expected if self.shown else None
+
     def expect(self, target: ExpectedTarget | None, seen: ObservedVehicle) -> None:
         """From now on this is what it should fly to; None: nothing that could be compared.
 
@@ -190,6 +195,8 @@ class TargetWatch:
             return self._has_strayed(reported, seen.beats)
         if reported == self._prior and not self.shown:
             return False  # not obeyed yet; when it never is, there is no progress
+        if not self.shown and not expected.is_given(reported) and self._is_late(reported):
+            return False  # a stop might end there
         if expected.matches(reported):
             self._show(expected, reported)
             return False
@@ -213,12 +220,16 @@ class TargetWatch:
 
         Where our command itself is why, two heartbeats after that tell its mode.
         """
-        if self._left is None or _same(self._left, reported):
+        if self._left is None or _same(self._left, reported) or self._is_late(reported):
             self._strayed = None
             return False
         if self._strayed is None:
             self._strayed = beats
         return beats - self._strayed >= MODE_BEATS
+
+    def _is_late(self, reported: Reported) -> bool:
+        """Whether this is the place of a command before, which was on its way still when the present one left."""
+        return any(ours.is_given(reported) for ours in self._ours if ours is not self._expected)
 
     def _show(self, expected: ExpectedTarget, reported: Reported) -> None:
         if not self.shown:  # this is the one, from now on

@@ -1,5 +1,6 @@
 """A log as a timeline. Nothing is verified here; a line that is no record ends it."""
 
+import re
 from base64 import b64decode
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -16,12 +17,15 @@ from rtshcua.evidence.note import parse, read_signature, split
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.anchors import ANCHORED
+from rtshcua.onboard.runtime.dispatcher import OBEYED
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
 #: effects whose detail is a signed document
 DOCUMENTS = ("approval", "recall", "replacement", "cancellation")
 
+#: the target in the detail of what was obeyed: 1e-7 degree, and mm above the sea
+_TARGET = re.compile(r"(-?\d{1,10}) (-?\d{1,10}) (-?\d{1,10})", re.ASCII)
 _KINDS = {STEP: "step", FALLBACK_LINK: "fallback of step", CONTINGENCY_LINK: "contingency"}
 
 
@@ -52,6 +56,9 @@ def detail_of(event: str, detail: str) -> str:
         return recorded(detail)
     if event == ANCHORED:
         return _witnessed(detail)
+    if event == OBEYED and (target := _TARGET.fullmatch(detail)) is not None:
+        latitude, longitude, up = map(int, target.groups())
+        return f"it flies to {latitude / 1e7:.7f}, {longitude / 1e7:.7f}, {up / 1_000:.1f} m above the sea"
     return f"the same answer again, {detail} times" if event == "repeated" else detail
 
 

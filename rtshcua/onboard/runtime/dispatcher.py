@@ -7,7 +7,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Executor
-from rtshcua.onboard.ports import Command, Dispatch, Frozen, Release
+from rtshcua.onboard.ports import Command, Dispatch, Frozen, Obeyed, Release
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
@@ -15,6 +15,8 @@ from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 CONSERVATIVE_US = 20_000
 WINDOW = 128
 _ENOUGH = 8
+#: that the vehicle was seen to do what was dispatched; the detail is the target that it named, if it did
+OBEYED: Final = "obeyed"
 #: what is recorded of a fallback that was sent home or down, and ended without word of a landing
 UNCONFIRMED: Final = "it was sent, and not confirmed: no landing was seen"
 _UNCONFIRMED = ("time-over", "released")
@@ -102,6 +104,15 @@ class Dispatcher:
         active = self.flying(token)
         if active is not None:
             self._remaining.measured(at_us - active.since_us)
+
+    def obeyed(self, now: Now, event: Obeyed) -> None:
+        """A command was seen to be done: whoever goes on after this process knows that nothing before it is in force.
+
+        The record names no token, for one that does says how a command ended.
+        """
+        active = self.flying(event.token)
+        if active is not None:
+            self._journal.effect(now, OBEYED, active.ref, detail=" ".join(map(str, event.target or ())))
 
     def flying(self, token: int) -> Active | None:
         """The command that flies, if it is this one: a late word about another one means nothing any more."""

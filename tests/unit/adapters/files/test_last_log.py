@@ -34,7 +34,7 @@ def test_the_first_log_has_none_before_it(last: LastLog) -> None:
 def test_a_closed_log_is_remembered_and_not_read_again(last: LastLog, tmp_path: Path) -> None:
     last.begin(tmp_path / "gone", None)
     last.end(tmp_path / "gone", None, "ab" * 32)
-    assert last.settle(mend) == Earlier("ab" * 32)
+    assert last.settle(mend) == Earlier("ab" * 32, log=tmp_path / "gone")
     assert [entry.name for entry in last.path.parent.iterdir()] == ["vehicle-quad%2007%2F%C3%A9"]
 
 
@@ -46,7 +46,7 @@ def test_a_log_that_broke_off_is_recovered(last: LastLog, tmp_path: Path, more: 
     assert earlier.last == recover(path, signer(Random(2))).last
     assert told in earlier.note
     assert unverified(path, lines, len(lines)) == ""
-    assert last.settle(mend) == Earlier(earlier.last, broken_off=path)
+    assert last.settle(mend) == Earlier(earlier.last, broken_off=path, log=path)
 
 
 def test_a_log_that_never_began_is_passed_over(last: LastLog, tmp_path: Path) -> None:

@@ -415,3 +415,26 @@ def test_before_a_command_without_a_target_shows_another_target_is_a_takeover() 
     assert targets.is_foreign(seen)
     targets.obeyed()
     assert not targets.is_foreign(seen)
+
+
+def test_a_leg_that_gets_there_after_the_stop_left_is_not_a_takeover() -> None:
+    """Its place was taken for that of the stop, or for somebody else's: the run stood down, and it was left there."""
+    here, leg, other = ((latitude, 80_000_000, 500_000) for latitude in (470_000_000, 470_000_500, 470_000_200))
+    for stop in (ExpectedTarget(here[0], here[1], None, within=10_000), None):
+        targets, seen = TargetWatch(), ObservedVehicle()
+        targets.expect(ExpectedTarget(*here), seen)
+        seen.target = here
+        assert not targets.is_foreign(seen)
+        targets.expect(ExpectedTarget(*leg), seen)  # still on its way when
+        targets.expect(stop, seen)  # this leaves
+        for beats, up_us in enumerate((S, 4 * S, 5 * S)):
+            seen.beats, seen.up_us, seen.target = beats, up_us, leg
+            assert not targets.is_foreign(seen)
+            assert not targets.shown
+        if stop is None:
+            continue
+        seen.target = other
+        assert not targets.is_foreign(seen)
+        assert targets.named is not None
+        seen.target = leg
+        assert targets.is_foreign(seen), "somebody sends it there again"

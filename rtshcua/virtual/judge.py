@@ -320,8 +320,8 @@ _FENCE: Final = 1
 _NOWHERE: Final = 0x7FFFFFFF
 _REPOSITION: Final = 192
 _MM: Final = 11.132  # in 1e-7 degree
-#: mm: two places that a report of the autopilot's target does not tell apart, by what the estimator makes of them
-_SAME_MM: Final = 1_000
+#: mm: how far from its target it may stand, for all that its reports tell: half a metre, and its estimator's error
+_SAME_MM: Final = 2_000
 _ASKS: Final = frozenset({401, 511, 512})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
 #: what DO_SET_MODE is a part of, by its parameters 2 and 3

@@ -136,3 +136,11 @@ def test_a_leg_that_gets_there_after_the_stop_left_is_not_a_takeover(flavour: st
     """A slow link, as radios are: the run stood down in the air, and nobody else was there."""
     was = flown(of(flavour, at(1.5, faults.LinkDelay(0, 400_000)), at(at_s, faults.Recall(0))))
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("recalled", set(), False)
+
+
+def test_a_pause_where_a_leg_had_ended_is_excused() -> None:
+    """Its target is where it was: no report tells."""
+    was = flown(of("px4", at(11.3, faults.RuntimeKilled(0, 11 * S)), at(22.27, PAUSE)))
+    assert was.samples[-1].taken_over_by == "pilot"
+    assert slugs(was) == set()
+    assert {each.cause for each in judge(was).exceptions} == {"unseen"}

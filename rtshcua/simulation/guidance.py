@@ -30,10 +30,7 @@ def towards(body: Body, north: float, east: float, speed: float, approach: Appro
         return 0.0, 0.0
     # Where it will be by the time that it has turned over, so that it does not slow down too late.
     closing = (north * body.v_north + east * body.v_east) / distance if distance > _NEAR_M else 0.0
-    left = distance - closing * LEAD_S
-    most = approach.speed(left if left > 0.0 else 0.0)
-    if most < speed:
-        speed = most
+    speed = min(speed, approach.speed(max(distance - closing * LEAD_S, 0.0)))
     return north / distance * speed, east / distance * speed
 
 

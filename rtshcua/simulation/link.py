@@ -27,7 +27,7 @@ class Link:
         self._order = count()
         self._free_us = 0
         self.under_way: list[tuple[int, int, bytes]] = []
-        """What was sent and has not arrived: (when it does, its place in the order of sending, the datagram), a heap."""
+        """What was sent and has not arrived, a heap: when it does, its place in the order of sending, the datagram."""
         self._waiting: list[bytes] = []
 
     def send(self, datagram: bytes, now_us: int) -> None:

@@ -43,10 +43,10 @@ class VirtualClock:
 class VirtualVehicle:
     """Steps the simulation tick by tick; what would be datagrams are method calls.
 
-    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt`, if
-    it is set, gives the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is begun counts as
-    permitted. `verifier`, `fence`, `manoeuvres` and `steps` are the driver's. Every `tick_us` it hears what was
-    said since.
+    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt`, if it
+    is set, gives the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is
+    begun counts as permitted. `verifier`, `fence`, `manoeuvres` and `steps` are the driver's. Every `tick_us` it hears
+    what was said since.
     """
 
     def __init__(

@@ -195,9 +195,7 @@ class Driver:
         aged = self.seen.pass_time(now_us)
         self._watch.strict = self._watch.strict or self.seen.airborne  # what is sent to it there has to arrive
         if now_us >= self.source.clock.due_us:
-            ts1_ns = self.source.clock.due(now_us)
-            if ts1_ns is not None:
-                send.append(messages.time_sync(ts1_ns))
+            send += self._ask_time(now_us)
         if self.asks_utc and now_us - self._asked_utc_us >= EACH_US:
             self._asked_utc_us = now_us
             send.append(messages.request(self.system, "SYSTEM_TIME"))
@@ -218,16 +216,12 @@ class Driver:
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
         if self.seen.notes or self.stream_requests.notes or self.preflight.notes:
-            for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes):
-                events += [ports.Noted(now_us, text) for text in notes]
-                notes.clear()
+            self._note(now_us, events)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         frames = self._pack(send, now_us, events) if send else []
         if self.settings.outstanding:
-            out, refused = self.link.pack(self.settings.due(self.system, now_us), now_us)
-            frames += out
-            self.settings.refused = refused[0] if refused else self.settings.refused
+            frames += self._set_parameters(now_us)
         return events, frames
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
@@ -419,6 +413,22 @@ class Driver:
                 self._others = event.how
         if manoeuvre.waits:
             send += self._ask(now_us)
+
+    def _note(self, now_us: int, events: list[Event]) -> None:
+        for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes):
+            events += [ports.Noted(now_us, text) for text in notes]
+            notes.clear()
+
+    def _ask_time(self, now_us: int) -> list[Message]:
+        """Ask for the vehicle's clock, if it is time to."""
+        ts1_ns = self.source.clock.due(now_us)
+        return [] if ts1_ns is None else [messages.time_sync(ts1_ns)]
+
+    def _set_parameters(self, now_us: int) -> list[bytes]:
+        """The frames that read or set a parameter now, as far as the boundary lets them out."""
+        frames, refused = self.link.pack(self.settings.due(self.system, now_us), now_us)
+        self.settings.refused = refused[0] if refused else self.settings.refused
+        return frames
 
     def _ask(self, now_us: int) -> list[Message]:
         """Ask who flies, if it is time to."""

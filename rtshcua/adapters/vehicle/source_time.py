@@ -103,8 +103,9 @@ class VehicleClock:
         if self._asked_us is not None:
             wait_us = self._wait_us(now_us)
             if now_us - self._asked_us < wait_us:
-                missed_us = now_us if self.answered_us is None else self.answered_us + MISSED_US
-                self.due_us = self._asked_us + wait_us if wait_us < EACH_US else min(self._asked_us + wait_us, missed_us)
+                self.due_us = self._asked_us + wait_us
+                if self.answered_us is not None and wait_us == EACH_US:  # but sooner, where an answer is missed
+                    self.due_us = min(self.due_us, self.answered_us + MISSED_US)
                 return None
         self._asked_us, self._doubted, self.due_us = now_us, False, 0
         ts1_ns = now_us * 1_000 + OURS

@@ -216,7 +216,7 @@ class Driver:
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
         if self.seen.notes or self.stream_requests.notes or self.preflight.notes:
-            self._note(now_us, events)
+            self._tell_notes(now_us, events)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         frames = self._pack(send, now_us, events) if send else []
@@ -414,7 +414,7 @@ class Driver:
         if manoeuvre.waits:
             send += self._ask(now_us)
 
-    def _note(self, now_us: int, events: list[Event]) -> None:
+    def _tell_notes(self, now_us: int, events: list[Event]) -> None:
         for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes):
             events += [ports.Noted(now_us, text) for text in notes]
             notes.clear()

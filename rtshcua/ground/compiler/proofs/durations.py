@@ -78,7 +78,7 @@ def prove(
         limit = own or skill.duration
         assert limit is not None
         nearer = _nearer(ground, step, invocation, starts[0].height, takes, min(fits, contract.duration_us))
-        _too_long(ground, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest.speed)
+        _too_long(ground, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest)
     energy = charge(speeds, time_us)
     # of a return the mission's bound counts the way home, if that is more
     home = invocation.invocation.plan.kind == MotionKind.HOME

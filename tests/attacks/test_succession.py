@@ -279,13 +279,13 @@ def test_what_comes_down_keeps_its_evidence_elsewhere_where_no_run_can_lie(
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     Path("runs").touch()
     with pytest.raises(OSError, match="directory"):
-        launch._run_folder(order(), b"bundle", SystemClock(), resumed=False)
-    run, told = launch._run_folder(order(), b"bundle", SystemClock(), resumed=True)
+        launch._run_folder(order(), launched(order()), b"bundle", SystemClock(), resumed=False)
+    run, told = launch._run_folder(order(), launched(order()), b"bundle", SystemClock(), resumed=True)
     assert (run.path / "mission.bundle").read_bytes() == b"bundle"
     assert run.path.is_relative_to(tmp_path)
     assert str(run.path) in told
     Path("runs").unlink()
-    run, told = launch._run_folder(order(), b"bundle", SystemClock(), resumed=True)
+    run, told = launch._run_folder(order(), launched(order()), b"bundle", SystemClock(), resumed=True)
     assert (run.path.parent, told) == (Path("runs"), "")
 
 

@@ -80,5 +80,5 @@ class BoundarySession:
             self._keep(digest)
 
     def _keep(self, digest: bytes) -> None:
-        if self.key is not None:
+        if self.key is not None and self.key.session:  # what is damaged stays so, for a person to see
             self._store.keep(self.key.session, digest)

@@ -41,7 +41,7 @@ _DOCUMENTS: Final = {
     "cancellation": receipt.CANCELLATION,
 }  # fmt: skip
 _UNDECIDED: Final = re.compile(r"([a-z_]+) ([0-9a-f]{64})")
-_HEX: Final = re.compile(r"(?:[0-9a-f]{2})*")
+_BINDING: Final = re.compile(rf"[0-9a-f]{{{2 * DIGEST_BYTES}}}")
 _WRITES: Final = re.compile(r"(set|restore) ([^,]++(?:, [^,]++)*+)")
 _WRITE: Final = re.compile(r"([A-Z0-9_]{1,16}) from (\S+) to (\S+)", re.ASCII)
 _NONE: Final = Claim(
@@ -248,16 +248,17 @@ def entry_of(record: Decision | Effect) -> Entry | Flaw | None:
 
 
 def _decided(record: Decision) -> Entry | None:
-    outcome, reason, binding = _OUTCOMES.get(record.outcome), _REASONS.get(record.reason), _hex(record.binding)
+    outcome, reason = _OUTCOMES.get(record.outcome), _REASONS.get(record.reason)
     state, given = record.state, record.context
-    if outcome is None or reason is None or len(binding) != DIGEST_BYTES:
+    if outcome is None or reason is None or _BINDING.fullmatch(record.binding) is None:
         return None
     if len(state.values) > MAX_SLOTS or len(state.monitors) > MAX_MONITORS or len(state.ages) != len(state.values):
         return None
     now = Now(record.at_us, record.utc_us, record.utc_error_us)
+    read = State(state.values, state.ages, state.monitors)
     asked = Request(
-        record.kind, record.step, record.link, binding, now, State(state.values, state.ages, state.monitors),
-        given.released_us, given.phase, given.remaining_us,
+        record.kind, record.step, record.link, bytes.fromhex(record.binding), now, read, given.released_us, given.phase,
+        given.remaining_us,
     )  # fmt: skip
     return _packed(
         Tag.DECIDED,
@@ -271,10 +272,6 @@ def _decided(record: Decision) -> Entry | None:
             given.consumed,
         ),
     )
-
-
-def _hex(text: str) -> bytes:
-    return bytes.fromhex(text) if _HEX.fullmatch(text) else b""
 
 
 def _packed(tag: Tag, payload: Callable[[], bytes]) -> Entry | None:

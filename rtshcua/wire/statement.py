@@ -59,12 +59,21 @@ def sign(statement: Statement, key: SigningKey) -> bytes:
     return cose.sign1(payload, key=key, duty=Duty.BOUNDARY, content_type=names.STATEMENT.content_type)
 
 
+def claimed(data: bytes) -> Statement:
+    """What a statement says, whoever signed it. Raises as `open_statement`."""
+    return _read(cose.unverified(data, limit=MAX_STATEMENT).payload)
+
+
 def open_statement(data: bytes, keys: Mapping[bytes, VerificationKey]) -> Statement:
     """What one of the keys (by `kid`) signed. Raises `EnvelopeError`, `ArtefactError` and `StatementError`."""
     opened = cose.open1(
         data, keys=keys, duty=Duty.BOUNDARY, content_type=names.STATEMENT.content_type, limit=MAX_STATEMENT
     )
-    said = artefact.unpack(names.STATEMENT, opened.payload, Statement, StatementError, "statement of a boundary")
+    return _read(opened.payload)
+
+
+def _read(payload: bytes) -> Statement:
+    said = artefact.unpack(names.STATEMENT, payload, Statement, StatementError, "statement of a boundary")
     digests = {len(said.before), len(said.digest), len(said.left), len(said.aside)}
     numbers = (said.session, said.count, *counted(said))
     fits = len(said.marks) % MARK_BYTES == 0 and len(said.marks) <= MARK_BYTES * MOST_MARKS

@@ -12,6 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference import log_vectors as vectors
+from reference.attested_flight import attested
 from reference.documents import approval, hand, low
 from reference.flat_case import ISSUED, S
 from reference.forgery import edit, read, signed
@@ -136,6 +137,16 @@ def test_where_a_root_between_is_missing_nobody_knows_when() -> None:
     assert found(judged(third, newer(BEFORE, version=2))) == ("verified", "", -1), "it did not revoke it"
     assert found(judged(newer(BEFORE, MISSION_KEY), third)) == ("failed", "trust/revoked-key", 0)
     assert found(judged(newer(BEFORE, MISSION_KEY, version=3))) == ("failed", "trust/revoked-key", 0)
+
+
+def test_a_boundary_key_that_was_revoked() -> None:
+    own = case.root(boundary=True)[0]
+    (last,) = [n for n, line in enumerate(attested()) if read(line).get("event") == "boundary"][-1:]
+    for issued_us, verdict, slug in ((ISSUED, "failed", "trust/revoked-key"), (AFTER, "verified", "")):
+        root = newer(issued_us, case.BOUNDARY_KEY, of=own, by=case.KEYS[Duty.ROOT])
+        report = judged(root, lines=attested(), pinned=VECTORS_KEY)
+        assert found(report) == (verdict, slug, last if slug else -1)
+        assert slug or told(report) == {"revoked"}
 
 
 def test_what_was_signed_as_it_was_revoked_may_be_either() -> None:

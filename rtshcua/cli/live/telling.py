@@ -4,10 +4,12 @@ from collections.abc import Iterator
 
 import msgspec
 
+from rtshcua.adapters.preparation import PERMITTED
 from rtshcua.cli.live.story import Happening, Plan, Signal, Step
 from rtshcua.cli.showing.log import detail_of
 from rtshcua.cli.showing.words import call, duration
 from rtshcua.cli.unconfirmed import is_unconfirmed
+from rtshcua.evidence.chain import BOUNDARY
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
@@ -19,6 +21,8 @@ from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 REPLACED = "replacement"
 #: what flies instead of a step that is not admitted before anything flew
 NOTHING_FLIES = "nothing: it has not left the ground, and nothing is sent"
+#: what the boundary makes of what was told anyway
+_UNTOLD = frozenset({BOUNDARY, PERMITTED})
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
 
 
@@ -95,7 +99,7 @@ class Teller:
                 "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail,
                 waits,
             )  # fmt: skip
-        if record.type != "effect":
+        if record.type != "effect" or record.event in _UNTOLD:
             return None
         self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
         if record.event == "succeeded" and record.kind == STEP:

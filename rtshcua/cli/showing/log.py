@@ -12,12 +12,14 @@ from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.cli.showing.document import recorded
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import many, true_to, utc
+from rtshcua.evidence.chain import BOUNDARY
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.note import parse, read_signature, split
+from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.onboard.runtime.dispatcher import OBEYED
+from rtshcua.wire import statement
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
@@ -59,7 +61,19 @@ def detail_of(event: str, detail: str) -> str:
     if event == OBEYED and (target := _TARGET.fullmatch(detail)) is not None:
         latitude, longitude, up = map(int, target.groups())
         return f"it flies to {latitude / 1e7:.7f}, {longitude / 1e7:.7f}, {up / 1_000:.1f} m above the sea"
+    if event == BOUNDARY:
+        return _stated(detail)
     return f"the same answer again, {detail} times" if event == "repeated" else detail
+
+
+def _stated(detail: str) -> str:
+    """How far the boundary says that it got; whether it does, `verify-log --audit` says."""
+    try:
+        said = statement.claimed(octets(detail) or b"")
+    except Untrusted:
+        return "no statement"
+    ends = ", and it ends there" if said.final else ""
+    return f"session {said.session} has {said.count} entries and {said.frames} frames of commands{ends}"
 
 
 def _witnessed(note: str) -> str:

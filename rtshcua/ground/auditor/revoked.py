@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Final, NamedTuple
 
+from rtshcua.evidence.chain import BOUNDARY
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Effect, Genesis
@@ -59,16 +60,20 @@ class RevokedKeys:
     def __init__(self, roots: Iterable[bytes]) -> None:
         self._roots = {signed: _opened(signed) for signed in roots}
         self._documents: list[Use] = []
+        self._statements: dict[bytes, Use] = {}  # of each boundary key the last
         self._read = False
 
     def take(self, record: AnyRecord) -> None:
-        """One sound record. Whether a document in it is one is for the audit to say."""
+        """One sound record. Whether a document or a statement in it is one is for the audit to say."""
         self._read = True
-        if not self._roots or not isinstance(record, Effect) or record.event not in KINDS:
+        if not self._roots or not isinstance(record, Effect) or record.event not in (*KINDS, BOUNDARY):
             return
         with suppress(Untrusted):
             kid = _signer(octets(record.detail) or b"", MAX_DOCUMENT)
             times = _between(record.utc_us, record.utc_error_us)
+            if record.event == BOUNDARY:
+                self._statements[kid] = Use("what the boundary made", kid, record.seq, *times)
+                return
             self._documents.append(Use(f"the {record.event}", kid, record.seq, *times, document=True))
 
     def judged(self, audit: Audit) -> Audit:
@@ -106,6 +111,7 @@ class RevokedKeys:
             Use("the log", bytes.fromhex(genesis.log_kid), 0, *times),
             Use("the policy", _signer(policy, MAX_BUNDLE), 0, *times),
             Use("the mission", _signer(mission, MAX_BUNDLE), 0, *times),
+            *self._statements.values(),
             *self._documents,
         ]
 

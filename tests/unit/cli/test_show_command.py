@@ -9,12 +9,14 @@ import pytest
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from reference.forgery import edit, flight, other_flight
+from reference.attested_flight import attested
+from reference.forgery import edit, flight, other_flight, read
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.cli import app
 from rtshcua.cli.showing import words
+from rtshcua.cli.showing.log import detail_of
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.showing.policy import show_policy
 from rtshcua.cli.shown import shorten, utc
@@ -311,3 +313,11 @@ def test_text_from_elsewhere() -> None:
     assert utc(0) == "1970-01-01 00:00:00Z"
     assert utc(-1) == "-1 us"
     assert utc(1 << 60) == f"{1 << 60} us"
+
+
+def test_a_statement_of_the_boundary_says_how_far_it_got() -> None:
+    said = [detail_of("boundary", read(line)["detail"]) for line in attested() if read(line).get("event") == "boundary"]
+    assert said[0] == "session 1 has 1 entries and 0 frames of commands"
+    assert said[-1].startswith("session 1 has 11 entries and ")
+    assert said[-1].endswith(" frames of commands, and it ends there")
+    assert detail_of("boundary", "nonsense") == "no statement"

@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import Duty, SigningKey, WrongDuty
-from rtshcua.wire.statement import MAX_STATEMENT, Statement, open_statement, sign
+from rtshcua.wire.statement import MAX_STATEMENT, Statement, claimed, open_statement, sign
 from rtshcua.wire.untrusted import Untrusted
 from virtual.rows import rows
 
@@ -23,7 +23,7 @@ def slug(data: bytes) -> str:
 
 
 def test_what_is_signed_is_read_back() -> None:
-    assert open_statement(sign(SAID, KEY), KEYS) == SAID
+    assert open_statement(sign(SAID, KEY), KEYS) == claimed(sign(SAID, KEY)) == SAID
     whole = replace(SAID, marks=b"m" * 1024, count=(1 << 63) - 1, final=True)
     assert open_statement(sign(whole, KEY), KEYS) == whole
     assert len(sign(whole, KEY)) < MAX_STATEMENT

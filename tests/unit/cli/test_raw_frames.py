@@ -100,9 +100,14 @@ def test_frames_that_were_changed_after_the_flight_prove_nothing(
 def test_commands_that_were_sent_and_are_not_there_are_not_spoken_for(
     flown: tuple[list[bytes], Entries], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """But where the boundary signs how many passed its gate, they are missed."""
     lines, entries = flown
     without = [(at_us, frame) for at_us, frame in entries if frame[6] != OURS]
     code, said = verify(folder(tmp_path, lines, encoded(without)), capsys, "--audit")
+    assert (code, said["failure"]["slug"]) == (ExitCode.BOUNDARY, "boundary/frames")
+    flight = Flight(case.seal(case.mission(case.low_steps())), case.simulated("px4"), attested=False)
+    lines = flight.fly().lines
+    code, said = verify(folder(tmp_path, lines, encoded(without[:9])), capsys, "--audit")
     assert code == ExitCode.OK
     assert "frames" not in slugs(said["proven"])
     assert "none of them is there" in next(c["text"] for c in said["unproven"] if c["slug"] == "telemetry")

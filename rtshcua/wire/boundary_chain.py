@@ -60,11 +60,12 @@ class Tag(IntEnum):
 
 class BoundaryChain:
     """The digest after `count` entries, that of so many `frames`, and the one `aside`, of what is only counted:
-    `repeated` answers, `declined` documents and `stopped` frames.
+    `repeated` answers, `declined` documents and `stopped` frames. Once it is `over`, its end was signed: whoever has it
+    lets nothing happen any more.
     """
 
     __slots__ = (
-        "_marks", "aside", "count", "declined", "digest", "frames", "left", "repeated", "stopped",
+        "_marks", "aside", "count", "declined", "digest", "frames", "left", "over", "repeated", "stopped",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -74,6 +75,7 @@ class BoundaryChain:
         self.frames = 0
         self.aside = START
         self.repeated = self.declined = self.stopped = 0
+        self.over = False
         self._marks: list[bytes] = []
 
     def add(self, tag: Tag, payload: bytes) -> bytes:

@@ -20,7 +20,6 @@ class Attestation:
         self._bundle = sha256(bundle).digest()
         self._enforced = enforced
         self._key: BoundaryKey | None = None
-        self._over = False
 
     @property
     def digest(self) -> bytes:
@@ -38,11 +37,13 @@ class Attestation:
         self._chain.add(Tag.BEGIN, payload)
 
     def statement(self, *, final: bool = False) -> bytes | None:
-        """A signed statement, None without a key or after the final one."""
+        """A signed statement, None without a key or after the final one. After that nothing is dispatched, and no frame
+        leaves that moves the vehicle: else an end could be signed before the end.
+        """
         key, chain = self._key, self._chain
-        if key is None or self._over:
+        if key is None or chain.over:
             return None
-        self._over = final
+        chain.over = final
         said = Statement(
             self._flight, key.session, key.before, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
             chain.repeated, chain.declined, chain.stopped, chain.aside, final,

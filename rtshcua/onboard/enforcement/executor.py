@@ -34,6 +34,7 @@ _ALWAYS = (1 << 63) - 1  # us
 # why a permit sends nothing
 FORGED: Final = Refusal("permit/forged", "it is not sealed with the key of this session")
 USED: Final = Refusal("permit/used", "it was dispatched before")
+SESSION_OVER: Final = Refusal("permit/session-over", "the boundary signed that its session ends here")
 LATE: Final = Refusal("permit/late", "its time is over")
 NOT_COVERED: Final = Refusal("permit/not-covered", "the link does not stand behind this permit")
 LAPSED: Final = Refusal("permit/lapsed", "it is standing, but its step is over or its flight has landed")
@@ -185,6 +186,8 @@ class Executor:
         return permit
 
     def _unprepared(self, permit: Preparation, now_us: int) -> Refusal | None:
+        if self._chain.over:
+            return SESSION_OVER
         if permit.serial in self._prepared:
             return USED
         if now_us > permit.not_after_us:
@@ -196,6 +199,8 @@ class Executor:
         self.frames.prepared()
 
     def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | Refusal:
+        if self._chain.over:
+            return SESSION_OVER
         if permit.serial in self._used:
             return USED
         if now_us > permit.not_after_us:

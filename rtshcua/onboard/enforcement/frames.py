@@ -57,6 +57,7 @@ NOT_LISTED: Final = Refusal("frame/not-listed", "it sets a parameter to what no 
 NOT_DOWN: Final = Refusal(
     "frame/not-down", "it sets a parameter of a vehicle that flies, is armed, or is not known to stand on the ground"
 )
+SESSION_OVER: Final = Refusal("frame/session-over", "the boundary signed that its session ends here")
 NO_SESSION: Final = Refusal("frame/no-session", "it moves the vehicle, and nothing that was permitted does so now")
 NOT_COVERED: Final = Refusal("frame/not-covered", "it is no part of the command that was permitted")
 #: the leg there was never checked
@@ -203,6 +204,8 @@ class FrameSession:
         # 3. always, or before the flight
         if allow_list.is_housekeeping(frame):
             return False
+        if self.chain.over:
+            return SESSION_OVER
         setting = allow_list.written(frame, bytewise=is_bytewise(self._autopilot))
         if setting is not None and setting in self._prepared and now_us <= self._prepared_us:
             return False if self.stands(now_us) else NOT_DOWN

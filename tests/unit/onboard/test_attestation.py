@@ -3,10 +3,14 @@
 from hashlib import sha256
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
 
 from reference.documents import approval, low, presented
 from reference.world import SESSION_KEY, START, allowed, loaded, request_for, sealed, try_load
-from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.codec.frames import Codec
+from rtshcua.onboard.enforcement.executor import SESSION_OVER
+from rtshcua.onboard.enforcement.frames import NOT_COVERED, FrameSession
+from rtshcua.onboard.enforcement.frames import SESSION_OVER as GATE_OVER
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import BoundaryKey, Dispatch
 from rtshcua.wire import boundary_chain, preparation, response
@@ -17,6 +21,7 @@ from rtshcua.wire.response import Answer
 from rtshcua.wire.statement import Statement, open_statement
 from virtual import case
 
+HEARTBEAT = m.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3)
 KEY = BoundaryKey(case.BOUNDARY_KEY, 7, b"k" * 32)
 KEYS = {case.BOUNDARY_KEY.kid: case.BOUNDARY_KEY.verification()}
 NOW_US = START.monotonic_us
@@ -130,3 +135,24 @@ def test_another_gate_counts_in_the_same_chain() -> None:
     of.executor.frames = FrameSession()
     of.executor.frames.seal(b"no frame", NOW_US)
     assert (said(of).stopped, said(of).frames) == (2, 0)
+
+
+def test_nothing_happens_after_the_end_was_signed() -> None:
+    """Whoever took over the runtime has it signed before the end, and would fly then without a record."""
+    of = loaded()
+    of.attestation.begin(KEY)
+    first, sealed_ = allowed(of), preparation.seal(Preparation(1, False, NOW_US, ()), SESSION_KEY)
+    assert isinstance(of.executor.dispatch(first, NOW_US), Dispatch)
+    vehicle = Codec(1, 1)
+    of.executor.frames.observe(vehicle.pack(HEARTBEAT), NOW_US)
+    ours = Codec(1, 191)
+    land = ours.pack(m.MAVLink_command_long_message(1, 1, 21, 0, 0, 0, 0, 0, 0, 0, 0))
+    assert of.executor.frames.seal(land, NOW_US) == NOT_COVERED
+    assert said(of, final=True).final
+    for refused in (
+        of.executor.dispatch(first, NOW_US), of.executor.stand_in(first, 2, 2, NOW_US),
+        of.executor.prepare(sealed_, NOW_US),
+    ):  # fmt: skip
+        assert refused == SESSION_OVER
+    assert of.executor.frames.seal(land, NOW_US) == GATE_OVER
+    assert isinstance(of.executor.frames.seal(ours.pack(m.MAVLink_timesync_message(0, 0)), NOW_US), bytes)

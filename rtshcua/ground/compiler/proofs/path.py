@@ -11,6 +11,7 @@ from typing import NamedTuple
 from rtshcua.decision.evaluate import Condition, Environment
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.safety import ranging
+from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE
 from rtshcua.decision.values import Span as Utc
 from rtshcua.decision.volume import Volume
@@ -164,13 +165,14 @@ def _breach(ground: Ground, airspace: PreparedAirspace, volume: Volume) -> str:
 
 
 class Broken(NamedTuple):
-    """A clause of the contract that cannot hold, the moment of UTC at which it cannot, and near where; None where these
-    do not matter.
+    """A clause of the contract that cannot hold, the moment of UTC at which it cannot, near where, and between which
+    heights the step flies; None where these do not matter.
     """
 
     clause: Clause
     moment: int | None = None
     place: Point | None = None
+    height: tuple[int, int] | None = None
 
 
 def _broken(
@@ -202,7 +204,10 @@ def _broken(
             ) -> bool:
                 return can(condition, ground.best(clause, contract), there, then)
 
-            return Broken(clause, moment, _near(ground, invocation, at, volume, legs, holds))
+            near = _near(ground, invocation, at, volume, legs, holds)
+            (low, high), vehicle = volume.height[:2], ground.prepared.policy.vehicle
+            of_height = slots_read((clause,), vehicle, ground.prepared.policy.monitors) == (vehicle.height,)
+            return Broken(clause, moment, near, (low, high) if of_height and low < high else None)
     for clause, condition in (*invocation.require, *invocation.assume):
         # where the step begins, only if the time matters too: else E0619 says so
         for there in (anywhere, at) if period.timed(clause, arguments) else (anywhere,):
@@ -243,6 +248,9 @@ def _never(ground: Ground, step: Step, broken: Broken, labels: list[tuple[Span, 
         at = f" at {clock(broken.moment, ground.prepared.tables.local)}, local time, when it may begin"
     if broken.place is not None:
         where = f": it fails near {position(policy, broken.place)}"
+    elif broken.height is not None:
+        low, high = (display(each, Dimension.ALTITUDE) for each in broken.height)
+        where = f": from where it begins on it flies between {low} and {high}"
     ground.context.report.add(
         codes.NEVER_HOLDS,
         step.span,

@@ -144,3 +144,9 @@ def test_a_pause_where_a_leg_had_ended_is_excused() -> None:
     assert was.samples[-1].taken_over_by == "pilot"
     assert slugs(was) == set()
     assert {each.cause for each in judge(was).exceptions} == {"unseen"}
+
+
+def test_a_target_that_is_told_late_is_waited_for_before_a_restart_takes_the_flight_for_its_own() -> None:
+    mute = at(15.5, faults.MessageSilence(0, "POSITION_TARGET_GLOBAL_INT", 2_300_000))
+    was = flown(of("px4", at(13, faults.RuntimeKilled(0, 3 * S)), at(14, GOTO), mute))
+    assert (was.ending, slugs(was)) == ("stood-down", set())

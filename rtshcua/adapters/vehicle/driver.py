@@ -15,7 +15,15 @@ from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.restart import arrives, flown_by, modes_of
 from rtshcua.adapters.vehicle.source_time import EACH_US, SourceTime
-from rtshcua.adapters.vehicle.streams import AT_TIMES, IN_THE_AIR, PATIENCE_US, StreamPlan, StreamRequests, plan_streams
+from rtshcua.adapters.vehicle.streams import (
+    AT_TIMES,
+    IN_THE_AIR,
+    PATIENCE_REFUSED_US,
+    PATIENCE_US,
+    StreamPlan,
+    StreamRequests,
+    plan_streams,
+)
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
@@ -475,7 +483,13 @@ class Driver:
         if not self._timed and (self.source.unready is None or now_us - self._answers_us > PATIENCE_US):
             self._timed = True
             self.stream_requests.renew(now_us)
-        return self._timed and self.stream_requests.settled(now_us)
+        return self._timed and self.stream_requests.settled(now_us) and not self._awaits_target(now_us)
+
+    def _awaits_target(self, now_us: int) -> bool:
+        """Whether the target may still come that tells whose flight this is; ArduCopter has none in a takeoff."""
+        if self.left is None or self.flavour is None or self.seen.targets or self._answers_us is None:
+            return False
+        return self.seen.mode in self.flavour.aims and now_us - self._answers_us <= PATIENCE_REFUSED_US
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""

@@ -68,10 +68,10 @@ def run(folder: Path, *words: str, **files: str) -> tuple[int, str]:
     for name, text in {"conftest": CONFTEST, **files}.items():
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
     paths = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:cov", "-p", "no:hypothesispytest"]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider"]
     done = subprocess.run(
         [*command, "--rootdir=.", "--basetemp=t", "-W", "error", *words], check=False, capture_output=True, cwd=folder,
-        env={**os.environ, "PYTHONPATH": paths}, text=True, timeout=120,
+        env={**os.environ, "PYTHONPATH": paths, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}, text=True, timeout=120,
     )  # fmt: skip
     return done.returncode, done.stdout
 

@@ -8,6 +8,7 @@ import gc
 import os
 import signal
 import sys
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
@@ -23,6 +24,9 @@ from typing import Any
 import pytest
 from _pytest.capture import FDCapture
 from _pytest.unraisableexception import collect_unraisable
+
+#: how long those that run tests may take to end once no more is wanted of them
+PATIENCE_S = 10.0
 
 
 @dataclass
@@ -75,10 +79,7 @@ class Processes:
                     if session.shouldstop:
                         raise session.Interrupted(session.shouldstop)
         finally:
-            for worker in self._workers:
-                worker.pipe.close()
-                os.kill(worker.process, signal.SIGTERM)
-                os.waitpid(worker.process, 0)
+            _end(self._workers)
         if self._begun != len(session.items):
             raise Crashed(f"{self._begun} of {len(session.items)} tests were begun")
         return True
@@ -157,6 +158,18 @@ class Processes:
         session.config.hook.pytest_runtest_logreport(report=report)
 
 
+def _end(workers: list[Worker]) -> None:
+    """Wait a while for those that go on: they end what their tests began once nobody listens, or at Ctrl-C."""
+    for worker in workers:
+        worker.pipe.close()
+    until_s = time.monotonic() + PATIENCE_S
+    for worker in workers:
+        while os.waitpid(worker.process, os.WNOHANG) == (0, 0):
+            if time.monotonic() > until_s:
+                os.kill(worker.process, signal.SIGTERM)
+            time.sleep(0.02)
+
+
 class _Told:
     """Sends reports to whoever counts them: of each test one, and of its fixtures if they failed or are timed."""
 
@@ -189,12 +202,15 @@ def _run(session: pytest.Session, pipe: Connection) -> None:
     """Run what is given."""
     items = _given(pipe)
     at = next(items, None)
-    while at is not None:
-        following = next(items, None)
-        pipe.send(at)
-        item, after = session.items[at], None if following is None else session.items[following]
-        item.config.hook.pytest_runtest_protocol(item=item, nextitem=after)
-        at = following
+    try:
+        while at is not None:
+            following = next(items, None)
+            pipe.send(at)
+            item, after = session.items[at], None if following is None else session.items[following]
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=after)
+            at = following
+    finally:
+        session._setupstate.teardown_exact(None)  # what is left of it where it is broken off
     gc.collect()
     collect_unraisable(session.config)
 

@@ -29,6 +29,7 @@ from rtshcua.virtual.fitting import fitting
 from rtshcua.virtual.vehicle import SECOND, START, TICK_US, VirtualClock, VirtualVehicle
 from rtshcua.wire import bundle as bundles
 from rtshcua.wire import cose, names
+from rtshcua.wire.boundary_chain import START as FIRST
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, open_root
@@ -142,7 +143,8 @@ class VirtualFlight:
     vehicle says is heard every `tick_us`: a longer tick makes a flight cheaper, and what happens on it as much later.
     `before` is the hash of the last line of the vehicle's log before this one. `settings` are parameters that are set
     before the flight, `owed` what earlier ones left to be put back, kept up to date as a file would be. With `boundary`
-    the boundary signs its own evidence; it must where the root names a key for that.
+    the boundary signs its own evidence, as its first session where only the key is given; it must where the root names
+    a key for that.
     Raises ValueError for a bundle that is refused, and what `open_root` raises.
     """
 
@@ -155,7 +157,7 @@ class VirtualFlight:
         wait_us: int = 100_000, resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
         sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
         settings: Mapping[str, int] = MappingProxyType({}), owed: dict[str, Owed] | None = None,
-        boundary: BoundaryKey | None = None,
+        boundary: BoundaryKey | SigningKey | None = None,
     ) -> None:  # fmt: skip
         policy, mission = claimed(bundle)
         utc_us = mission.issued_at_us + LATER_US if utc_us is None else utc_us
@@ -199,7 +201,7 @@ class VirtualFlight:
             ),
             SYNCED_FIRST,
         )
-        loaded.attestation.begin(boundary)
+        loaded.attestation.begin(BoundaryKey(boundary, 1, FIRST) if isinstance(boundary, SigningKey) else boundary)
         self.recorder.attest = loaded.attestation.statement
         for line in self.recorder.attested(now):
             self.sink.append(line, SYNCED_FIRST)

@@ -151,10 +151,17 @@ class SignedLink:
         return hashlib.sha256(self._key + octets).digest()[:_TAG]
 
     def _has_room(self, stream: Stream, local: int) -> bool:
-        """A stream whose last frame is over a minute old needs no memory: step 4 refuses all that it would refuse."""
-        if stream not in self._streams and len(self._streams) >= MOST_STREAMS:
-            self._streams = {each: last for each, last in self._streams.items() if last >= local - MINUTE}
-        return stream in self._streams or len(self._streams) < MOST_STREAMS
+        """A stream whose last frame is over a minute old needs no memory: step 4 refuses all that it would refuse. As
+        many senders are remembered as streams.
+        """
+        streams, heard_by, sender = self._streams, self._heard_by, stream[:2]
+        if stream not in streams and len(streams) >= MOST_STREAMS:
+            streams = self._streams = {each: last for each, last in streams.items() if last >= local - MINUTE}
+        if sender not in heard_by and len(heard_by) >= MOST_STREAMS:
+            recent = {each for each, last in streams.items() if last >= local - MINUTE}
+            heard_by = self._heard_by = {each: link for each, link in heard_by.items() if (*each, link) in recent}
+        in_streams = stream in streams or len(streams) < MOST_STREAMS
+        return in_streams and (sender in heard_by or len(heard_by) < MOST_STREAMS)
 
 
 def stream_of(frame: bytes) -> Stream:

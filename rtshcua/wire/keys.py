@@ -17,6 +17,13 @@ KID_BYTES: Final = 16
 PUBLIC_BYTES: Final = 32
 SEED_BYTES: Final = 32
 
+#: the field's prime, and the y of each point of small order: what such a key signs is signed for whoever likes it
+_P: Final = 2**255 - 19
+_Y: Final = (
+    0x05FC536D880238B13933C6D305ACDFD5F098EFF289F4C345B027B2C28F95E826  # of the points of order 8, and its negative
+)
+_SMALL_ORDER: Final = frozenset({0, 1, _P - 1, _Y, _P - _Y})
+
 #: stands for every role, policy or vehicle; a source is always named
 ANY: Final = "*"
 
@@ -54,8 +61,19 @@ def key_id(duty: Duty, public: bytes) -> bytes:
     return digest.digest(digest.KEY, duty.label + b"\0" + public)[:KID_BYTES]
 
 
+def is_strong(point: bytes) -> bool:
+    """Whether a point (32 bytes) is in canonical form and not of small order; not whether it is on the curve."""
+    y = int.from_bytes(point, "little") & ((1 << 255) - 1)  # above it is the sign of x
+    return y < _P and y not in _SMALL_ORDER
+
+
 def verified(public: bytes, signature: bytes, message: bytes) -> bool:
-    """Whether the key of `public` (32 bytes) signed `message`; one with s >= L is refused (RFC 8032, 5.1.7)."""
+    """Whether the key of `public` (32 bytes) signed `message`; one with s >= L is refused (RFC 8032, 5.1.7).
+
+    So is a key, or a first half of the signature, that is not strong: OpenSSL takes these, others do not.
+    """
+    if not is_strong(public) or not is_strong(signature[:PUBLIC_BYTES]):
+        return False
     try:
         Ed25519PublicKey.from_public_bytes(public).verify(signature, message)
     except InvalidSignature:
@@ -85,6 +103,8 @@ class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         if len(self.public) != PUBLIC_BYTES:
             raise ValueError(f"a public key has {PUBLIC_BYTES} bytes, not {len(self.public)}")
+        if not is_strong(self.public):
+            raise ValueError("a public key is in canonical form and not of small order")
         if unknown := sorted(set(self.sources) - _SOURCES):
             raise ValueError(f"`{unknown[0]}` is not a source")
 

@@ -10,8 +10,9 @@ from typing import Final, Self
 
 import msgspec
 
+from rtshcua.model.flat.limits import MAX_KEYS, MAX_REVOKED
 from rtshcua.wire import artefact, cose, names
-from rtshcua.wire.keys import ANY, KID_BYTES, PUBLIC_BYTES, Duty, SigningKey, VerificationKey
+from rtshcua.wire.keys import ANY, KID_BYTES, PUBLIC_BYTES, Duty, SigningKey, VerificationKey, is_strong
 from rtshcua.wire.untrusted import Untrusted
 
 #: what a human answer comes through; a key that may speak through an agent only answers nothing
@@ -115,8 +116,8 @@ def open_root(data: bytes, *, pinned: bytes | None, now_us: int) -> TrustRoot:
     own word, and no other. Raises `RootError`, `ArtefactError` and `EnvelopeError`.
     """
     if pinned is not None and len(pinned) == PUBLIC_BYTES:
-        key = VerificationKey(Duty.ROOT, pinned)
-        return _open(data, {key.kid: key}, now_us)
+        pins = (VerificationKey(Duty.ROOT, pinned),) if is_strong(pinned) else ()
+        return _open(data, {key.kid: key for key in pins}, now_us)
     # Nothing but the root itself holds the key: it is parsed first, by a total and strict decoder, then verified.
     claimed = _claimed(data)
     trusted = claimed.keys_for(Duty.ROOT)
@@ -233,6 +234,9 @@ def _check_signer(root: TrustRoot, kid: bytes) -> VerificationKey:
 
 def _check(root: TrustRoot) -> None:
     """Refuse a root that contradicts itself, whoever signed it."""
+    if len(root.keys) > MAX_KEYS or len(root.revocations) > MAX_REVOKED:
+        text = f"a root names at most {MAX_KEYS} keys, and revokes at most {MAX_REVOKED}"
+        raise RootError("malformed", text)
     if root.version < 1 or root.expires_at_us <= root.issued_at_us:
         raise RootError("malformed", "a root counts its versions from 1 and expires after it was issued")
     for duty in Duty:

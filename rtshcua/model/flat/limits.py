@@ -38,3 +38,5 @@ MAX_MONITORS = 32
 MAX_WINDOW = 600_000_000  # us: how far back a temporal monitor looks
 MAX_GAP = 1_000_000  # us: when more time passes between two observations, what was in between is not known
 MAX_PHASE_NAMES = 64
+MAX_KEYS = 512  # in a trust root
+MAX_REVOKED = 4_096  # keys that a trust root revokes

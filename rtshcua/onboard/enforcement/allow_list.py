@@ -12,7 +12,7 @@ the same for every adapter, read next to what autopilots make of a frame.
 """
 
 from collections.abc import Callable, Mapping
-from math import cos, hypot, isfinite, isnan, radians
+from math import isfinite, isnan
 from typing import Any, Final, NamedTuple
 
 from rtshcua.mavlink import enums, layouts
@@ -21,7 +21,7 @@ from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, HEARTBEAT, LAYOUT
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.mavlink.parameters import bits_of, decode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.zone import meridian
+from rtshcua.model.flat.zone import SHIFT, meridian
 from rtshcua.onboard.ports import Command
 
 _Fields = tuple[Any, ...]
@@ -181,10 +181,9 @@ _BEFORE_FLIGHT: Final[dict[int, Callable[[_Fields], bool]]] = {
 #: recorded flight of PX4 it moves by 0.7 m
 DATUM_MOVES: Final = 2_000
 _ROUNDING: Final = 2  # mm, mm/s
-#: m: how near to a point of its path the vehicle must have been seen before it is sent to the next; the adapters count
-#: it as arrived within 2 m
-NEAR: Final = 5.0
-_METRES: Final = 0.011_131_9  # one 1e-7 degree of latitude
+#: 1e-7 degree of latitude, 5 m: how near to a point of its path the vehicle must have been seen before it is sent to
+#: the next; the adapters count it as arrived within 2 m
+NEAR: Final = 449
 
 #: command, frame of reference (heights above mean sea level) and flags of a DO_REPOSITION
 _REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
@@ -253,8 +252,17 @@ def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
     if here is None:
         return False
     latitude, longitude = point
-    east = (meridian(here[1], longitude) - longitude) * cos(radians(latitude / 1e7))
-    return hypot(here[0] - latitude, east) * _METRES <= NEAR
+    north = here[0] - latitude
+    east = (meridian(here[1], longitude) - longitude) * _cosine(latitude) >> SHIFT
+    return north * north + east * east <= NEAR * NEAR
+
+
+def _cosine(latitude: int) -> int:
+    """The cosine of a latitude in 1e-7 degree, times 2**SHIFT: by Bhaskara I, which is off by 0.0016 at most, and takes
+    no float.
+    """
+    square = (abs(latitude) // 10_000) ** 2  # 1e-3 degree
+    return ((180_000**2 - 4 * square) << SHIFT) // (180_000**2 + square)
 
 
 def _long(fields: _Fields, command: Command, autopilot: int, home_amsl: int | None) -> bool:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rtshcua.wire import key_file
 from rtshcua.wire.key_file import MAX_KEY_FILE, KeyFileError, dump_signing_key, load_signing_key
-from rtshcua.wire.keys import Duty, SigningKey, VerificationKey, WrongDuty, key_id
+from rtshcua.wire.keys import Duty, SigningKey, VerificationKey, WrongDuty, key_id, verified
 from rtshcua.wire.untrusted import Untrusted
 from virtual.rows import rows
 
@@ -101,7 +101,16 @@ def test_a_verification_key_that_cannot_be():
     with pytest.raises(ValueError, match="a public key has 32 bytes, not 31"):
         VerificationKey(Duty.POLICY, bytes(31))
     with pytest.raises(ValueError, match="`pilot` is not a source"):
-        VerificationKey(Duty.MISSION, bytes(32), sources=("agent", "pilot"))
+        VerificationKey(Duty.MISSION, bytes([2] * 32), sources=("agent", "pilot"))
+
+
+def test_a_key_that_anybody_signs_for_is_none():
+    neutral, other_form = bytes([1]) + bytes(31), ((1 << 255) - 1).to_bytes(32, "little")
+    for weak in (neutral, other_form):
+        with pytest.raises(ValueError, match="in canonical form and not of small order"):
+            VerificationKey(Duty.POLICY, weak)
+        assert not verified(weak, weak + bytes(32), b"anything")
+    assert not verified(signing_key().public, neutral + bytes(32), b"anything")
 
 
 def test_secrets_are_never_shown():

@@ -5,6 +5,7 @@ import hashlib
 import msgspec
 import pytest
 
+from rtshcua.model.flat.limits import MAX_KEYS, MAX_REVOKED
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import ANY, Duty, SigningKey, VerificationKey, WrongDuty
 from rtshcua.wire.trust import (
@@ -86,6 +87,7 @@ def test_keys_are_found_by_duty():
 def test_another_pin_is_refused():
     assert opening(SIGNED, pinned=NEXT.public) == "unknown-key"
     assert opening(SIGNED, pinned=NEXT.kid) == "unknown-key"
+    assert opening(SIGNED, pinned=bytes(32)) == "unknown-key"  # a pin that anybody could sign for
     with pytest.raises(ValueError, match="a root is pinned by 32 or 16 bytes, not 3"):
         open_root(SIGNED, pinned=b"pin", now_us=200)
 
@@ -130,6 +132,8 @@ def test_a_tampered_root_is_refused():
         ({"thresholds": Thresholds(witness=0)}, "malformed"),
         ({"thresholds": Thresholds(witness=2)}, "unreachable-threshold"),
         ({"keys": (*KEYS, ROOT.verification())}, "shared-key"),
+        ({"keys": KEYS[:1] * (MAX_KEYS + 1)}, "malformed"),
+        ({"revoked": tuple(n.to_bytes(8) for n in range(MAX_REVOKED + 1))}, "malformed"),
         ({"keys": (*KEYS, VerificationKey(Duty.LOG, POLICY.public))}, "shared-key"),
         ({"keys": (*KEYS, signing_key(5, Duty.LOG, development=True).verification())}, "development-key"),
     ],

@@ -14,8 +14,9 @@ MAKEFLAGS += --no-print-directory
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-setup: ## make .venv, or bring it up to date
+setup: ## make .venv and the boundary in C, or bring them up to date
 	@.make/setup
+	@.make/boundary
 
 demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, verify its log
 	@.make/demo

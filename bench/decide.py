@@ -171,8 +171,8 @@ def sixteen(zone: Zone) -> Zone:
     return replace(zone, data=ring(*zone.data[:2], *zone.data[4:6])) if zone.shape == POLYGON else zone
 
 
-def asked_of_decide(places: int) -> Callable[[], object]:
-    """Asks about the inspection under ten rules that all speak of it, from one place or from several in turn."""
+def ten_candidates() -> PreparedPolicy:
+    """A policy of ten rules that all speak of the inspection, in zones of 16 corners."""
     low = [flat.apply(Op.LT, flat.signal(flat.BATTERY), flat.const(n)) for n in (1_000, 1_500, 2_000)]
     narrow = [flat.apply(Op.LE, flat.argument(1), flat.const(n * flat.M)) for n in (6, 8, 10)]
     rules = (
@@ -183,9 +183,14 @@ def asked_of_decide(places: int) -> Callable[[], object]:
         flat.RULES[6],
         flat.rule(RuleKind.FORBID, flat.INSPECT, when=flat.clause("", low[0])),
     )
-    policy = loaded(replace(flat.POLICY, rules=rules, zones=tuple(map(sixteen, flat.ZONES))))
+    return loaded(replace(flat.POLICY, rules=rules, zones=tuple(map(sixteen, flat.ZONES))))
+
+
+def asked_of_decide(places: int) -> Callable[[], object]:
+    """Asks about the inspection under ten rules that all speak of it, from one place or from several in turn."""
+    policy = ten_candidates()
     invocation = prepared(flat.INVOCATIONS[flat.INSPECTION_STEP], policy)
-    assert len(rules) == sum(map(len, invocation.candidates)) == 10
+    assert sum(map(len, invocation.candidates)) == 10
     states = [flat.state({flat.POSITION_X: 110 * flat.M + n}) for n in range(places)]
     context = flat.context()
     assert all(decide(invocation, at, policy, context, flat.NOW).outcome is Outcome.ALLOW for at in states)

@@ -1,0 +1,36 @@
+/* What every part of the boundary rests on: views into bytes that stay where they are. Mirrors nothing in Python, which has bytes and tuples. */
+#ifndef RT_BASE_H
+#define RT_BASE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+/* So many bytes; `at` may be anything where `size` is 0. Text is UTF-8 and not ended by a NUL. */
+typedef struct {
+    const uint8_t *at;
+    uint32_t size;
+} rt_bytes;
+
+/* The items of a CBOR array that was found well-formed: `at` is the first item, of `count`; `end` is behind the last. */
+typedef struct {
+    const uint8_t *at;
+    const uint8_t *end;
+    uint32_t count;
+} rt_list;
+
+/* Why something is refused, the slug of the Python refusal; NULL where all is well. */
+typedef const char *rt_refusal;
+
+static inline bool rt_same(rt_bytes one, rt_bytes other) {
+    return one.size == other.size && (one.size == 0 || memcmp(one.at, other.at, one.size) == 0);
+}
+
+#define RT_DIGEST_BYTES 32
+#define RT_KEY_BYTES 32
+#define RT_KID_BYTES 16
+#define RT_ID_BYTES 16
+#define RT_FLIGHT_BYTES 16
+
+#endif

@@ -1,0 +1,121 @@
+/* Conditions, evaluated over one situation from the postfix code that `tree.c` found well-formed. Everything is a point there, or
+   missing, but for the height over a planned volume. So a number is `number + factor * height`, and what is subtracted from
+   itself is 0, as in the sums of tree.py. By its bound on each sum nothing exceeds 2**62. */
+#include "parts.h"
+
+typedef struct {
+    int64_t number, factor;
+    rt_truth truth; /* of a truth value; of a number RT_UNKNOWN where a part of it is missing, else 0 */
+} cell;
+
+/* Whether left - right is at most `bound`, or, for RT_OP_EQ, is 0. */
+static rt_truth compare(int64_t op, const cell *left, const cell *right, int64_t bound, const rt_environment *at) {
+    if (left->truth || right->truth) return RT_UNKNOWN;
+    int64_t low = left->number - right->number, high = low, factor = left->factor - right->factor;
+    if (factor) {
+        low += factor * (factor < 0 ? at->volume->high : at->volume->low);
+        high += factor * (factor < 0 ? at->volume->low : at->volume->high);
+    }
+    if (op == RT_OP_EQ || op == RT_OP_NE) return low > 0 || high < 0 ? RT_FALSE : low == high ? RT_TRUE : RT_MIXED;
+    return high <= bound ? RT_TRUE : low > bound ? RT_FALSE : RT_MIXED;
+}
+
+static cell signal(int64_t slot, const rt_environment *at) {
+    if (at->ranging && slot == at->now->policy->policy->vehicle.height) return (cell){0, 1, at->volume->level ? 0 : RT_UNKNOWN};
+    rt_value value = at->now->slots[slot];
+    return (cell){value.value, 0, value.known ? 0 : RT_UNKNOWN};
+}
+
+/* Conditions that ask neither for numbers nor for other conditions. */
+static rt_truth atom(int64_t op, int64_t a, int64_t b, const rt_environment *at) {
+    const rt_situation *now = at->now;
+    const rt_policy *policy = now->policy->policy;
+    const rt_vehicle *vehicle = &policy->vehicle;
+    int64_t utc = now->utc_us, zone;
+    rt_truth truth;
+    switch (op) {
+    case RT_OP_SIGNAL_IN:
+        return !now->slots[a].known ? RT_UNKNOWN : rt_holds(policy->sets[b], now->slots[a].value) ? RT_TRUE : RT_FALSE;
+    case RT_OP_ARGUMENT_IN:
+        return rt_holds(policy->sets[b], at->arguments[a]) ? RT_TRUE : RT_FALSE;
+    case RT_OP_KNOWN:
+        return now->slots[a].known ? RT_TRUE : RT_UNKNOWN;
+    case RT_OP_POSITION_IN:
+        return rt_zone_holds(now, (uint32_t)a, at->volume, at->through_us);
+    case RT_OP_POSITION_IN_ARGUMENT:
+        zone = at->arguments[a];
+        if (!rt_within(zone, 0, (int64_t)policy->tables[b].count - 1))
+            return RT_UNKNOWN; /* an argument out of range is no zone */
+        return rt_zone_holds(now, (uint32_t)rt_int_at(policy->tables[b], (uint32_t)zone), at->volume, at->through_us);
+    case RT_OP_ARGUMENT_POINT_IN:
+        truth = rt_zone_contains(now->policy, (uint32_t)b, at->arguments[a], at->arguments[a + 1]) ? RT_TRUE : RT_FALSE;
+        if (!rt_zone_timed(&policy->zones[b])) return truth;
+        return rt_and(truth, rt_zone_exists(vehicle, &policy->zones[b], utc, utc + at->through_us, now->error_us));
+    case RT_OP_TIME_IN:
+        return rt_time_of_day(vehicle, a, b, utc, utc, now->error_us);
+    case RT_OP_WEEK_IN:
+        return rt_time_of_week(vehicle, policy->sets[a], utc, utc, now->error_us);
+    case RT_OP_PHASE_IN:
+        return rt_holds(policy->sets[b], at->phase) ? RT_TRUE : RT_FALSE;
+    default:
+        return now->monitors[a];
+    }
+}
+
+rt_truth rt_evaluate(rt_list code, const rt_environment *at) {
+    cell stack[RT_MAX_STACK + 1] = {{0, 0, 0}};
+    cell *top = stack; /* the last value; the first of the stack is none */
+    int64_t op, a, b;
+    while (rt_next_int(&code, &op) && rt_next_int(&code, &a) && rt_next_int(&code, &b)) {
+        switch (op) {
+        case RT_OP_CONST:
+            *++top = (cell){a, 0, 0};
+            break;
+        case RT_OP_SIGNAL:
+            *++top = signal(a, at);
+            break;
+        case RT_OP_ARGUMENT:
+            *++top = (cell){at->arguments[a], 0, 0};
+            break;
+        case RT_OP_ADD:
+        case RT_OP_SUB:
+            top--;
+            top->number += op == RT_OP_ADD ? top[1].number : -top[1].number;
+            top->factor += op == RT_OP_ADD ? top[1].factor : -top[1].factor;
+            top->truth |= top[1].truth;
+            break;
+        case RT_OP_SCALE:
+            top->number *= a;
+            top->factor *= a;
+            break;
+        case RT_OP_LT:
+        case RT_OP_LE:
+        case RT_OP_EQ:
+        case RT_OP_NE:
+            top--;
+            top->truth = compare(op, top, top + 1, op == RT_OP_LT ? -1 : 0, at);
+            if (op == RT_OP_NE) top->truth = rt_not(top->truth);
+            break;
+        case RT_OP_GT:
+        case RT_OP_GE:
+            top--;
+            top->truth = compare(op, top + 1, top, op == RT_OP_GT ? -1 : 0, at);
+            break;
+        case RT_OP_AND:
+        case RT_OP_OR:
+            top--;
+            top->truth = op == RT_OP_AND ? rt_and(top->truth, top[1].truth) : rt_or(top->truth, top[1].truth);
+            break;
+        case RT_OP_NOT:
+            top->truth = rt_not(top->truth);
+            break;
+        default:
+            (++top)->truth = atom(op, a, b, at);
+        }
+    }
+    return top->truth;
+}
+
+rt_truth rt_matches(const rt_rule *rule, const rt_environment *at) {
+    return rule->has_when ? rt_evaluate(rule->when.code, at) : RT_TRUE;
+}

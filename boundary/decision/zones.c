@@ -1,0 +1,72 @@
+#include "parts.h"
+
+rt_truth rt_zone_along(const rt_prepared_policy *policy, uint32_t zone, rt_list path, int64_t error) {
+    int64_t x = 0, y = 0, to_x, to_y;
+    rt_next_int(&path, &x);
+    rt_next_int(&path, &y);
+    rt_truth truth = rt_zone_contains(policy, zone, x, y) ? RT_TRUE : RT_FALSE;
+    if (path.count == 0) return error == 0 || rt_zone_clear(policy, zone, x, y, x, y, error) ? truth : RT_MIXED;
+    while (rt_next_int(&path, &to_x) && rt_next_int(&path, &to_y)) {
+        if (!rt_zone_clear(policy, zone, x, y, to_x, to_y, error)) return RT_MIXED;
+        x = to_x;
+        y = to_y;
+    }
+    return truth;
+}
+
+/* The same of the leg to a planner's path. */
+static rt_truth along_leg(const rt_prepared_policy *policy, uint32_t zone, const rt_volume *volume) {
+    bool leads = volume->planner && volume->planner->points;
+    int64_t x = volume->x, y = volume->y, to_x = leads ? volume->planner->x : x, to_y = leads ? volume->planner->y : y;
+    if ((leads || volume->error) && !rt_zone_clear(policy, zone, x, y, to_x, to_y, volume->error)) return RT_MIXED;
+    return rt_zone_contains(policy, zone, x, y) ? RT_TRUE : RT_FALSE;
+}
+
+/* The same of the path, which is remembered: it depends on nothing else. */
+static rt_truth along_path(const rt_prepared_policy *policy, uint32_t zone, const rt_volume *volume) {
+    const rt_planner *planner = volume->planner;
+    rt_truth truth;
+    if (planner->along && planner->along[zone]) return planner->along[zone];
+    if (planner->points > 1) {
+        truth = rt_zone_along(policy, zone, planner->path, volume->error);
+    } else {
+        rt_volume end = *volume;
+        end.planner = NULL;
+        end.x = planner->x;
+        end.y = planner->y;
+        truth = along_leg(policy, zone, &end);
+    }
+    if (planner->along) planner->along[zone] = (uint8_t)truth;
+    return truth;
+}
+
+/* Whether the heights low..high lie between floor and ceiling. A zone with neither does not ask for the height. */
+static rt_truth between(const rt_zone *zone, int64_t low, int64_t high, bool known) {
+    if (zone->floor == RT_LOWEST && zone->ceiling == RT_HIGHEST) return RT_TRUE;
+    if (!known) return RT_UNKNOWN;
+    if (low > zone->floor && high < zone->ceiling) return RT_TRUE;
+    return high <= zone->floor || low >= zone->ceiling ? RT_FALSE : RT_MIXED;
+}
+
+rt_truth rt_zone_holds(const rt_situation *situation, uint32_t number, const rt_volume *volume, int64_t through_us) {
+    const rt_prepared_policy *policy = situation->policy;
+    const rt_zone *zone = &policy->policy->zones[number];
+    rt_truth truth = 0, vertical = between(zone, volume->leg_low, volume->high, volume->level);
+    if (vertical == RT_FALSE) truth = RT_FALSE;
+    else truth = rt_and(vertical, volume->located ? along_leg(policy, number, volume) : RT_UNKNOWN);
+    if (volume->climbs) {
+        rt_volume start = *volume;
+        start.planner = NULL;
+        vertical = between(zone, volume->start_low, volume->high, volume->level);
+        if (vertical == RT_FALSE) truth |= RT_FALSE;
+        else truth |= rt_and(vertical, volume->located ? along_leg(policy, number, &start) : RT_UNKNOWN);
+    }
+    if (volume->planner && volume->planner->points) {
+        vertical = between(zone, volume->low, volume->high, volume->level);
+        if (vertical == RT_FALSE) truth |= RT_FALSE;
+        else truth |= rt_and(vertical, volume->located ? along_path(policy, number, volume) : RT_UNKNOWN);
+    }
+    if (!rt_zone_timed(zone)) return truth;
+    int64_t utc = situation->utc_us;
+    return rt_and(truth, rt_zone_exists(&policy->policy->vehicle, zone, utc, utc + through_us, situation->error_us));
+}

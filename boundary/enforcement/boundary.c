@@ -1,0 +1,258 @@
+#include "boundary.h"
+
+#include "wire/octets.h"
+
+#define CLOCKS_PART_US 3000000LL
+#define APART_US 2000000LL
+
+bool rt_is_apart(int64_t now_us, int64_t own_us) {
+    return own_us >= 0 && (now_us > own_us + APART_US || now_us < own_us - APART_US);
+}
+
+static bool keeps_time(rt_boundary *boundary, const rt_now *now) {
+    if (now->utc_error_us > CLOCKS_PART_US)
+        return true; /* by a clock that does not know the time, nothing is granted anyway */
+    int64_t ahead = now->utc_us - now->monotonic_us;
+    if (!boundary->ahead_known) {
+        boundary->ahead_known = true;
+        boundary->ahead_us = ahead;
+    }
+    int64_t parted = ahead - boundary->ahead_us;
+    return parted <= CLOCKS_PART_US && parted >= -CLOCKS_PART_US;
+}
+
+/* A request that was refused a decision. */
+static uint32_t undecided(rt_boundary *boundary, uint8_t status, rt_bytes request, uint8_t *out) {
+    uint8_t digest[RT_DIGEST_BYTES];
+    rt_sha256 hash;
+    rt_sha256_begin(&hash);
+    rt_sha256_add(&hash, request);
+    rt_sha256_end(&hash, digest);
+    rt_chain_add(&boundary->chain, RT_TAG_UNDECIDED, (rt_bytes){&status, 1}, (rt_bytes){digest, sizeof digest});
+    return rt_write_refusal(status, boundary->chain.digest, out);
+}
+
+/* An answer about a step that equals the one before is counted, and no entry of its own. */
+static void chain_decided(rt_boundary *boundary, rt_bytes request, const rt_decision *decision, int64_t consumed, bool permitted) {
+    const rt_request *asked = &boundary->asked;
+    const int64_t said[5] = {asked->step, decision->outcome, decision->reason, decision->clause, decision->target};
+    uint8_t payload[14], *at = payload;
+    rt_put(&at, (uint64_t)decision->outcome, 1);
+    rt_put(&at, (uint64_t)decision->reason, 1);
+    rt_put(&at, (uint64_t)decision->step, 1);
+    rt_put(&at, (uint64_t)(decision->target > RT_DEGRADE_LINK ? decision->target : RT_DEGRADE_LINK), 2);
+    rt_put(&at, (uint64_t)decision->valid_until_us, 8);
+    rt_put(&at, (uint64_t)consumed, 1);
+    bool again = false;
+    if (asked->kind == RT_STEP) {
+        again = boundary->answered && !permitted && memcmp(said, boundary->last, sizeof said) == 0;
+        memcpy(boundary->last, said, sizeof said);
+        boundary->answered = true;
+    }
+    if (again) rt_chain_repeat(&boundary->chain, (rt_bytes){payload, sizeof payload}, request);
+    else rt_chain_add(&boundary->chain, RT_TAG_DECIDED, (rt_bytes){payload, sizeof payload}, request);
+}
+
+static uint32_t answer_step(rt_boundary *boundary, rt_bytes request, uint8_t *out) {
+    const rt_request *asked = &boundary->asked;
+    rt_session *session = &boundary->session;
+    rt_prepared_invocation *step = rt_step_at(session, asked->step);
+    rt_decision decision;
+    rt_context context = {
+        {asked->binding, RT_DIGEST_BYTES}, boundary->vehicle, boundary->version, rt_is_consumed(session, asked->step) ? 1 : 0,
+        asked->released_us, asked->phase, asked->remaining_us, boundary->approvals, 0,
+    };
+    const rt_in_force *in_force = &session->in_force;
+    context.approval_count = rt_answers_about(
+        &in_force->approvals, &in_force->bundle.policy, &step->invocation, &asked->now, boundary->approvals, RT_MAX_APPROVALS);
+    rt_decide_step(session, asked->step, &asked->state, &context, &asked->now, &decision);
+    chain_decided(boundary, request, &decision, context.consumed, decision.outcome == RT_ALLOW);
+    const uint8_t *evidence = boundary->chain.digest;
+    if (decision.outcome != RT_ALLOW)
+        return rt_write_answer(&decision, context.consumed, NULL, evidence, out);
+    uint8_t sealed[RT_PERMIT_BYTES];
+    rt_permit permit = {RT_STEP, asked->step, -1, boundary->serial, step->invocation.contract.fallback.count,
+                        in_force->bundle.policy.contingency_count, decision.valid_until_us};
+    boundary->serial += 1 + (uint64_t)permit.fallbacks + (uint64_t)permit.contingencies + RT_AGAIN;
+    rt_seal_permit(&permit, boundary->executor.key, sealed);
+    return rt_write_answer(&decision, context.consumed, sealed, evidence, out);
+}
+
+static uint32_t answer_link(rt_boundary *boundary, rt_bytes request, uint8_t *out) {
+    const rt_request *asked = &boundary->asked;
+    rt_decision decision;
+    rt_bytes binding = {asked->binding, RT_DIGEST_BYTES};
+    rt_decide_link(&boundary->session, asked->kind, asked->step, asked->link, binding, &asked->state, &asked->now, &decision);
+    int64_t target = decision.target;
+    decision.target = RT_NO_TARGET;
+    chain_decided(boundary, request, &decision, 0, target != RT_NO_TARGET);
+    const uint8_t *evidence = boundary->chain.digest;
+    if (target == RT_NO_TARGET)
+        return rt_write_answer(&decision, 0, NULL, evidence, out);
+    uint8_t sealed[RT_PERMIT_BYTES];
+    rt_permit permit = {asked->kind, asked->step, target, boundary->serial++, 0, 0, decision.valid_until_us};
+    rt_seal_permit(&permit, boundary->executor.key, sealed);
+    return rt_write_answer(&decision, 0, sealed, evidence, out);
+}
+
+uint32_t rt_enforce(rt_boundary *boundary, rt_bytes request, int64_t own_us, uint8_t *out) {
+    rt_request *asked = &boundary->asked;
+    const rt_policy *policy = &boundary->session.in_force.bundle.policy;
+    if (!rt_read_request(request, policy->slots, policy->monitor_count, asked) || rt_is_apart(asked->now.monotonic_us, own_us))
+        return undecided(boundary, RT_MALFORMED, request, out);
+    int64_t now_us = asked->now.monotonic_us;
+    /* a release to come would move the deadline */
+    if (now_us < boundary->now_us || now_us < asked->released_us || !keeps_time(boundary, &asked->now))
+        return undecided(boundary, RT_MALFORMED, request, out);
+    boundary->now_us = now_us;
+    rt_status turn = rt_turn_of(&boundary->session, asked->kind, asked->step, asked->link);
+    if (turn != RT_DECIDED)
+        return undecided(boundary, (uint8_t)turn, request, out);
+    if (asked->kind != RT_STEP)
+        return answer_link(boundary, request, out);
+    /* nor was anything released before it was here */
+    if (asked->released_us < boundary->session.in_force.received_us[asked->step])
+        return undecided(boundary, RT_MALFORMED, request, out);
+    return answer_step(boundary, request, out);
+}
+
+rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup) {
+    /* not the whole: of what a bundle may fill most is never touched, and needs no memory */
+    boundary->loaded = boundary->opened = boundary->to_keep = false;
+    boundary->bundle_size = boundary->document_size = boundary->document_count = 0;
+    boundary->flights = 0;
+    memset(&boundary->executor, 0, sizeof boundary->executor);
+    memset(&boundary->chain, 0, sizeof boundary->chain);
+    boundary->executor.gate.chain = &boundary->chain;
+    boundary->attests = false;
+    boundary->keys = setup->keys;
+    boundary->kept = setup->kept;
+    boundary->vehicle = setup->vehicle;
+    boundary->has_key = setup->has_key;
+    rt_refusal refused = rt_open_root(setup->root, setup->pinned, setup->now.utc_us, &boundary->root);
+    if (refused != NULL) return refused;
+    rt_gate *gate = &boundary->executor.gate;
+    gate->signs = setup->signs;
+    if (setup->signs)
+        rt_signed_link_begin(&gate->signer, setup->keys->link, setup->kept->link_timestamp, setup->kept->streams,
+                             (uint32_t)setup->kept->stream_count, setup->now.utc_us, setup->now.monotonic_us, 0);
+    return NULL;
+}
+
+static void policy_name(const rt_boundary *boundary, uint8_t name[RT_DIGEST_BYTES]) {
+    rt_sha256 hash;
+    rt_sha256_begin(&hash);
+    rt_sha256_add(&hash, boundary->session.in_force.bundle.policy.name);
+    rt_sha256_end(&hash, name);
+}
+
+rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *now) {
+    rt_session *session = &boundary->session;
+    rt_executor *executor = &boundary->executor;
+    rt_invocation invocation;
+    if (boundary->loaded && executor->flies) return "flies";
+    boundary->loaded = boundary->opened = boundary->ahead_known = false;
+    rt_refusal refused = rt_session_begin(session, (rt_bytes){boundary->bundle, boundary->bundle_size}, &boundary->root,
+                                          boundary->vehicle, flight, now);
+    if (refused != NULL) return refused;
+    rt_bundle *bundle = &session->in_force.bundle;
+    boundary->expires_us = 0;
+    for (uint32_t step = 0; step < bundle->mission.invocation_count; step++) {
+        rt_invocation_at(&bundle->mission, step, &invocation);
+        int64_t expires_us = invocation.issued_at_us + invocation.contract.validity_us;
+        if (expires_us > boundary->expires_us) boundary->expires_us = expires_us;
+    }
+    boundary->opened = rt_was_opened(boundary->kept, bundle->mission_digest);
+    if (!boundary->opened) {
+        uint8_t name[RT_DIGEST_BYTES];
+        policy_name(boundary, name);
+        refused = rt_may_open(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version);
+        if (refused != NULL) return refused;
+        /* nothing is forgotten that may not have expired yet */
+        rt_open_mission(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version,
+                        now->utc_us - now->utc_error_us);
+        boundary->to_keep = true;
+    }
+    memset(&boundary->chain, 0, sizeof boundary->chain);
+    boundary->attests = boundary->answered = false;
+    rt_executor_begin(executor, boundary->keys->session, &bundle->policy, &bundle->mission);
+    boundary->serial = 1;
+    boundary->version = bundle->policy.version;
+    boundary->now_us = 0;
+    boundary->document_count = 0;
+    boundary->loaded = true;
+    /* what was opened before is brought down by the contingency, and no step of it begins again */
+    executor->called_off = session->in_force.recalled = boundary->opened;
+    return NULL;
+}
+
+bool rt_give_back(rt_boundary *boundary) {
+    if (!boundary->loaded || boundary->opened || boundary->executor.used_count > 0) return false;
+    rt_forget_mission(boundary->kept, boundary->session.in_force.missions[0]);
+    boundary->loaded = false;
+    return true;
+}
+
+uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, uint8_t *out) {
+    rt_taken taken = {RT_OF_UNKNOWN, NULL, -1, -1, -1, 0};
+    const rt_bytes document = {boundary->documents[boundary->document_count], boundary->document_size};
+    if (now->monotonic_us < boundary->now_us) {
+        taken.refused = "time-went-back";
+    } else if (!keeps_time(boundary, now)) {
+        taken.refused = "time-of-day-set";
+    } else {
+        boundary->now_us = now->monotonic_us;
+        rt_take_document(&boundary->session, document, now, released, &taken);
+        boundary->executor.called_off = rt_called_off(&boundary->session);
+        if (taken.refused == NULL && taken.kind == RT_OF_REPLACEMENT) boundary->document_count++;
+    }
+    if (taken.refused == NULL) {
+        uint8_t payload[27], digest[RT_DIGEST_BYTES], *at = payload;
+        rt_sha256 hash;
+        rt_sha256_begin(&hash);
+        rt_sha256_add(&hash, document);
+        rt_sha256_end(&hash, digest);
+        rt_put(&at, (uint64_t)taken.kind, 1);
+        rt_put(&at, (uint64_t)taken.step, 2);
+        rt_put(&at, (uint64_t)now->monotonic_us, 8);
+        rt_put(&at, (uint64_t)now->utc_us, 8);
+        rt_put(&at, (uint64_t)now->utc_error_us, 8);
+        rt_chain_add(&boundary->chain, RT_TAG_DOCUMENT, (rt_bytes){payload, sizeof payload}, (rt_bytes){digest, sizeof digest});
+    } else {
+        rt_chain_decline(&boundary->chain, document);
+    }
+    boundary->document_size = 0;
+    /* texts are for who shows them: the slug says all */
+    const char *slug = taken.refused == NULL ? "accepted" : taken.refused;
+    rt_bytes text = {(const uint8_t *)slug, 0};
+    while (slug[text.size] != 0) text.size++;
+    const rt_receipt receipt = {taken.kind, text, text, taken.step, taken.role, taken.granted, taken.expires_us,
+                                {boundary->chain.digest, RT_DIGEST_BYTES}};
+    return rt_write_receipt(&receipt, out);
+}
+
+bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_DIGEST_BYTES]) {
+    const rt_in_force *in_force = &boundary->session.in_force;
+    uint8_t payload[8 + RT_DIGEST_BYTES + RT_FLIGHT_BYTES], rest[RT_DIGEST_BYTES + 1], *at = payload;
+    if (boundary->attests || !boundary->has_key) return false;
+    rt_put(&at, (uint64_t)session, 8);
+    memcpy(at, before, RT_DIGEST_BYTES);
+    memcpy(at + RT_DIGEST_BYTES, in_force->flight, RT_FLIGHT_BYTES);
+    rt_sha256 hash;
+    rt_sha256_begin(&hash);
+    rt_sha256_add(&hash, (rt_bytes){boundary->bundle, boundary->bundle_size});
+    rt_sha256_end(&hash, rest);
+    rest[RT_DIGEST_BYTES] = 1; /* everything is enforced */
+    rt_chain_add(&boundary->chain, RT_TAG_BEGIN, (rt_bytes){payload, sizeof payload}, (rt_bytes){rest, sizeof rest});
+    boundary->attests = true;
+    boundary->attestation = session;
+    memcpy(boundary->before, before, RT_DIGEST_BYTES);
+    return true;
+}
+
+uint32_t rt_attested(rt_boundary *boundary, bool final, uint8_t *out) {
+    if (!boundary->attests || boundary->chain.over) return 0;
+    boundary->chain.over = final;
+    return rt_sign_statement(&boundary->chain, boundary->keys->boundary, boundary->session.in_force.flight, boundary->attestation,
+                             boundary->before, final, out);
+}

@@ -1,0 +1,213 @@
+#include "calls.h"
+
+/* What of a call is still to be read. */
+typedef struct {
+    const uint8_t *at;
+    uint32_t left;
+    bool short_; /* more was asked for than came */
+} reader;
+
+static int64_t take(reader *call, uint32_t octets) {
+    uint64_t value = 0, half = 1ULL << (8 * octets - 1);
+    if (call->left < octets) {
+        call->short_ = true;
+        return 0;
+    }
+    for (uint32_t octet = 0; octet < octets; octet++)
+        value = value << 8 | *call->at++;
+    call->left -= octets;
+    return value < half ? (int64_t)value : -(int64_t)(half - (value - half));
+}
+
+static rt_bytes rest_of(reader *call) {
+    rt_bytes rest = {call->at, call->left};
+    call->left = 0;
+    return rest;
+}
+
+static void put(uint8_t **out, int64_t value, uint32_t octets) {
+    while (octets-- > 0)
+        *(*out)++ = (uint8_t)((uint64_t)value >> 8 * octets & 0xFF);
+}
+
+static uint32_t refuse(rt_refusal slug, uint8_t *out) {
+    uint32_t size = 0;
+    out[size++] = 1;
+    for (; slug[size - 1] != 0 && size < RT_MAX_RESULT; size++)
+        out[size] = (uint8_t)slug[size - 1];
+    return size;
+}
+
+/* A time that a request may have: what is computed from it stays within 64 bits. */
+static bool is_time(int64_t time) { return time >= 0 && time <= RT_MAX_VALUE; }
+
+static uint32_t permitted(rt_refusal refused, const rt_permit *permit, uint8_t *out) {
+    if (refused != NULL)
+        return refuse(refused, out);
+    uint8_t *at = out;
+    put(&at, 0, 1);
+    put(&at, permit->kind, 1);
+    put(&at, permit->step, 2);
+    put(&at, permit->link, 2);
+    put(&at, (int64_t)permit->serial, 8);
+    put(&at, permit->not_after_us, 8);
+    return (uint32_t)(at - out);
+}
+
+static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, uint8_t *out) {
+    uint8_t bare[RT_LARGEST_FRAME];
+    rt_gate *gate = &boundary->executor.gate;
+    rt_heard heard = RT_ACCEPTED;
+    if (gate->signs) {
+        heard = rt_accept_frame(&gate->signer, frame, now_us);
+        if (heard == RT_ACCEPTED && frame.size <= sizeof bare && frame.size == RT_HEADER + (uint32_t)frame.at[1] + RT_CHECKSUM + RT_SIGNATURE) {
+            memcpy(bare, frame.at, frame.size);
+            rt_set_flags(bare, 0);
+            frame = (rt_bytes){bare, frame.size - RT_SIGNATURE};
+        }
+    }
+    if (heard == RT_ACCEPTED)
+        rt_gate_observe(gate, frame, now_us);
+    out[0] = 0;
+    out[1] = (uint8_t)heard;
+    return 2;
+}
+
+/* A part goes behind those before it; the first one begins anew. */
+static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_bytes part) {
+    bool document = what == RT_CALL_PRESENT;
+    uint32_t *size = document ? &boundary->document_size : &boundary->bundle_size;
+    const uint32_t most = document ? RT_MAX_DOCUMENT : RT_MAX_BUNDLE;
+    if (!document && what != RT_CALL_LOAD) return "malformed";
+    if (document ? !boundary->loaded : boundary->loaded && boundary->executor.flies) return document ? "not-loaded" : "flies";
+    if (!document) boundary->loaded = false;
+    if (at == 0) *size = 0;
+    if (at != *size) return "malformed";
+    if (part.size > most - *size) return "too-large";
+    uint8_t *into = document ? boundary->documents[boundary->document_count] : boundary->bundle;
+    memcpy(into + *size, part.at, part.size);
+    *size += part.size;
+    return NULL;
+}
+
+/* Nobody can tell the id of a flight ahead, nor give it one that was flown before. */
+static void draw_flight(rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BYTES]) {
+    static const uint8_t domain[] = "rtshcua/flight";
+    uint8_t digest[RT_DIGEST_BYTES], count[8];
+    boundary->flights++;
+    for (uint32_t octet = 0; octet < 8; octet++) count[octet] = (uint8_t)(boundary->flights >> 8 * octet & 0xFF);
+    const rt_bytes parts[] = {{domain, sizeof domain}, {count, sizeof count}};
+    rt_hmac_sha256((rt_bytes){boundary->keys->session, RT_KEY_BYTES}, parts, 2, digest);
+    memcpy(flight, digest, RT_FLIGHT_BYTES);
+}
+
+static uint32_t load(rt_boundary *boundary, const rt_now *now, uint8_t *out) {
+    rt_refusal refused;
+    (void)rt_give_back(boundary); /* what nothing was sent of may be waited with again */
+    draw_flight(boundary, out + 1);
+    refused = rt_load(boundary, out + 1, now);
+    if (refused != NULL) return refuse(refused, out);
+    out[0] = 0;
+    out[1 + RT_FLIGHT_BYTES] = boundary->opened ? 1 : 0;
+    return 2 + RT_FLIGHT_BYTES;
+}
+
+/* LOAD and PRESENT: about what was handed over in parts. */
+static uint32_t answer_staged(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
+    rt_now now;
+    now.monotonic_us = take(left, 8);
+    now.utc_us = take(left, 8);
+    now.utc_error_us = take(left, 8);
+    int64_t released = kind == RT_CALL_PRESENT ? take(left, 4) : 0;
+    int64_t size = take(left, 4);
+    bool sound = !left->short_ && left->left == 0 && released >= 0;
+    if (!sound || !is_time(now.monotonic_us) || !is_time(now.utc_us) || !is_time(now.utc_error_us)) return refuse("malformed", out);
+    if (size != (kind == RT_CALL_LOAD ? boundary->bundle_size : boundary->document_size)) return refuse("malformed", out);
+    if (rt_is_apart(now.monotonic_us, own_us)) return refuse("time-apart", out);
+    if (kind == RT_CALL_LOAD) return load(boundary, &now, out);
+    if (!boundary->loaded) return refuse("not-loaded", out);
+    out[0] = 0;
+    return 1 + rt_present(boundary, &now, released, out + 1);
+}
+
+/* What the flight's executor is told, of a permit or of how a command ended. */
+static uint32_t answer_executor(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
+    rt_executor *executor = &boundary->executor;
+    rt_permit permit;
+    if (kind == RT_CALL_ENDED && left->left == 0) rt_ended(executor);
+    else if (kind == RT_CALL_ENDED) rt_ended_command(executor, (uint64_t)take(left, 8));
+    else if (kind == RT_CALL_LANDED) rt_landed(executor);
+    else if (kind == RT_CALL_RELEASE) rt_release(executor);
+    else {
+        int64_t now_us = take(left, 8);
+        if (left->short_ || !is_time(now_us)) return refuse("malformed", out);
+        if (rt_is_apart(now_us, own_us)) return refuse("time-apart", out);
+        if (kind == RT_CALL_DISPATCH) return permitted(rt_dispatch(executor, rest_of(left), now_us, &permit), &permit, out);
+        int64_t what = take(left, 1), link = take(left, 1);
+        return permitted(rt_stand_in(executor, rest_of(left), what, link, now_us, &permit), &permit, out);
+    }
+    out[0] = 0;
+    return 1;
+}
+
+uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t *out) {
+    reader left = {call.at, call.size, false};
+    int64_t kind = take(&left, 1), now_us;
+    rt_refusal refused = "malformed";
+    uint32_t size = 0;
+    switch (kind) {
+    case RT_CALL_PART: {
+        int64_t what = take(&left, 1), at = take(&left, 4);
+        refused = left.short_ ? "malformed" : stage(boundary, what, at, rest_of(&left));
+        break;
+    }
+    case RT_CALL_LOAD:
+    case RT_CALL_PRESENT:
+        return answer_staged(boundary, kind, &left, own_us, out);
+    case RT_CALL_ENFORCE:
+        if (!boundary->loaded) return refuse("not-loaded", out);
+        size = rt_enforce(boundary, rest_of(&left), own_us, out + 1);
+        refused = NULL;
+        break;
+    case RT_CALL_DISPATCH:
+    case RT_CALL_STAND_IN:
+    case RT_CALL_ENDED:
+    case RT_CALL_LANDED:
+    case RT_CALL_RELEASE:
+        return boundary->loaded ? answer_executor(boundary, kind, &left, own_us, out) : refuse("not-loaded", out);
+    case RT_CALL_OBSERVE: /* and what leaves always leaves, before a bundle is in force too */
+    case RT_CALL_SEAL:
+        now_us = take(&left, 8);
+        if (left.short_ || !is_time(now_us)) break;
+        refused = "time-apart";
+        if (rt_is_apart(now_us, own_us)) break;
+        if (kind == RT_CALL_OBSERVE) return observe(boundary, rest_of(&left), now_us, out);
+        refused = rt_gate_seal(&boundary->executor.gate, rest_of(&left), now_us, out + 1, &size);
+        break;
+    case RT_CALL_BEGIN:
+        if (!boundary->loaded || left.left != 8 + RT_DIGEST_BYTES) break;
+        now_us = take(&left, 8);
+        refused = now_us >= 0 && rt_attest(boundary, now_us, left.at) ? NULL : "no-boundary-key";
+        break;
+    case RT_CALL_STATEMENT:
+        size = rt_attested(boundary, take(&left, 1) != 0, out + 1);
+        refused = size > 0 ? NULL : "no-boundary-key";
+        break;
+    case RT_CALL_DIGEST:
+        memcpy(out + 1, boundary->chain.digest, RT_DIGEST_BYTES);
+        size = RT_DIGEST_BYTES;
+        refused = NULL;
+        break;
+    default:
+        break;
+    }
+    if (refused != NULL) return refuse(refused, out);
+    out[0] = 0;
+    return 1 + size;
+}
+
+uint32_t rt_take_back(rt_boundary *boundary, uint8_t *out) {
+    rt_release(&boundary->executor);
+    boundary->executor.called_off = true;
+    return refuse("not-kept", out);
+}

@@ -1,0 +1,39 @@
+/* The calls that cross to a boundary outside the runtime, and their answers: octets in, octets out, whatever carries them. The other
+   end is rtshcua/onboard/enforcement/isolated.py.
+
+   A call is an octet that says which, and what follows it, big-endian; an answer is 0 and what is given back, or 1 and the slug of a
+   refusal. Nothing that a caller says is believed but by its seal: whatever comes, it is answered. */
+#ifndef RT_ENFORCEMENT_CALLS_H
+#define RT_ENFORCEMENT_CALLS_H
+
+#include "boundary.h"
+
+enum {
+    RT_CALL_PART = 1,     /* for which (1: LOAD, PRESENT), where (4), octets: a part of what that call is about */
+    RT_CALL_LOAD = 2,     /* now (24), size (4) -> flight (16), whether it was opened before (1) */
+    RT_CALL_ENFORCE = 3,  /* a request -> a response */
+    RT_CALL_PRESENT = 4,  /* now (24), released (4), size (4) -> a receipt */
+    RT_CALL_DISPATCH = 5, /* now (8), a permit -> kind (1), step (2), link (2), serial (8), not after (8) */
+    RT_CALL_STAND_IN = 6, /* now (8), kind (1), link (1), the standing permit -> as DISPATCH */
+    RT_CALL_ENDED = 7,    /* token (8) or nothing */
+    RT_CALL_LANDED = 8,
+    RT_CALL_RELEASE = 9,
+    RT_CALL_OBSERVE = 10, /* now (8), a frame as it came -> what was made of it (1): rt_heard */
+    RT_CALL_SEAL = 11,    /* now (8), a frame -> the octets to send */
+    RT_CALL_BEGIN = 12,     /* session (8), the digest that was kept of the one before (32) */
+    RT_CALL_STATEMENT = 13, /* whether it is the last (1) -> a signed statement of the boundary's own evidence */
+    RT_CALL_DIGEST = 14     /* -> the digest of that (32) */
+};
+
+#define RT_MAX_PART 60000 /* octets */
+#define RT_MAX_CALL (RT_MAX_PART + 64)
+#define RT_MAX_RESULT (RT_MAX_STATEMENT + 64)
+
+/* Answer one call into `out` of RT_MAX_RESULT octets; the size of the answer. `own_us` is our own monotonic time, -1 where the
+   caller's is the only one. */
+uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t *out);
+
+/* What was answered last must not count, for it could not be kept: nothing more leaves, and the answer in `out` is a refusal now. */
+uint32_t rt_take_back(rt_boundary *boundary, uint8_t *out);
+
+#endif

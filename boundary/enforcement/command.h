@@ -1,0 +1,26 @@
+/* One bounded manoeuvre, as the bundle has it: `Command` of onboard/ports.py. It exists only beside a permit. */
+#ifndef RT_ENFORCEMENT_COMMAND_H
+#define RT_ENFORCEMENT_COMMAND_H
+
+#include "model/flat.h"
+
+/* `path` is x0, y0, ... in local mm. Where `has_place` it is the one point `place`. Altitude mm above home, speed mm/s. */
+typedef struct {
+    uint64_t token;
+    int64_t kind, altitude, speed;
+    rt_list path;
+    bool has_place;
+    int64_t place[2];
+    rt_projection projection;
+} rt_command;
+
+/* A local place in 1e-7 degree: `unproject` of model/flat/zone.py. */
+void rt_unproject(const rt_projection *projection, int64_t x, int64_t y, int64_t *latitude, int64_t *longitude);
+
+/* The number within 180 degrees of the longitude `near` that names the same meridian as `longitude`. */
+int64_t rt_meridian(int64_t longitude, int64_t near_to);
+
+/* A point of the path, in 1e-7 degree; false where there is none of this number. */
+bool rt_point_at(const rt_command *command, int64_t number, int64_t *latitude, int64_t *longitude);
+
+#endif

@@ -1,0 +1,236 @@
+#include "executor.h"
+
+#include "wire/octets.h"
+
+#define UNTOUCHED (RT_DEGRADE_LINK - 1)
+#define ALWAYS INT64_MAX /* us */
+
+void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], const rt_policy *policy, const rt_mission *mission) {
+    const rt_signed_link signer = executor->gate.signer; /* the link stays as it is */
+    const bool signs = executor->gate.signs;
+    rt_chain *chain = executor->gate.chain;
+    memset(executor, 0, sizeof *executor);
+    executor->gate.signer = signer;
+    executor->gate.signs = signs;
+    executor->gate.chain = chain;
+    memcpy(executor->key, key, RT_KEY_BYTES);
+    executor->policy = policy;
+    executor->mission = mission;
+    executor->step = executor->fallback_step = -1;
+    executor->fallback_link = executor->contingency = UNTOUCHED;
+}
+
+static void of_link(const rt_policy *policy, const rt_link *link, rt_command *command) {
+    const rt_contract *contract = &policy->contracts[link->skill];
+    const rt_motion *motion = &contract->motion;
+    command->kind = motion->kind;
+    command->altitude = motion->altitude < 0 ? 0 : rt_int_at(link->arguments, (uint32_t)motion->altitude);
+    command->speed = motion->speed < 0 ? 0 : rt_int_at(link->arguments, (uint32_t)motion->speed);
+    if (motion->kind != RT_FLY)
+        return;
+    rt_list left = contract->parameters;
+    rt_parameter parameter;
+    while (rt_next_parameter(&left, &parameter))
+        if (parameter.kind == RT_PLACE) {
+            command->has_place = true;
+            command->place[0] = rt_int_at(link->arguments, (uint32_t)parameter.cell);
+            command->place[1] = rt_int_at(link->arguments, (uint32_t)parameter.cell + 1);
+            return;
+        }
+}
+
+/* The command of a step or a link; false for one that the bundle does not have. */
+static bool command_of(const rt_executor *executor, const rt_permit *permit, rt_command *command) {
+    const rt_policy *policy = executor->policy;
+    rt_invocation invocation;
+    memset(command, 0, sizeof *command);
+    command->token = permit->serial;
+    command->projection = policy->projection;
+    if (permit->kind == RT_CONTINGENCY_LINK) {
+        if (permit->link < 0 || permit->link >= policy->contingency_count)
+            return false;
+        of_link(policy, &policy->contingency[permit->link], command);
+        return true;
+    }
+    if (permit->step < 0 || permit->step >= executor->mission->invocation_count)
+        return false;
+    rt_invocation_at(executor->mission, (uint32_t)permit->step, &invocation);
+    if (permit->kind == RT_STEP) {
+        command->kind = invocation.plan.kind;
+        command->altitude = invocation.plan.altitude;
+        command->speed = invocation.plan.speed;
+        command->path = invocation.plan.path;
+        return true;
+    }
+    int64_t rule = -1 - permit->link, number = permit->link;
+    if (rule >= 0) {
+        if (rule >= policy->rule_count || !policy->rules[rule].has_target)
+            return false;
+        of_link(policy, &policy->rules[rule].target, command);
+        return true;
+    }
+    rt_list chain = invocation.contract.fallback;
+    rt_link link;
+    while (rt_next_link(&chain, &link))
+        if (number-- == 0) {
+            of_link(policy, &link, command);
+            return true;
+        }
+    return false;
+}
+
+/* Where a serial stands among the used ones, or would. */
+static uint32_t place_of(const rt_executor *executor, uint64_t serial) {
+    uint32_t low = 0, high = executor->used_count;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if (executor->used[middle] < serial)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static bool is_used(const rt_executor *executor, uint64_t serial) {
+    uint32_t at = place_of(executor, serial);
+    return at < executor->used_count && executor->used[at] == serial;
+}
+
+static void use(rt_executor *executor, uint64_t serial) {
+    uint32_t at = place_of(executor, serial);
+    for (uint32_t later = executor->used_count++; later > at; later--)
+        executor->used[later] = executor->used[later - 1];
+    executor->used[at] = serial;
+}
+
+/* Where in its chain a fallback permit stands: a degrade rule's target comes before the first link. */
+static int64_t position(const rt_permit *permit) {
+    return permit->link > RT_DEGRADE_LINK ? permit->link : RT_DEGRADE_LINK;
+}
+
+static rt_refusal refuse_step(const rt_executor *executor, const rt_permit *permit) {
+    if (executor->homeward || executor->called_off)
+        return "permit/mission-over";
+    if (executor->running || permit->step <= executor->step)
+        return "permit/out-of-turn";
+    return NULL;
+}
+
+static rt_refusal refuse_link(const rt_executor *executor, const rt_permit *permit) {
+    if (permit->kind == RT_CONTINGENCY_LINK) /* holds may come and go; from what brings it home or down it goes on */
+        return executor->final && permit->link < executor->contingency ? "permit/backwards" : NULL;
+    if (permit->step < executor->step)
+        return "permit/lapsed";
+    if (executor->final || (permit->step == executor->fallback_step && position(permit) <= executor->fallback_link))
+        return "permit/backwards";
+    return NULL;
+}
+
+static void follow(rt_executor *executor, const rt_permit *permit, int64_t motion) {
+    bool homeward = motion == RT_HOME || motion == RT_LAND;
+    executor->running = false;
+    executor->homeward = executor->homeward || homeward;
+    if (permit->kind == RT_CONTINGENCY_LINK) {
+        executor->contingency = permit->link;
+        executor->final = executor->final || homeward;
+    } else {
+        executor->fallback_step = permit->step;
+        executor->fallback_link = position(permit);
+    }
+}
+
+static rt_refusal dispatch(rt_executor *executor, const rt_permit *permit, int64_t now_us) {
+    rt_command command;
+    if (executor->gate.chain->over)
+        return "permit/session-over";
+    if (is_used(executor, permit->serial))
+        return "permit/used";
+    if (now_us > permit->not_after_us)
+        return "permit/late";
+    rt_refusal refused = permit->kind == RT_STEP ? refuse_step(executor, permit) : refuse_link(executor, permit);
+    if (refused != NULL)
+        return refused;
+    if (executor->used_count == RT_MOST_DISPATCHED || !command_of(executor, permit, &command))
+        return "permit/not-covered";
+    use(executor, permit->serial);
+    if (permit->kind == RT_STEP) {
+        executor->step = permit->step;
+        executor->serial = permit->serial;
+        executor->running = true;
+        if (!executor->flies) {
+            executor->flies = true;
+            executor->flight = permit->serial;
+        }
+    } else {
+        follow(executor, permit, command.kind);
+    }
+    executor->last = permit->serial;
+    uint8_t payload[21], *at = payload;
+    rt_put(&at, (uint64_t)permit->kind, 1);
+    rt_put(&at, (uint64_t)permit->step, 2);
+    rt_put(&at, (uint64_t)(permit->link > RT_DEGRADE_LINK ? permit->link : RT_DEGRADE_LINK), 2);
+    rt_put(&at, permit->serial, 8);
+    rt_put(&at, (uint64_t)now_us, 8);
+    rt_chain_add(executor->gate.chain, RT_TAG_SENT, (rt_bytes){payload, sizeof payload}, (rt_bytes){NULL, 0});
+    rt_gate_open(&executor->gate, &command, permit->not_after_us);
+    return NULL;
+}
+
+/* A permit by which nothing is sent: why, at a monotonic time. */
+static rt_refusal chained(rt_executor *executor, rt_refusal refused, int64_t now_us) {
+    uint8_t time[8], *at = time;
+    rt_bytes slug = {(const uint8_t *)refused, 0};
+    if (refused == NULL) return NULL;
+    while (refused[slug.size] != 0) slug.size++;
+    rt_put(&at, (uint64_t)now_us, 8);
+    rt_chain_add(executor->gate.chain, RT_TAG_REFUSED, (rt_bytes){time, sizeof time}, slug);
+    return refused;
+}
+
+rt_refusal rt_dispatch(rt_executor *executor, rt_bytes sealed, int64_t now_us, rt_permit *permit) {
+    bool ours = rt_open_permit(sealed, executor->key, permit);
+    return chained(executor, ours ? dispatch(executor, permit, now_us) : "permit/forged", now_us);
+}
+
+static rt_refusal stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit) {
+    rt_permit standing;
+    if (!rt_open_permit(sealed, executor->key, &standing))
+        return "permit/forged";
+    bool fallback = kind == RT_FALLBACK_LINK;
+    if (link < 0 || link >= (fallback ? standing.fallbacks : standing.contingencies))
+        return "permit/not-covered";
+    /* not sent, followed by another step, or landed since */
+    bool lapsed = !executor->flies || !is_used(executor, standing.serial) || standing.serial < executor->flight;
+    if (standing.kind != RT_STEP || lapsed || (fallback && standing.serial != executor->serial))
+        return "permit/lapsed";
+    uint64_t serial = standing.serial + 1 + (uint64_t)link + (fallback ? 0 : (uint64_t)standing.fallbacks);
+    if (!fallback && link == standing.contingencies - 1) {
+        uint64_t end = serial + RT_AGAIN;
+        while (serial < end && is_used(executor, serial))
+            serial++;
+    }
+    *permit = (rt_permit){kind, fallback ? standing.step : -1, link, serial, 0, 0, ALWAYS};
+    return dispatch(executor, permit, now_us);
+}
+
+rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit) {
+    return chained(executor, stand_in(executor, sealed, kind, link, now_us, permit), now_us);
+}
+
+void rt_ended(rt_executor *executor) {
+    executor->running = false;
+    rt_gate_close(&executor->gate);
+}
+
+void rt_ended_command(rt_executor *executor, uint64_t token) {
+    if (token == executor->last)
+        rt_ended(executor);
+}
+
+void rt_landed(rt_executor *executor) {
+    executor->running = executor->flies = false;
+    rt_gate_close(&executor->gate);
+}
+
+void rt_release(rt_executor *executor) { rt_gate_close(&executor->gate); }

@@ -1,0 +1,42 @@
+/* The only place that turns a permit into something to send. `executor.py`. */
+#ifndef RT_ENFORCEMENT_EXECUTOR_H
+#define RT_ENFORCEMENT_EXECUTOR_H
+
+#include "frames.h"
+#include "wire/permit.h"
+
+/* how many permits may be dispatched in one session: more than any flight has, and what the table holds */
+#define RT_MOST_DISPATCHED 65536
+
+typedef struct {
+    uint8_t key[RT_KEY_BYTES];
+    const rt_policy *policy;
+    const rt_mission *mission; /* a replacement puts another in its place */
+    bool called_off;           /* no step may be sent any more */
+    rt_gate gate;
+    uint64_t used[RT_MOST_DISPATCHED]; /* serials, ascending */
+    uint32_t used_count;
+    int64_t step; /* the last step that was sent, -1 before, */
+    uint64_t serial;
+    bool running;
+    uint64_t last; /* the permit that was dispatched last */
+    bool flies;
+    uint64_t flight; /* the first step permit of this flight, while it flies */
+    int64_t fallback_step, fallback_link; /* the step whose chain was last in use, and the last link sent */
+    int64_t contingency;                  /* the last link of the contingency that was sent */
+    bool homeward, final;
+} rt_executor;
+
+void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], const rt_policy *policy, const rt_mission *mission);
+
+/* Send the command of a permit, or of a link by the standing permit of a step that was sent: the gate is open for it then.
+   Answer why not, or NULL and what is permitted. */
+rt_refusal rt_dispatch(rt_executor *executor, rt_bytes sealed, int64_t now_us, rt_permit *permit);
+rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit);
+
+void rt_ended(rt_executor *executor);                        /* the running step ended, however it did */
+void rt_ended_command(rt_executor *executor, uint64_t token); /* that command ended; another since runs on */
+void rt_landed(rt_executor *executor);                       /* standing permits lapse */
+void rt_release(rt_executor *executor);                      /* send nothing more that moves the vehicle */
+
+#endif

@@ -1,0 +1,149 @@
+#include "frames.h"
+#include "mavlink/parameters.h"
+
+#define HOME_MOVES 10000    /* mm */
+#define STANDS_US 3000000LL /* us */
+
+void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us) {
+    gate->open = gate->started = true;
+    gate->command = *command;
+    gate->not_after_us = not_after_us;
+    gate->begun = false;
+    gate->leg = -1;
+    gate->prepared_count = 0;
+    if (!gate->settled_known || command->kind == RT_CLIMB) {
+        gate->settled_known = gate->home_known;
+        gate->settled_amsl = gate->home_amsl;
+    }
+}
+
+void rt_gate_close(rt_gate *gate) { gate->open = false; }
+
+bool rt_gate_stands(const rt_gate *gate, int64_t now_us) {
+    int64_t oldest = gate->armed_us < gate->stands_us ? gate->armed_us : gate->stands_us;
+    return oldest > (now_us > STANDS_US ? now_us - STANDS_US : 0) && !gate->armed && !gate->open;
+}
+
+static bool is_bytewise(const rt_gate *gate) { return gate->autopilot == RT_MAV_AUTOPILOT_PX4; }
+
+void rt_gate_observe(rt_gate *gate, rt_bytes octets, int64_t now_us) {
+    rt_frame heard;
+    rt_setting told;
+    if (!rt_read_frame(octets, &heard) || heard.component != RT_MAV_COMP_ID_AUTOPILOT1)
+        return;
+    if (heard.message == RT_MSG_HEARTBEAT) {
+        uint8_t autopilot = heard.payload[RT_HEARTBEAT_AUTOPILOT];
+        bool known = autopilot == RT_MAV_AUTOPILOT_PX4 || autopilot == RT_MAV_AUTOPILOT_ARDUPILOTMEGA;
+        if (gate->system == 0 && known) {
+            gate->system = heard.system;
+            gate->autopilot = autopilot;
+        }
+        if (heard.system == gate->system) {
+            gate->armed = (heard.payload[RT_HEARTBEAT_BASE_MODE] & RT_MAV_MODE_FLAG_SAFETY_ARMED) != 0;
+            gate->armed_us = now_us;
+        }
+    } else if (heard.system != gate->system) {
+        return;
+    } else if (heard.message == RT_MSG_GLOBAL_POSITION_INT) {
+        gate->here_known = true;
+        gate->here.latitude = rt_i32(&heard, RT_GLOBAL_POSITION_INT_LAT);
+        gate->here.longitude = rt_i32(&heard, RT_GLOBAL_POSITION_INT_LON);
+        int64_t home = (int64_t)rt_i32(&heard, RT_GLOBAL_POSITION_INT_ALT) -
+                       rt_i32(&heard, RT_GLOBAL_POSITION_INT_RELATIVE_ALT);
+        int64_t moved = home - gate->settled_amsl;
+        if (!gate->settled_known || (moved <= HOME_MOVES && moved >= -HOME_MOVES)) {
+            gate->home_known = true;
+            gate->home_amsl = home;
+        }
+    } else if (heard.message == RT_MSG_EXTENDED_SYS_STATE) {
+        bool down = heard.payload[RT_EXTENDED_SYS_STATE_LANDED_STATE] == RT_MAV_LANDED_STATE_ON_GROUND;
+        gate->stands_us = down ? now_us : 0;
+    } else if (heard.message == RT_MSG_PARAM_VALUE && rt_setting_of(&heard, is_bytewise(gate), &told)) {
+        static const uint8_t fence_type[RT_NAME_OCTETS] = "FENCE_TYPE";
+        if (memcmp(told.name, fence_type, RT_NAME_OCTETS) == 0) {
+            gate->types_known = true;
+            gate->types = told.value; /* 0 where it is no number */
+        }
+    }
+}
+
+static bool is_prepared(const rt_gate *gate, const rt_setting *setting, int64_t now_us) {
+    if (!setting->is_number || now_us > gate->prepared_us)
+        return false;
+    for (uint32_t at = 0; at < gate->prepared_count; at++)
+        if (gate->prepared[at].value == setting->value && memcmp(gate->prepared[at].name, setting->name, RT_NAME_OCTETS) == 0)
+            return true;
+    return false;
+}
+
+static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t now_us) {
+    rt_point point, last, next;
+    if (!gate->open)
+        return "frame/no-session";
+    if (!rt_carries_out(frame, &gate->command, gate->autopilot, gate->home_known, gate->home_amsl))
+        return "frame/not-covered";
+    if (!gate->begun && now_us > gate->not_after_us)
+        return "frame/late";
+    if (rt_point_of(frame, &point)) {
+        bool has_last = rt_point_at(&gate->command, gate->leg, &last.latitude, &last.longitude);
+        bool there = !has_last || (gate->here_known && rt_is_near(gate->here, last)); /* else it would cut the corner */
+        bool has_next = rt_point_at(&gate->command, gate->leg + 1, &next.latitude, &next.longitude);
+        if (has_last && last.latitude == point.latitude && last.longitude == point.longitude) {
+            /* once more to where it flies already */
+        } else if (there && has_next && next.latitude == point.latitude && next.longitude == point.longitude) {
+            gate->leg++;
+        } else {
+            return "frame/out-of-order";
+        }
+    }
+    gate->begun = true;
+    return NULL;
+}
+
+/* Why a frame does not leave; `*carries` where it does, and carries out a command. */
+static rt_refusal refuse(rt_gate *gate, rt_bytes octets, int64_t now_us, bool *carries) {
+    rt_frame frame;
+    rt_setting setting;
+    /* 1. it is what it will be taken for: one frame, from us, to the autopilot that was heard, and to nobody else */
+    if (!rt_read_frame(octets, &frame))
+        return "frame/not-one-frame";
+    if (gate->system == 0) /* a vehicle may wait to be spoken to; what we are is all that it is told then */
+        return rt_is_greeting(&frame) && frame.component == RT_MAV_COMP_ID_ONBOARD_COMPUTER ? NULL : "frame/no-vehicle";
+    if (frame.system != gate->system || frame.component != RT_MAV_COMP_ID_ONBOARD_COMPUTER)
+        return "frame/not-ours";
+    if (frame.has_target &&
+        (frame.target_system != gate->system || frame.target_component != RT_MAV_COMP_ID_AUTOPILOT1))
+        return "frame/wrong-target";
+    /* 2. never, whatever is permitted */
+    if (rt_is_forced_arming(&frame))
+        return "frame/forced-arming";
+    /* 3. always, or before the flight */
+    if (rt_is_housekeeping(&frame))
+        return NULL;
+    if (gate->chain->over)
+        return "frame/session-over";
+    bool sets = frame.message == RT_MSG_PARAM_SET && rt_setting_of(&frame, is_bytewise(gate), &setting);
+    if (sets && is_prepared(gate, &setting, now_us))
+        return rt_gate_stands(gate, now_us) ? NULL : "frame/not-down";
+    if (rt_is_of_fence(&frame, gate->types_known, gate->types))
+        return gate->started || gate->armed ? "frame/after-start" : NULL;
+    if (sets)
+        return "frame/not-listed";
+    /* 4. what is permitted now */
+    *carries = true;
+    return refuse_motion(gate, &frame, now_us);
+}
+
+rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *out, uint32_t *size) {
+    bool carries = false;
+    rt_refusal refused = refuse(gate, frame, now_us, &carries);
+    *size = 0;
+    if (refused != NULL) {
+        rt_chain_stop(gate->chain, frame);
+        return refused;
+    }
+    if (carries) rt_chain_leave(gate->chain, frame);
+    memcpy(out, frame.at, frame.size);
+    *size = gate->signs ? rt_sign_frame(&gate->signer, out, frame.size, now_us) : frame.size;
+    return NULL;
+}

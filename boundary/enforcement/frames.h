@@ -1,0 +1,45 @@
+/* The gate that frames leave by, opened and closed by the executor alone. `frames.py`. */
+#ifndef RT_ENFORCEMENT_FRAMES_H
+#define RT_ENFORCEMENT_FRAMES_H
+
+#include "allow_list.h"
+#include "mavlink/signing.h"
+#include "wire/boundary_chain.h"
+
+#define RT_MOST_WRITES 32
+
+typedef struct {
+    rt_chain *chain; /* where what leaves is chained */
+    bool signs;
+    rt_signed_link signer;
+    bool open; /* a command is permitted, */
+    rt_command command;
+    int64_t not_after_us; /* its first frame leaves by then, monotonic */
+    bool begun;           /* a frame of it left */
+    int64_t leg;          /* the last point of its path that was sent, -1 before */
+    bool here_known;
+    rt_point here;
+    bool started; /* a session was opened: fences stay as they are */
+    uint8_t system, autopilot;
+    bool armed;
+    int64_t armed_us, stands_us;
+    bool types_known;
+    uint32_t types;
+    rt_setting prepared[RT_MOST_WRITES];
+    uint32_t prepared_count;
+    int64_t prepared_us;
+    bool home_known, settled_known;
+    int64_t home_amsl, settled_amsl; /* mm */
+} rt_gate;
+
+void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us);
+void rt_gate_close(rt_gate *gate);
+bool rt_gate_stands(const rt_gate *gate, int64_t now_us);
+
+/* Take in one good frame from the link, its signature verified where there is a key. */
+void rt_gate_observe(rt_gate *gate, rt_bytes frame, int64_t now_us);
+
+/* Why a frame is not sent at a monotonic time, NULL where it is; `out`, of RT_LARGEST_FRAME octets, is what to send then. */
+rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *out, uint32_t *size);
+
+#endif

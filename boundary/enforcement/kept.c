@@ -1,0 +1,72 @@
+#include "kept.h"
+#include "crypto/crypto.h"
+
+bool rt_was_opened(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]) {
+    for (uint64_t at = 0; at < kept->opened_count; at++)
+        if (memcmp(kept->opened[at].digest, digest, RT_DIGEST_BYTES) == 0)
+            return true;
+    return false;
+}
+
+rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
+                       const uint8_t policy[RT_DIGEST_BYTES], int64_t version) {
+    if (rt_was_opened(kept, digest) || expires_us <= kept->floor_us)
+        return "replayed";
+    bool known = false;
+    for (uint64_t at = 0; at < kept->version_count; at++)
+        if (memcmp(kept->versions[at].name, policy, RT_DIGEST_BYTES) == 0) {
+            known = true;
+            if (version < kept->versions[at].version)
+                return "old-policy";
+        }
+    bool room = kept->opened_count < RT_MOST_OPENED && (known || kept->version_count < RT_MOST_POLICIES);
+    return room ? NULL : "full";
+}
+
+void rt_open_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
+                     const uint8_t policy[RT_DIGEST_BYTES], int64_t version, int64_t now_us) {
+    uint64_t left = 0, at = 0;
+    for (uint64_t each = 0; each < kept->opened_count; each++) {
+        if (kept->opened[each].expires_us >= now_us)
+            kept->opened[left++] = kept->opened[each];
+        else if (kept->opened[each].expires_us > kept->floor_us)
+            kept->floor_us = kept->opened[each].expires_us;
+    }
+    memcpy(kept->opened[left].digest, digest, RT_DIGEST_BYTES);
+    kept->opened[left++].expires_us = expires_us;
+    kept->opened_count = left;
+    while (at < kept->version_count && memcmp(kept->versions[at].name, policy, RT_DIGEST_BYTES) != 0)
+        at++;
+    if (at == kept->version_count)
+        memcpy(kept->versions[kept->version_count++].name, policy, RT_DIGEST_BYTES);
+    kept->versions[at].version = version;
+}
+
+void rt_forget_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]) {
+    uint64_t left = 0;
+    for (uint64_t each = 0; each < kept->opened_count; each++)
+        if (memcmp(kept->opened[each].digest, digest, RT_DIGEST_BYTES) != 0) kept->opened[left++] = kept->opened[each];
+    kept->opened_count = left;
+}
+
+static void check_of(const rt_kept *kept, uint8_t check[RT_DIGEST_BYTES]) {
+    rt_sha256 hash;
+    rt_sha256_begin(&hash);
+    rt_sha256_add(&hash, (rt_bytes){(const uint8_t *)kept, offsetof(rt_kept, check)});
+    rt_sha256_end(&hash, check);
+}
+
+void rt_seal_kept(rt_kept *kept) {
+    kept->layout = RT_KEPT_LAYOUT;
+    kept->turn++;
+    check_of(kept, kept->check);
+}
+
+bool rt_is_whole_kept(const rt_kept *kept) {
+    uint8_t check[RT_DIGEST_BYTES];
+    if (kept->layout != RT_KEPT_LAYOUT || kept->opened_count > RT_MOST_OPENED || kept->version_count > RT_MOST_POLICIES ||
+        kept->stream_count > RT_MOST_STREAMS)
+        return false;
+    check_of(kept, check);
+    return memcmp(check, kept->check, RT_DIGEST_BYTES) == 0;
+}

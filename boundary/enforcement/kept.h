@@ -1,0 +1,49 @@
+/* What a boundary keeps over a restart, in one file of two slots that are written in turn: a write that breaks off leaves the other.
+   Mirrors adapters/files/replay.py (missions that were opened, versions of policies) and adapters/files/signing.py. */
+#ifndef RT_ENFORCEMENT_KEPT_H
+#define RT_ENFORCEMENT_KEPT_H
+
+#include "mavlink/signing.h"
+
+#define RT_MOST_OPENED 4096
+#define RT_MOST_POLICIES 256
+
+typedef struct {
+    uint8_t digest[RT_DIGEST_BYTES];
+    int64_t expires_us; /* UTC */
+} rt_opened;
+
+typedef struct {
+    uint8_t name[RT_DIGEST_BYTES]; /* SHA-256 of it */
+    int64_t version;
+} rt_version;
+
+typedef struct {
+    uint64_t layout;   /* RT_KEPT_LAYOUT */
+    uint64_t turn;     /* the slot with the greater one counts */
+    uint64_t restarts; /* how often a boundary began with it */
+    int64_t floor_us;  /* what expires by then was opened, or might have been */
+    uint64_t opened_count, version_count, stream_count;
+    rt_opened opened[RT_MOST_OPENED];
+    rt_version versions[RT_MOST_POLICIES];
+    int64_t link_timestamp;
+    rt_stream streams[RT_MOST_STREAMS];
+    uint8_t check[RT_DIGEST_BYTES]; /* SHA-256 over all before */
+} rt_kept;
+
+#define RT_KEPT_LAYOUT 0x7274736863756101ULL
+
+/* Whether a mission may be opened; NULL, "replayed", "old-policy", or "full" where no more can be remembered. */
+rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
+                       const uint8_t policy[RT_DIGEST_BYTES], int64_t version);
+bool rt_was_opened(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]);
+/* Open it: what expired by `now_us` (UTC) is pruned, so that the floor rises. */
+void rt_open_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
+                     const uint8_t policy[RT_DIGEST_BYTES], int64_t version, int64_t now_us);
+
+void rt_forget_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]);
+
+void rt_seal_kept(rt_kept *kept);            /* before it is written */
+bool rt_is_whole_kept(const rt_kept *kept); /* after it was read */
+
+#endif

@@ -1,0 +1,58 @@
+/* What the tests call of enforcement/ and mavlink/: one gate and one signed link. */
+#include "enforcement/frames.h"
+
+#define EXPORT __attribute__((visibility("default")))
+
+EXPORT void rt_test_gate_begin(void);
+EXPORT void rt_test_gate_open(int64_t kind, int64_t altitude, int64_t speed, const uint8_t *path, uint32_t size, uint32_t count,
+                              const int64_t *projection, int64_t not_after_us);
+EXPORT void rt_test_gate_close(void);
+EXPORT void rt_test_gate_observe(const uint8_t *frame, uint32_t size, int64_t now_us);
+EXPORT const char *rt_test_gate_seal(const uint8_t *frame, uint32_t size, int64_t now_us, uint8_t *out, uint32_t *sealed);
+EXPORT void rt_test_link_begin(const uint8_t *key, int64_t timestamp, const int64_t *streams, uint32_t count, int64_t utc_us,
+                               int64_t monotonic_us, uint8_t id);
+EXPORT uint32_t rt_test_link_sign(uint8_t *frame, uint32_t size, int64_t now_us);
+EXPORT int rt_test_link_accept(const uint8_t *frame, uint32_t size, int64_t now_us);
+EXPORT int64_t rt_test_link_ahead(void);
+
+static rt_gate gate;
+static rt_chain chain;
+static rt_signed_link link;
+
+void rt_test_gate_begin(void) {
+    memset(&gate, 0, sizeof gate);
+    gate.chain = &chain;
+}
+
+void rt_test_gate_open(int64_t kind, int64_t altitude, int64_t speed, const uint8_t *path, uint32_t size, uint32_t count,
+                       const int64_t *projection, int64_t not_after_us) {
+    rt_command command = {1, kind, altitude, speed, {path, path + size, count}, false, {0, 0},
+                          {projection[0], projection[1], projection[2], projection[3]}};
+    rt_gate_open(&gate, &command, not_after_us);
+}
+
+void rt_test_gate_close(void) { rt_gate_close(&gate); }
+
+void rt_test_gate_observe(const uint8_t *frame, uint32_t size, int64_t now_us) {
+    rt_gate_observe(&gate, (rt_bytes){frame, size}, now_us);
+}
+
+const char *rt_test_gate_seal(const uint8_t *frame, uint32_t size, int64_t now_us, uint8_t *out, uint32_t *sealed) {
+    return rt_gate_seal(&gate, (rt_bytes){frame, size}, now_us, out, sealed);
+}
+
+void rt_test_link_begin(const uint8_t *key, int64_t timestamp, const int64_t *streams, uint32_t count, int64_t utc_us,
+                        int64_t monotonic_us, uint8_t id) {
+    rt_stream known[RT_MOST_STREAMS];
+    for (uint32_t at = 0; at < count; at++)
+        known[at] = (rt_stream){(uint8_t)streams[4 * at], (uint8_t)streams[4 * at + 1], (uint8_t)streams[4 * at + 2], streams[4 * at + 3]};
+    rt_signed_link_begin(&link, key, timestamp, known, count, utc_us, monotonic_us, id);
+}
+
+uint32_t rt_test_link_sign(uint8_t *frame, uint32_t size, int64_t now_us) { return rt_sign_frame(&link, frame, size, now_us); }
+
+int rt_test_link_accept(const uint8_t *frame, uint32_t size, int64_t now_us) {
+    return (int)rt_accept_frame(&link, (rt_bytes){frame, size}, now_us);
+}
+
+int64_t rt_test_link_ahead(void) { return link.ahead; }

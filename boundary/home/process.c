@@ -1,0 +1,288 @@
+/* The boundary as a process of its own: it answers the calls of `enforcement/calls.h` that come over one socket, with what it was
+   given at its start: the trust root, the identity of the vehicle, the keys and one file of its own.
+
+       rtshcua-boundary --socket FD --root FD --pin HEX --vehicle IDENTITY --kept FD [--link-key FD] [--boundary-key FD]
+                        [--user UID --group GID] [--paced]
+
+   Every file is opened by who starts it, so that it needs no path and, once it began, no right to open one. It first sends one
+   message: the measures that are in force (4 octets, isolation.h), and the name of the link's key (8 octets, 0 without one). It ends with 0 when the socket is closed, 64 for a wrong command
+   line, 65 where the root is not to be trusted, 74 where its file cannot be read or written, 78 where that file is damaged. */
+#define _GNU_SOURCE
+#include "isolation.h"
+
+#include "enforcement/calls.h"
+#include "crypto/crypto.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <sys/random.h>
+#include <sys/socket.h>
+#include <sys/types.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, IO = 74, DAMAGED = 78 };
+/* how far ahead of what was used the link's timestamp is kept, in its units of 10 us, and how often: signing.py */
+#define RESERVE 300000LL
+#define EVERY_US 1000000LL
+
+static rt_boundary boundary;
+static rt_kept slots[2];
+static uint8_t call[RT_MAX_CALL], result[RT_MAX_RESULT];
+
+typedef struct {
+    int socket, root, kept, link_key, boundary_key;
+    const char *vehicle, *pin;
+    uint32_t user, group;
+    int paced;
+} options;
+
+static int number(const char *text, uint32_t *value) {
+    char *end;
+    unsigned long found = strtoul(text, &end, 10);
+    *value = (uint32_t)found;
+    return *text != 0 && *end == 0 && found <= 0x7FFFFFFF;
+}
+
+static int read_options(int count, char **words, options *given) {
+    *given = (options){-1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0};
+    struct { const char *name; int *file; } files[] = {
+        {"--socket", &given->socket}, {"--root", &given->root}, {"--kept", &given->kept},
+        {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key},
+    };
+    for (int at = 1; at < count; at++) {
+        uint32_t value;
+        int known = 0;
+        if (strcmp(words[at], "--paced") == 0) {
+            given->paced = 1;
+            continue;
+        }
+        if (at + 1 == count)
+            return 0;
+        const char *name = words[at++], *said = words[at];
+        for (size_t each = 0; each < sizeof files / sizeof *files; each++)
+            if (strcmp(name, files[each].name) == 0) {
+                known = number(said, &value);
+                *files[each].file = (int)value;
+            }
+        if (strcmp(name, "--vehicle") == 0)
+            known = 1, given->vehicle = said;
+        else if (strcmp(name, "--pin") == 0)
+            known = 1, given->pin = said;
+        else if (strcmp(name, "--user") == 0)
+            known = number(said, &given->user);
+        else if (strcmp(name, "--group") == 0)
+            known = number(said, &given->group);
+        if (!known)
+            return 0;
+    }
+    return given->socket >= 0 && given->root >= 0 && given->kept >= 0 && given->vehicle != NULL;
+}
+
+static size_t read_all(int file, void *into, size_t most) {
+    size_t done = 0;
+    ssize_t got = 1;
+    while (done < most && (got = read(file, (uint8_t *)into + done, most - done)) > 0)
+        done += (size_t)got;
+    close(file);
+    return got < 0 ? 0 : done;
+}
+
+static int write_kept(int file, rt_kept *kept) {
+    rt_seal_kept(kept);
+    off_t at = (off_t)((kept->turn & 1) * sizeof *kept);
+    size_t done = 0;
+    while (done < sizeof *kept) {
+        ssize_t put = pwrite(file, (const uint8_t *)kept + done, sizeof *kept - done, at + (off_t)done);
+        if (put < 0 && errno != EINTR)
+            return 0;
+        done += put > 0 ? (size_t)put : 0;
+    }
+    return fdatasync(file) == 0;
+}
+
+/* A disk may take its time: another thread waits for it, so that what is asked meanwhile is answered. */
+static struct {
+    pthread_mutex_t lock;
+    pthread_cond_t turn;
+    int file, running;
+    rt_kept next;
+    uint64_t given, done, failed; /* how many writes were given, are over, and which of them was the last that failed */
+} keeper = {.lock = PTHREAD_MUTEX_INITIALIZER, .turn = PTHREAD_COND_INITIALIZER};
+
+static void *keep(void *nothing) {
+    static rt_kept writing;
+    pthread_mutex_lock(&keeper.lock);
+    keeper.running = 1;
+    for (;;) {
+        pthread_cond_broadcast(&keeper.turn);
+        while (keeper.done == keeper.given) pthread_cond_wait(&keeper.turn, &keeper.lock);
+        uint64_t number = keeper.given;
+        writing.turn = keeper.done == 0 ? keeper.next.turn : writing.turn;
+        uint64_t turn = writing.turn;
+        writing = keeper.next;
+        writing.turn = turn;
+        pthread_mutex_unlock(&keeper.lock);
+        int fine = write_kept(keeper.file, &writing);
+        pthread_mutex_lock(&keeper.lock);
+        keeper.done = number;
+        if (!fine) keeper.failed = number;
+    }
+    return nothing;
+}
+
+/* Have it written; where it must be, wait for it. False where it could not be. */
+static int give(const rt_kept *kept, int must) {
+    pthread_mutex_lock(&keeper.lock);
+    keeper.next = *kept;
+    uint64_t number = ++keeper.given;
+    pthread_cond_broadcast(&keeper.turn);
+    while (must && keeper.done < number) pthread_cond_wait(&keeper.turn, &keeper.lock);
+    int fine = !must || keeper.failed < number;
+    pthread_mutex_unlock(&keeper.lock);
+    return fine;
+}
+
+static int start_keeper(int file) {
+    pthread_t thread;
+    keeper.file = file;
+    if (pthread_create(&thread, NULL, keep, NULL) != 0) return 0;
+    pthread_mutex_lock(&keeper.lock);
+    while (!keeper.running) pthread_cond_wait(&keeper.turn, &keeper.lock);
+    pthread_mutex_unlock(&keeper.lock);
+    return 1;
+}
+
+/* The newer slot that is whole. An empty file is as if nothing had been kept; one that says nothing is damage. */
+static rt_kept *read_kept(int file) {
+    ssize_t size = 0;
+    rt_kept *newer = NULL;
+    for (int slot = 0; slot < 2; slot++) {
+        ssize_t got = pread(file, &slots[slot], sizeof *slots, (off_t)(slot * (off_t)sizeof *slots));
+        size += got > 0 ? got : 0;
+        if (got == (ssize_t)sizeof *slots && rt_is_whole_kept(&slots[slot]) && (newer == NULL || slots[slot].turn > newer->turn))
+            newer = &slots[slot];
+    }
+    if (newer == NULL && size == 0) {
+        memset(&slots[0], 0, sizeof *slots);
+        slots[0].floor_us = -1;
+        newer = &slots[0];
+    }
+    return newer;
+}
+
+static int64_t own_time_us(clockid_t clock) {
+    struct timespec now;
+    clock_gettime(clock, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+/* The link's timestamps, so many ahead of what was used. */
+static void gather(rt_kept *kept, int64_t ahead) {
+    rt_signed_link *link = &boundary.executor.gate.signer;
+    kept->link_timestamp = link->ahead + ahead;
+    kept->stream_count = link->stream_count;
+    memcpy(kept->streams, link->streams, sizeof kept->streams);
+    for (uint64_t each = 0; each < kept->stream_count; each++) kept->streams[each].last += ahead;
+    link->news = false;
+}
+
+static uint32_t from_hex(const char *text, uint8_t *into, uint32_t most) {
+    uint32_t size = 0;
+    for (; text[0] != 0 && text[1] != 0 && size < most; text += 2) {
+        const char digits[3] = {text[0], text[1], 0};
+        char *end;
+        into[size++] = (uint8_t)strtoul(digits, &end, 16);
+        if (*end != 0) return 0;
+    }
+    return size;
+}
+
+/* A key in a file that its owner alone may read: 32 octets, or 64 hexadecimal digits. */
+static int read_key(int file, uint8_t key[RT_KEY_BYTES]) {
+    char data[80];
+    size_t size = read_all(file, data, sizeof data - 1);
+    data[size] = 0;
+    int fine = size == RT_KEY_BYTES;
+    if (fine) memcpy(key, data, RT_KEY_BYTES);
+    else fine = size >= 2 * RT_KEY_BYTES && from_hex(data, key, RT_KEY_BYTES) == RT_KEY_BYTES;
+    rt_wipe(data, sizeof data);
+    return fine;
+}
+
+#define LINK_NAME 8
+
+/* A name for a key that gives nothing of it away: `fingerprint` of adapters/files/signing.py. */
+static void name_link(const uint8_t key[RT_KEY_BYTES], uint8_t *name) {
+    static const uint8_t domain[] = "rtshcua/link-key";
+    uint8_t digest[RT_DIGEST_BYTES];
+    rt_sha256 hash;
+    rt_sha256_begin(&hash);
+    rt_sha256_add(&hash, (rt_bytes){domain, sizeof domain});
+    rt_sha256_add(&hash, (rt_bytes){key, RT_KEY_BYTES});
+    rt_sha256_end(&hash, digest);
+    memcpy(name, digest, LINK_NAME);
+}
+
+int main(int count, char **words) {
+    static uint8_t root[1 << 20];
+    options given;
+    uint32_t measures = 0;
+    if (!read_options(count, words, &given))
+        return USAGE;
+    rt_keys *keys = rt_key_memory(sizeof *keys, &measures);
+    rt_kept *kept = read_kept(given.kept);
+    if (keys == NULL || getrandom(keys->session, sizeof keys->session, 0) != sizeof keys->session)
+        return IO;
+    if (kept == NULL)
+        return DAMAGED;
+    rt_bytes root_bytes = {root, (uint32_t)read_all(given.root, root, sizeof root)};
+    if (given.link_key >= 0 && !read_key(given.link_key, keys->link))
+        return IO;
+    if (given.boundary_key >= 0 && !read_key(given.boundary_key, keys->boundary))
+        return IO;
+    kept->restarts++;
+    if (!write_kept(given.kept, kept))
+        return IO;
+    if (!start_keeper(given.kept))
+        return IO;
+    measures |= rt_isolate(given.user, given.group);
+    static uint8_t pin[RT_KEY_BYTES];
+    const rt_setup setup = {
+        keys, kept, root_bytes, {pin, given.pin == NULL ? 0 : from_hex(given.pin, pin, sizeof pin)},
+        {(const uint8_t *)given.vehicle, (uint32_t)strlen(given.vehicle)}, given.link_key >= 0, given.boundary_key >= 0,
+        {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
+    if (rt_boundary_begin(&boundary, &setup) != NULL)
+        return UNTRUSTED;
+    uint8_t greeting[4 + LINK_NAME] = {0};
+    for (int octet = 0; octet < 4; octet++) greeting[octet] = (uint8_t)(measures >> 8 * octet & 0xFF);
+    if (given.link_key >= 0) name_link(keys->link, greeting + 4);
+    if (send(given.socket, greeting, sizeof greeting, 0) != sizeof greeting)
+        return IO;
+    int64_t kept_us = own_time_us(CLOCK_MONOTONIC);
+    for (;;) {
+        ssize_t size = recv(given.socket, call, sizeof call, 0);
+        if (size < 0 && errno == EINTR)
+            continue;
+        if (size <= 0) {
+            gather(kept, 0); /* an orderly end keeps the exact figures */
+            (void)rt_give_back(&boundary);
+            return give(kept, 1) && size == 0 ? FINE : IO;
+        }
+        int64_t now_us = own_time_us(CLOCK_MONOTONIC);
+        uint32_t answered = rt_answer(&boundary, (rt_bytes){call, (uint32_t)size}, given.paced ? -1 : now_us, result);
+        /* what must outlive us is on the disk before anybody acts on the answer */
+        const rt_gate *gate = &boundary.executor.gate;
+        if (boundary.to_keep || (gate->signs && (now_us - kept_us > EVERY_US || gate->signer.news))) {
+            bool must = boundary.to_keep;
+            gather(kept, RESERVE);
+            if (!give(kept, must))
+                answered = rt_take_back(&boundary, result);
+            boundary.to_keep = false;
+            kept_us = now_us;
+        }
+        if (send(given.socket, result, answered, 0) != (ssize_t)answered)
+            return IO;
+    }
+}

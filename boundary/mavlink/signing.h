@@ -1,0 +1,42 @@
+/* MAVLink 2 message signing, both ends: https://mavlink.io/en/guide/message_signing.html. `signing.py`. */
+#ifndef RT_MAVLINK_SIGNING_H
+#define RT_MAVLINK_SIGNING_H
+
+#include "framing.h"
+
+#define RT_MOST_STREAMS 16
+
+/* What a stream is named by: system, component, link; when it was last heard, and whether its system and component were heard by
+   this link lately. */
+typedef struct {
+    uint8_t system, component, link;
+    int64_t last; /* timestamp, -1: only `by` counts */
+} rt_stream;
+
+typedef struct {
+    uint8_t key[RT_KEY_BYTES];
+    uint8_t link;
+    int64_t ahead;    /* the local timestamp */
+    int64_t since_us; /* monotonic time less the timestamp */
+    rt_stream streams[RT_MOST_STREAMS];
+    uint32_t stream_count;
+    rt_stream heard[RT_MOST_STREAMS]; /* by which link each sender was heard last; `last` says when */
+    uint32_t heard_count;
+    bool has_own;
+    uint8_t own_system, own_component;
+    bool news; /* there is more to keep than time going by; the caller takes it back */
+} rt_signed_link;
+
+typedef enum { RT_ACCEPTED, RT_UNSIGNED, RT_FORGED, RT_STRAYED, RT_STALE, RT_CROWDED } rt_heard;
+
+/* `streams` and `timestamp` are those of the run before. The key is copied. */
+void rt_signed_link_begin(rt_signed_link *link, const uint8_t key[RT_KEY_BYTES], int64_t timestamp,
+                          const rt_stream *streams, uint32_t count, int64_t utc_us, int64_t monotonic_us, uint8_t id);
+
+/* Sign an unsigned frame of `size` octets in place; there is room for RT_SIGNATURE more. Answers the new size. */
+uint32_t rt_sign_frame(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t now_us);
+
+/* Whether a whole frame with a right checksum may come in; only then is it remembered. */
+rt_heard rt_accept_frame(rt_signed_link *link, rt_bytes frame, int64_t now_us);
+
+#endif

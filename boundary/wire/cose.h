@@ -1,0 +1,21 @@
+/* Signed envelopes: COSE_Sign1 (RFC 9052, sections 4.2 and 4.4) with Ed25519, and nothing optional. */
+#ifndef RT_WIRE_COSE_H
+#define RT_WIRE_COSE_H
+
+#include "keys.h"
+
+/* What an envelope claims. Nothing of it is to be trusted. */
+typedef struct {
+    rt_bytes protected, content_type, kid, payload, signature;
+} rt_envelope;
+
+/* Take an envelope apart without trusting it: `malformed` unless it is canonical. */
+rt_refusal rt_take_apart(rt_bytes envelope, uint32_t limit, rt_envelope *claimed);
+
+/* Whether a public key signed it for a duty. */
+bool rt_signed_by(const rt_envelope *envelope, int64_t duty, rt_bytes public);
+
+/* The signature over a protected header and a payload for a duty. */
+void rt_sign_for(int64_t duty, const uint8_t seed[RT_KEY_BYTES], rt_bytes protected, rt_bytes payload, uint8_t signature[RT_SIGNATURE_BYTES]);
+
+#endif

@@ -1,0 +1,98 @@
+"""C opens the trust roots and bundles that Python opens, and refuses all others by the same slug."""
+
+import ctypes
+from collections import Counter
+from random import Random
+
+import pytest
+
+from boundary.opening import (
+    MANY,
+    SIGNED_ROOT,
+    Boundary,
+    agree_on_bundle,
+    agree_on_root,
+    rich,
+    some_bundle,
+    some_root,
+)
+from reference import bundle_case
+from reference.bundle_case import NOW, ROOT, root
+from rtshcua.model.flat.limits import MAX_KEYS, MAX_REVOKED
+from rtshcua.wire import cose, names
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot
+
+
+@pytest.fixture(scope="module")
+def c(boundary: ctypes.CDLL) -> Boundary:
+    return Boundary(boundary)
+
+
+def compare(c: Boundary, seed: int, count: int) -> Counter[str]:
+    """How many mutants of roots and bundles were accepted and refused, and why, alike by both."""
+    random, found = Random(seed), Counter[str]()
+    for number in range(count):
+        pin = random.choice(
+            (ROOT.public, ROOT.kid, None, ROOT.kid[::-1], bytes(32)) if number % 4 == 0 else (ROOT.public,)
+        )
+        if number % 3 == 0:
+            trust = agree_on_root(c, some_root(random), pin, NOW + random.choice((0, 0, 0, -1, 1)))
+            found[f"root {trust if isinstance(trust, str) else 'accepted'}"] += 1
+            if isinstance(trust, TrustRoot):
+                found[f"{agree_on_bundle(c, bundle_case.sealed(), trust)}"] += 1
+            continue
+        trusted = agree_on_root(c, SIGNED_ROOT, ROOT.kid)
+        assert isinstance(trusted, TrustRoot)
+        vehicle = random.choice(("quad-07",) * 9 + ("quad-08",))
+        now_us = NOW + random.choice((0, 0, 0, bundle_case.HOUR, 1 << 40))
+        found[f"{agree_on_bundle(c, some_bundle(random), trusted, vehicle, now_us)}"] += 1
+    return found
+
+
+def test_what_python_opens_c_opens(c: Boundary) -> None:
+    signed, pin, data, vehicle, now_us = rich()
+    trust = agree_on_root(c, signed, pin, now_us)
+    assert isinstance(trust, TrustRoot)
+    assert agree_on_bundle(c, data, trust, vehicle, now_us) is None
+    assert isinstance(agree_on_root(c, signed, None, now_us), TrustRoot)
+    assert isinstance(agree_on_root(c, MANY.sign(ROOT), ROOT.kid), TrustRoot)
+
+
+def test_a_bundle_of_which_one_bit_is_another_is_refused_alike(c: Boundary) -> None:
+    random, data = Random(6), bundle_case.sealed()
+    trust = agree_on_root(c, SIGNED_ROOT, ROOT.public)
+    assert isinstance(trust, TrustRoot)
+    for bit in random.sample(range(8 * len(data)), 300):
+        flipped = bytearray(data)
+        flipped[bit // 8] ^= 1 << bit % 8
+        assert agree_on_bundle(c, bytes(flipped), trust) is not None
+    for end in random.sample(range(len(data)), 60):
+        assert agree_on_bundle(c, data[:end], trust) == "malformed"
+
+
+def test_roots_have_the_same_limits(c: Boundary) -> None:
+    def signed(keys: int = 3, revoked: int = 1) -> bytes:
+        made = [SigningKey.from_seed(n.to_bytes(32), duty=Duty.LOG).verification() for n in range(keys - 3)]
+        revocations = tuple(n.to_bytes(8) for n in range(revoked))
+        trust = TrustRoot(1, False, NOW - 1, NOW + 1, (*root().keys, *made), revoked=revocations)
+        return cose.sign1(trust.encode(), key=ROOT, duty=Duty.ROOT, content_type=names.ROOT.content_type)
+
+    for at_most in (signed(MAX_KEYS), signed(revoked=MAX_REVOKED)):
+        assert isinstance(agree_on_root(c, at_most, ROOT.public), TrustRoot)
+    for too_many in (signed(MAX_KEYS + 1), signed(revoked=MAX_REVOKED + 1), bytes(MAX_ROOT + 2)):
+        assert agree_on_root(c, too_many, ROOT.public) == "malformed"
+
+
+def test_mutants_are_refused_alike(c: Boundary) -> None:
+    found = compare(c, 7, 1_000)
+    expected = {"None", "malformed", "wrong-policy", "binding-mismatch", "id-mismatch", "unknown-key", "wrong-duty",
+                "bad-signature", "wrong-vehicle", "key-expired"}  # fmt: skip
+    assert expected <= found.keys()
+    assert {"root accepted", "root malformed", "root unknown-key", "root shared-key"} <= found.keys()
+    assert 70 < found["None"] < 550
+
+
+@pytest.mark.soak
+def test_a_hundred_thousand_mutants_are_refused_alike(c: Boundary) -> None:
+    assert compare(c, 8, 100_000).total() >= 100_000

@@ -1,0 +1,244 @@
+"""The gate and the signing of frames in C do what those in Python do: the same frames leave, the others for the same
+reason, the same octets, and what came in is believed alike.
+"""
+
+import ctypes
+from math import inf, nan
+from random import Random
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from rtshcua.codec.frames import Codec
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink.framing import unsigned
+from rtshcua.mavlink.signing import EPOCH_US, MINUTE, SignedLink, State
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.zone import SHIFT, Projection, unproject
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.ports import Command
+from rtshcua.wire import cbor
+
+SYSTEM, OURS, HOME_AMSL = 3, 191, 488_000
+AUTOPILOTS = (3, 12)
+HOMES = (  # Zurich; across longitude 180, in the south; near the pole
+    Projection(473_977_000, 85_456_000, int(7.53 * (1 << SHIFT)), int(11.12 * (1 << SHIFT))),
+    Projection(-171_000_000, 1_799_999_900, int(10.6 * (1 << SHIFT)), int(11.06 * (1 << SHIFT))),
+    Projection(890_000_000, -1_000_000, int(0.19 * (1 << SHIFT)), int(11.17 * (1 << SHIFT))),
+)
+SAMPLE, SOAK = 40, 40_000
+
+
+class InC:
+    """The gate in C."""
+
+    def __init__(self, boundary: ctypes.CDLL) -> None:
+        self._lib = boundary
+        boundary.rt_test_gate_seal.restype = ctypes.c_char_p
+        boundary.rt_test_gate_begin()
+
+    def open(self, command: Command, projection: Projection, not_after_us: int) -> None:
+        octets = b"".join(map(cbor.encode, command.path))
+        self.kept = octets
+        self._lib.rt_test_gate_open(
+            ctypes.c_int64(command.kind), ctypes.c_int64(command.altitude), ctypes.c_int64(command.speed), octets,
+            len(octets), len(command.path),
+            (ctypes.c_int64 * 4)(projection.latitude, projection.longitude, projection.east, projection.north),
+            ctypes.c_int64(not_after_us),
+        )  # fmt: skip
+
+    def close(self) -> None:
+        self._lib.rt_test_gate_close()
+
+    def observe(self, frame: bytes, now_us: int) -> None:
+        self._lib.rt_test_gate_observe(frame, len(frame), ctypes.c_int64(now_us))
+
+    def seal(self, frame: bytes, now_us: int) -> bytes | str:
+        out, size = ctypes.create_string_buffer(512), ctypes.c_uint32()
+        slug = self._lib.rt_test_gate_seal(frame, len(frame), ctypes.c_int64(now_us), out, ctypes.byref(size))
+        return out.raw[: size.value] if slug is None else slug.decode()
+
+
+def pack(message: Any, component: int = OURS, system: int = SYSTEM) -> bytes:
+    return Codec(system, component).pack(message)
+
+
+def long(number: int, *parameters: float) -> Any:
+    return m.MAVLink_command_long_message(SYSTEM, 1, number, 0, *[*parameters, *[0.0] * (7 - len(parameters))])
+
+
+def drawn_command(random: Random, home: Projection) -> Command:
+    near = [random.randrange(-60_000, 60_000) for _ in range(2 * random.randrange(1, 6))]
+    kind = random.choice(list(MotionKind))
+    path = tuple(near) if kind in (MotionKind.FLY, MotionKind.COVER) else ()
+    geo = tuple(part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(home, x, y))
+    return Command(7, "skill", kind, path, geo, random.choice((20_000, 35_250)), random.choice((0, 4_000, 3_333)))
+
+
+def drawn_frame(random: Random, of: Command) -> bytes:
+    """A frame that carries the command out, or nearly, or housekeeping, or anything else, and now and then damaged."""
+    x, y = random.choice([*zip(of.geo[::2], of.geo[1::2], strict=True), (2**31 - 1, 2**31 - 1), (1, 2)])
+    height = of.altitude / 1000 + random.choice((0, 0, 0.001, 0.003, 1.999, 2.002, -5.0))
+    speed = of.speed / 1000 + random.choice((0, 0, 0.0015, 0.0025))
+    odd = random.choice((0.0, -0.0, nan, inf, 1.0, -1.0, 1e-45, 3.4e38))
+    sea = HOME_AMSL / 1000 + height
+    message = random.choice(
+        (
+            long(176, 1, random.randrange(12), random.randrange(8)),
+            long(176, 1, random.choice((4, 6, 9, 17)), odd),
+            long(400, 1),
+            long(400, random.choice((0, 1)), random.choice((0, 21196))),
+            long(22, random.choice((0, nan)), 0, 0, nan, nan, nan, sea),
+            long(22, 0, 0, 0, 0, 0, odd, height),
+            long(178, 1, speed, -1),
+            long(random.choice((401, 511, 512, 246, 185)), random.choice((0, odd))),
+            m.MAVLink_command_int_message(
+                SYSTEM, 1, random.choice((0, 0, 0, 3)), 192, 0, 0, random.choice((speed, -1.0)), 1,
+                random.choice((0, odd)), random.choice((nan, nan, 0)), x, y, random.choice((sea, sea, nan)),
+            ),
+            m.MAVLink_set_position_target_global_int_message(
+                0, SYSTEM, 1, 6, random.choice((0x0DF8, 0x0DF8, 0x0DF0)), x, y, height, 1, 0, 0, 0, 0, 0, 0, 0
+            ),
+            m.MAVLink_heartbeat_message(random.choice((18, 6)), 8, random.choice((0, 128)), 0, 4, 3),
+            m.MAVLink_param_set_message(
+                SYSTEM, 1, random.choice((b"FENCE_ENABLE", b"FENCE_TYPE", b"RTL_ALT")),
+                random.choice((1, 7, 15, 4, odd)), random.choice((2, 6, 9)),
+            ),
+            m.MAVLink_param_request_list_message(SYSTEM, random.choice((1, 0))),
+            m.MAVLink_mission_count_message(SYSTEM, 1, 4, random.choice((0, 1))),
+            m.MAVLink_mission_clear_all_message(SYSTEM, 1, random.choice((0, 1, 255))),
+            m.MAVLink_mission_item_int_message(
+                SYSTEM, 1, 0, 0, random.randrange(4_999, 5_006), random.choice((0, 2)), 1, 4, 0, 0, 0, 1, 1, 0,
+                random.choice((0, 1)),
+            ),
+            m.MAVLink_statustext_message(6, b"text"), m.MAVLink_timesync_message(0, 5),
+            m.MAVLink_manual_control_message(SYSTEM, 0, 0, 500, 0, 0),
+        )
+    )  # fmt: skip
+    frame = pack(message, random.choice((OURS,) * 9 + (1,)), random.choice((SYSTEM,) * 19 + (255,)))
+    if random.random() < 0.15:
+        at = random.randrange(len(frame))
+        frame = frame[:at] + bytes([random.randrange(256)]) + frame[at + 1 :]
+    return frame if random.random() < 0.98 else frame[: random.randrange(len(frame))]
+
+
+def drawn_report(random: Random, of: Command, autopilot: int) -> bytes:
+    """Something that the vehicle says of itself."""
+    x, y = random.choice([*zip(of.geo[::2], of.geo[1::2], strict=True), (0, 0)])
+    off = random.choice((0, 200, 440, 460, 700))
+    above = random.randrange(50_000)
+    home = HOME_AMSL + random.choice((0, 500, 9_999, 10_001))
+    message = random.choice(
+        (
+            m.MAVLink_heartbeat_message(2, autopilot, random.choice((0, 128)), 0, 4, 3),
+            m.MAVLink_global_position_int_message(0, x + off, y - off, home + above, above, 0, 0, 0, 0),
+            m.MAVLink_global_position_int_message(0, x, y + off, home + above, above, 0, 0, 0, 0),
+            m.MAVLink_extended_sys_state_message(0, random.randrange(5)),
+            m.MAVLink_param_value_message(
+                b"FENCE_TYPE", random.choice((3, 7.5, nan, 1e-44, -3.5, 3e10)), random.choice((2, 4, 6, 9)), 1, 0
+            ),
+        )
+    )
+    return pack(message, random.choice((1, 1, 1, 1, 2)), random.choice((SYSTEM,) * 9 + (4,)))
+
+
+def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
+    """One session of each, and how many frames both let out."""
+    random = Random(seed)
+    here, there = FrameSession(), InC(boundary)
+    autopilot, home, now_us, left = random.choice(AUTOPILOTS), random.choice(HOMES), 1_000_000, 0
+    command = drawn_command(random, home)
+    for report in (m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3), None)[: random.randrange(3)]:
+        frame = pack(report, 1) if report is not None else drawn_report(random, command, autopilot)
+        here.observe(frame, now_us)
+        there.observe(frame, now_us)
+    for _ in range(60):
+        now_us += random.choice((0, 1_000, 400_000, 4_000_000))
+        chance = random.random()
+        if chance < 0.08:
+            command = drawn_command(random, home)
+            here.open(command, now_us + 500_000)
+            there.open(command, home, now_us + 500_000)
+        elif chance < 0.1:
+            here.close()
+            there.close()
+        elif chance < 0.35:
+            report_ = drawn_report(random, command, autopilot)
+            here.observe(report_, now_us)
+            there.observe(report_, now_us)
+        else:
+            frame = drawn_frame(random, command)
+            one, other = here.seal(frame, now_us), there.seal(frame, now_us)
+            assert other == (one.slug if isinstance(one, Refusal) else one), (seed, frame.hex())
+            left += not isinstance(one, Refusal)
+    return left
+
+
+def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
+    """One signed link of each, and how many frames both believed."""
+    random = Random(seed)
+    key, other_key = random.randbytes(32), random.randbytes(32)
+    utc_us, now_us = EPOCH_US + random.randrange(10**15), random.randrange(10**9)
+    local = (utc_us - EPOCH_US) // 10
+    streams = {
+        (random.randrange(1, 4), random.randrange(1, 3), random.randrange(2)): local
+        - random.choice((5, MINUTE + 5, -9))
+        for _ in range(random.randrange(4))
+    }
+    stored = State(local + random.choice((-5, 0, 900)), streams)
+    here = SignedLink(key, stored, utc_us, now_us)
+    words = [part for stream, last in streams.items() for part in (*stream, last)]
+    boundary.rt_test_link_begin(
+        key, ctypes.c_int64(stored.timestamp), (ctypes.c_int64 * max(1, len(words)))(*words), len(streams),
+        ctypes.c_int64(utc_us), ctypes.c_int64(now_us), 0,
+    )  # fmt: skip
+    boundary.rt_test_link_ahead.restype = ctypes.c_int64
+    names = ("accepted", "unsigned", "forged", "strayed", "stale", "crowded")
+    seen, believed = [], 0
+    for _ in range(80):
+        now_us += random.choice((0, 10, 100_000, 70_000_000))
+        frame = pack(long(512, 148), random.randrange(1, 40), random.choice((SYSTEM, 1, 2)))
+        if random.random() < 0.3:
+            signed = here.sign(frame, now_us)
+            buffer = ctypes.create_string_buffer(frame, 300)
+            size = boundary.rt_test_link_sign(buffer, len(frame), ctypes.c_int64(now_us))
+            assert buffer.raw[:size] == signed
+            assert unsigned(signed) == frame
+            seen.append(signed)
+        else:
+            ahead = (utc_us + now_us - EPOCH_US) // 10 + random.choice((0, -MINUTE - 9, 7, 200_000))
+            of = random.choice((key, key, key, other_key))
+            signed = SignedLink(of, State(ahead, {}), EPOCH_US, 0, link=random.randrange(2)).sign(frame, 0)
+            signed = random.choice((signed, signed, signed, frame, *seen[-3:]))
+            seen.append(signed)
+            if random.random() < 0.1:
+                at = random.randrange(len(signed))
+                signed = signed[:at] + bytes([random.randrange(256)]) + signed[at + 1 :]
+            if signed[0] != 0xFD or len(signed) < 12 or len(signed) != 12 + signed[1] + 13 * (signed[2] & 1):
+                continue  # the codec gives whole frames alone
+            before = {name: getattr(here.counts, name) for name in names}
+            accepted = here.accept(signed, now_us)
+            why = next(at for at, name in enumerate(names) if getattr(here.counts, name) != before[name])
+            assert boundary.rt_test_link_accept(signed, len(signed), ctypes.c_int64(now_us)) == why, seed
+            believed += accepted
+        assert boundary.rt_test_link_ahead() == here.state.timestamp
+    return believed
+
+
+@pytest.mark.parametrize("compare", [compare_gates, compare_links])
+def test_both_gates_let_out_and_believe_the_same(compare: Any, boundary: ctypes.CDLL) -> None:
+    passed = [compare(boundary, seed) for seed in range(SAMPLE)]
+    assert sum(map(bool, passed)) > SAMPLE / 2, "else it compares little"
+
+
+@pytest.fixture(params=range(0, SOAK, 1_000))
+def seeds(request: pytest.FixtureRequest) -> range:
+    return range(request.param, request.param + 1_000)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("compare", [compare_gates, compare_links])
+def test_both_gates_agree_for_long(compare: Any, seeds: range, boundary: ctypes.CDLL) -> None:
+    for seed in seeds:
+        compare(boundary, seed)

@@ -1,0 +1,72 @@
+"""A plug-in of pytest that asks the decision in C whatever a test asks the one in Python, and fails where they differ:
+
+    RTSHCUA_BOUNDARY=build/boundary/librtshcua.so pytest -p reference.shadow tests/unit tests/integration
+
+So every request of every flight in the tests is one more case, unless it flies in another process.
+"""
+
+import ctypes
+import os
+import sys
+from collections import Counter
+from typing import Any, Final
+
+import pytest
+from msgspec.structs import replace
+
+from reference import flat_case, native
+from rtshcua.decision import decide as decide_module
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.situation import Context, Now, State
+
+_asked: Final = Counter[str]()
+_decide = decide_module.decide
+_c = native.Native(ctypes.CDLL(os.environ["RTSHCUA_BOUNDARY"]))
+_ready: list[Any] = [None, None]  # the policy and the invocation that C has
+
+
+def decide(
+    invocation: PreparedInvocation, state: State, policy: PreparedPolicy, context: Context, now: Now
+) -> Decision:
+    """The decision of the reference, once C has decided the same."""
+    decision = _decide(invocation, state, policy, context, now)
+    if invocation.policy is not policy or len(state.values) != len(state.ages):
+        _asked["what no request can say"] += 1
+        return decision
+    if _ready[0] is not policy:
+        assert _c.policy(policy.policy) is None
+        _ready[:] = policy, None
+    if _ready[1] is not invocation:
+        _prepare(invocation, policy)
+        _ready[1] = invocation
+    question = native.Question(state, context, now)
+    assert _c.ask([question]) == [native.expected(invocation, question, decision)], question
+    _asked["alike"] += 1
+    return decision
+
+
+def _prepare(invocation: PreparedInvocation, policy: PreparedPolicy) -> None:
+    """Give C the step, in a mission with a phase of the same name, as far as the policy knows the name."""
+    step = invocation.invocation
+    name = policy.policy.phases[invocation.phase] if invocation.phase >= 0 else "a phase that no condition names"
+    phases = (*(f"phase {number}" for number in range(step.phase)), name)
+    mission = replace(flat_case.MISSION, phases=phases, invocations=(step,))
+    _c.unchecked(mission, 0)
+
+
+def pytest_configure() -> None:
+    """Take the place of `decide`, wherever it was imported to."""
+    for module in list(sys.modules.values()):
+        if getattr(module, "decide", None) is _decide:
+            module.decide = decide  # type: ignore[attr-defined]
+
+
+def pytest_collection_finish() -> None:
+    """And in the tests."""
+    pytest_configure()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say how often both were asked."""
+    terminalreporter.write_line(f"asked of the decision in C too: {dict(_asked)}")

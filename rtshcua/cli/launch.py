@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, Protocol
 
+from rtshcua.adapters.boundary_process import BoundaryProcess
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.keystore import KeyStore
@@ -32,6 +33,7 @@ from rtshcua.cli.configured import would_set
 from rtshcua.cli.faults import code_of, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
+from rtshcua.cli.isolating import isolate
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
@@ -52,6 +54,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.frames import Gate
+from rtshcua.onboard.enforcement.isolated import IsolatedGate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.ports import Ending, Event
 from rtshcua.onboard.rehearsal import stranded
@@ -101,7 +104,8 @@ class Launch:
     the key store's. `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
     `utc_error_us`: what the operator says that UTC is off by at most. `sortie`: it is one of a qualification.
     `settings`: parameters that are set before the flight, by name, and put back after it. `wait_s`: the bundle says the
-    policy alone, and for so many seconds at most it waits for the one that flies.
+    policy alone, and for so many seconds at most it waits for the one that flies. `boundary_user`: the user and group
+    that a boundary of its own process runs as.
     """
 
     bundle: Path
@@ -131,6 +135,7 @@ class Launch:
     sortie: Sortied | None = None
     settings: Mapping[str, int] = field(default_factory=dict)
     wait_s: float | None = None
+    boundary_user: tuple[int, int] | None = None
     boundary_key: Path | None = None
 
 
@@ -160,7 +165,8 @@ def launch(order: Launch) -> ExitCode:
             own_key, keyless = _boundary_key(order, root, loaded, clock)
             _expect_boundary_key(keyless, resumed=not order.dry_run)
             loaded.preparation.owes(debts.left)
-            signing = _sign(order, loaded, clock)
+            loaded, apart = _apart(order, loaded, bundle, trust, own_key, clock, stack)
+            signing = _sign(order, loaded, clock, apart)
             stack.callback(signing.close)
             _hear(order, loaded, signing)
             driver = _driver(order, loaded, slack, signing)
@@ -238,6 +244,23 @@ def launch(order: Launch) -> ExitCode:
             feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _apart(
+    order: Launch, loaded: Loaded, bundle: bytes, trust: Trusted, own_key: SigningKey | None, clock: LinkClock,
+    stack: ExitStack,
+) -> tuple[Loaded, BoundaryProcess | None]:  # fmt: skip
+    """The bundle in force in a boundary that runs apart, where that is asked for, until the stack is closed. What may
+    have expired is brought down by the one in this process, which does not ask. Raises `Refused` and OSError.
+    """
+    if order.mode is not Mode.PROCESS or order.dry_run or trust.distrust is not None:
+        return loaded, None
+    apart = isolate(
+        bundle, loaded.vehicle, trust.root, trust.signed, order.state, clock.now(),
+        link_key=order.signing_key, own_key=own_key, user=order.boundary_user, paced=order.speed != 1,
+    )  # fmt: skip
+    stack.callback(apart.process.close)
+    return apart.loaded, apart.process
 
 
 def _boundary_key(
@@ -550,12 +573,19 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now, flight: bytes
     return loaded
 
 
-def _sign(order: Launch, loaded: Loaded, clock: LinkClock) -> Signing:
+def _sign(order: Launch, loaded: Loaded, clock: LinkClock, apart: BoundaryProcess | None = None) -> Signing:
     try:
         signing = Signing(
-            order.signing_key, loaded.bundle.policy, loaded.executor.frames, order.state, clock,
-            unsigned_radio=order.unsigned_radio, even_damaged=not order.dry_run,
+            None if apart is not None else order.signing_key, loaded.bundle.policy, loaded.executor.frames,
+            order.state, clock, unsigned_radio=order.unsigned_radio, even_damaged=not order.dry_run,
         )  # fmt: skip
+        if apart is not None:
+            signing.notes += [f"the boundary runs without {text}" for text in apart.missing]
+            if apart.link_name is not None:
+                assert isinstance(loaded.executor.frames, IsolatedGate)
+                signing.elsewhere(
+                    apart.link_name, loaded.executor.frames, loaded.bundle.policy, unsigned_radio=order.unsigned_radio
+                )
     except LinkKeyError as error:
         raise _of_link_key(error) from None
     if order.signing_key is None and order.link is not None and not order.link.is_loopback:

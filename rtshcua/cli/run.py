@@ -2,6 +2,7 @@
 
 import grp
 import os
+import pwd
 import sys
 import tempfile
 import time
@@ -41,8 +42,11 @@ def run(
             help="another vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
         ),
     ] = None,
-    mode: Annotated[Mode, typer.Option(help="how decisions are enforced; `none` flies the simulated vehicle only")]
+    mode: Annotated[Mode, typer.Option(help="where decisions are made; `none` enforces nothing, in simulation")]
     = Mode.SOFTWARE,
+    boundary_user: Annotated[
+        str | None, typer.Option(metavar="USER", help="with `--mode process`: the user that it runs as; as root")
+    ] = None,
     speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
     flavour: simulated.Flavour = None,
     battery: simulated.Battery = None,
@@ -129,9 +133,10 @@ def run(
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
+    user = _boundary_user(boundary_user, mode, sets=bool(set_), waits=wait)
     group = _group(agent_socket, operator_socket, agent_group)
-    if isinstance(group, str):
-        return fail(ExitCode.USAGE, group)
+    if isinstance(user, str) or isinstance(group, str):
+        return fail(ExitCode.USAGE, user if isinstance(user, str) else str(group))
     try:
         witnesses = witnessed.addresses(witness or ())
     except AddressError as error:
@@ -152,6 +157,7 @@ def run(
             link=link,
             simulator=words if incidents is None else incidents.words,
             mode=mode,
+            boundary_user=user,
             speed=speed,
             vehicle=vehicle,
             roots=tuple(root or ()),
@@ -221,6 +227,23 @@ def _misplaced(*, wait: bool, timed: bool, socket: bool, never: bool) -> str | N
     if wait and never:
         return "`--wait` does not go with `--dry-run` and `--scenario`, which know the mission before"
     return None
+
+
+def _boundary_user(name: str | None, mode: Mode, *, sets: bool, waits: bool) -> tuple[int, int] | str | None:
+    """The ids of the user and group that the boundary's process runs as; what is wrong, in words."""
+    if mode is not Mode.PROCESS:
+        return None if name is None else "`--boundary-user` goes with `--mode process`"
+    if sets or waits:
+        return f"`--mode process` does not go with `{'--set' if sets else '--wait'}` yet: that needs `--mode software`"
+    if name is None:
+        return None
+    try:
+        found = pwd.getpwnam(name)
+    except KeyError:
+        return f"there is no user `{name}`"
+    if os.geteuid() != 0:
+        return "`--boundary-user` needs root: only root may start what runs as somebody else"
+    return found.pw_uid, found.pw_gid
 
 
 def _group(agent_socket: Path | None, operator_socket: Path | None, name: str | None) -> int | str | None:

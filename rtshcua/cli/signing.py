@@ -5,9 +5,10 @@ from pathlib import Path
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.files.signing import IN_USE, LinkKeeper, LinkKeyError, LinkStore, fingerprint, read_link_key
 from rtshcua.mavlink.radio import UnsignedRadio
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import Counts, SignedLink, State, Verifier
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.isolated import IsolatedGate
 from rtshcua.onboard.rehearsal import unheard
 
 _RADIO = "the policy reads RADIO_STATUS, which radios do not sign: it is not known without `--unsigned-radio`"
@@ -25,16 +26,16 @@ class Signing:
     """
 
     def __init__(
-        self, key_file: Path | None, policy: Policy, frames: FrameSession, state: Path, clock: LinkClock,
+        self, key_file: Path | None, policy: Policy, frames: FrameSession | IsolatedGate, state: Path, clock: LinkClock,
         *, unsigned_radio: bool, even_damaged: bool = False,
     ) -> None:  # fmt: skip
         self.damage: LinkKeyError | OSError | None = None
-        self.verifier: SignedLink | UnsignedRadio | None = None
+        self.verifier: Verifier | None = None
         self.trouble: str | None = None
         self.notes: list[str] = []
         self.unheard: frozenset[int] = frozenset()
         self.name: bytes | None = None  # the fingerprint of the key
-        self._link: SignedLink | None = None
+        self._counts: Counts | None = None
         self._keeper: LinkKeeper | None = None
         if key_file is None:
             return
@@ -53,8 +54,17 @@ class Signing:
             self.damage = error
         if link is None:
             link = SignedLink(key, State(0, {}), now.utc_us, now.monotonic_us)
+        assert isinstance(frames, FrameSession)
         frames.sign_with(link)
-        self._link = link
+        self._counts = link.counts
+        self._hear(link, policy, unsigned_radio=unsigned_radio)
+
+    def elsewhere(self, name: bytes, gate: IsolatedGate, policy: Policy, *, unsigned_radio: bool) -> None:
+        """A boundary elsewhere has the key of this name: it signs and verifies, and keeps the timestamps."""
+        self.name, self._counts = name, gate.counts
+        self._hear(gate, policy, unsigned_radio=unsigned_radio)
+
+    def _hear(self, link: Verifier, policy: Policy, *, unsigned_radio: bool) -> None:
         self.verifier = UnsignedRadio(link) if unsigned_radio else link
         read = {source.message for signal in policy.signals for source in signal.sources}
         if not unsigned_radio:
@@ -65,7 +75,7 @@ class Signing:
     @property
     def rejected(self) -> str | None:
         """What came and was not believed, in words, while nothing else came; None if nothing did."""
-        counts = None if self._link is None else self._link.counts
+        counts = self._counts
         if counts is None or counts.accepted:
             return None
         why = (

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple, Protocol, dataclass_transform
 
 import msgspec
 
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import SigningKey
@@ -309,6 +310,30 @@ class Boundary(Protocol):
 
         `released` is the number of steps that were released: none of them is replaced any more.
         """
+        ...
+
+
+class Dispatching(Protocol):
+    """What turns permits into what is sent: the boundary's executor, here or elsewhere. Times are monotonic, us."""
+
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+        """What to send for a permit, or why nothing is sent."""
+        ...
+
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+        """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
+        ...
+
+    def ended(self, token: int | None = None) -> None:
+        """The running step ended, or that command did."""
+        ...
+
+    def landed(self) -> None:
+        """The vehicle landed: standing permits lapse."""
+        ...
+
+    def release(self) -> None:
+        """Nothing more that moves the vehicle is to be sent."""
         ...
 
 

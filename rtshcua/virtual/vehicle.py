@@ -9,6 +9,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.isolated import IsolatedGate
 from rtshcua.onboard.ports import Command, Event, Readings
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.world import Simulation
@@ -51,11 +52,11 @@ class VirtualVehicle:
 
     def __init__(
         self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None,
-        frames: FrameSession | None = None, verifier: Verifier | None = None, *, fence: bool = True,
+        frames: FrameSession | IsolatedGate | None = None, verifier: Verifier | None = None, *, fence: bool = True,
         manoeuvres: Mapping[str, Stages] | None = None, tick_us: int = TICK_US, steps: Sequence[Invocation] = (),
     ) -> None:  # fmt: skip
         self.simulation = Simulation(config)
-        self.frames = FrameSession() if frames is None else frames
+        self.frames: FrameSession | IsolatedGate = FrameSession() if frames is None else frames
         self._free = frames is None
         self._tick_us = tick_us
         self.driver = Driver(policy, self.frames, fence=fence, verifier=verifier, manoeuvres=manoeuvres, steps=steps)
@@ -98,7 +99,7 @@ class VirtualVehicle:
 
     def begin(self, command: Command, now_us: int) -> None:
         """Start a command."""
-        if self._free:
+        if isinstance(self.frames, FrameSession) and self._free:
             self.frames.open(command, now_us + 10 * SECOND)
         events, frames = self.driver.begin(command, now_us)
         self._send(frames, events)

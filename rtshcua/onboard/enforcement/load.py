@@ -19,6 +19,13 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.attestation import Attestation
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.executor import Commands, Executor
+from rtshcua.onboard.enforcement.isolated import (
+    Caller,
+    IsolatedAttestation,
+    IsolatedBoundary,
+    IsolatedExecutor,
+    IsolatedGate,
+)
 from rtshcua.onboard.enforcement.preparation import PreparationIssuer
 from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.boundary_chain import BoundaryChain
@@ -36,6 +43,7 @@ class Mode(StrEnum):
 
     NONE = "none"
     SOFTWARE = "software"
+    PROCESS = "process"
 
 
 class Loaded(msgspec.Struct, frozen=True):
@@ -44,13 +52,13 @@ class Loaded(msgspec.Struct, frozen=True):
     """
 
     boundary: Boundary
-    executor: Executor
+    executor: Executor | IsolatedExecutor
     in_force: InForce
     policy: PreparedPolicy
     vehicle: str
     mode: Mode
     preparation: PreparationIssuer
-    attestation: Attestation
+    attestation: Attestation | IsolatedAttestation
 
     @property
     def bundle(self) -> Bundle:
@@ -81,12 +89,14 @@ def load(
     flight: bytes,
     peer_is_own_simulator: bool,
     settings: Mapping[str, int] = MappingProxyType({}),
+    caller: Caller | None = None,
 ) -> Loaded | Refusal:
     """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else;
     `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log. `settings` are
     the parameters that an operator has set before it.
 
-    `now` is when the bundle was received (paper symbol `t_r`).
+    `now` is when the bundle was received (paper symbol `t_r`). With a `caller` the boundary is elsewhere: it opens the
+    bundle itself, and draws the id of the flight.
 
     Raises ValueError for a session key or an id of another length; whatever is wrong with the bundle is a `Refusal`.
     """
@@ -110,8 +120,19 @@ def load(
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")
     issuer = PreparationIssuer(session_key, settings)
-    in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
-    return session(in_force, policy, vehicle, mode, session_key, issuer, bundle=bundle)
+    if caller is None:
+        in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
+        return session(in_force, policy, vehicle, mode, session_key, issuer, bundle=bundle)
+    answer = caller.load(bundle, now)
+    if isinstance(answer, Refusal):
+        return answer
+    drawn, reopened = answer
+    in_force = InForce(opened, policy, invocations, root, vehicle, drawn, now.monotonic_us)
+    commands = Commands(policy.policy, opened.mission)
+    commands.called_off = reopened
+    boundary = IsolatedBoundary(caller, in_force, commands)
+    executor = IsolatedExecutor(caller, commands, IsolatedGate(caller, signs=caller.signs))
+    return Loaded(boundary, executor, in_force, policy, vehicle, mode, issuer, IsolatedAttestation(caller))
 
 
 def session(

@@ -1,0 +1,180 @@
+"""The boundary as a process of its own (boundary/home/process.c): started with what it needs, called over a socket.
+
+It gets open files and no path: the trust root, one file in which it keeps what must outlive it, and the link's key,
+which is never read here. One process at a time holds that file: two runtimes cannot share what is kept of a vehicle.
+"""
+
+import os
+import socket
+import subprocess
+from collections.abc import Iterator, Sequence
+from enum import IntFlag
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.writing import PRIVATE_FOLDER, lock, make_folder
+from rtshcua.onboard.enforcement.isolated import MAX_PART
+
+#: how long one answer may take, in s: a mission of many steps is looked at as a whole when it is loaded
+PATIENCE_S: Final = 20.0
+_PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
+_BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
+#: octets of the largest call and answer
+_CALL, _ANSWER = MAX_PART + 64, 1_024
+_GREETING: Final = 12
+
+
+class Measure(IntFlag):
+    """What keeps others out of the process, and it away from everything else (boundary/home/isolation.h)."""
+
+    OWN_USER = 1
+    OWN_NETWORK = 2
+    NO_FILES = 4
+    FEW_CALLS = 8
+    NOT_DUMPABLE = 16
+    LOCKED_MEMORY = 32
+    SECRET_MEMORY = 64
+
+
+#: what is missing where a measure is not in force, in words
+MISSING: Final = {
+    Measure.OWN_USER: "a user of its own: whoever runs as this user can read the files of its keys (`--boundary-user`)",
+    Measure.OWN_NETWORK: "a network namespace of its own: that needs root or CAP_SYS_ADMIN",
+    Measure.NO_FILES: "Landlock: this kernel does not have it",
+    Measure.FEW_CALLS: "seccomp: this kernel does not have it",
+    Measure.NOT_DUMPABLE: "protection from being read (PR_SET_DUMPABLE)",
+    Measure.LOCKED_MEMORY: "locked memory for its keys: raise RLIMIT_MEMLOCK",
+    Measure.SECRET_MEMORY: "memfd_secret: the kernel can read its keys (`secretmem.enable=1`)",
+}
+
+_ENDED: Final = {
+    64: "its command line is wrong",
+    65: "it does not trust the trust root",
+    74: "its file cannot be read or written",
+    78: "what it kept is damaged",
+}
+
+
+class BoundaryError(Exception):
+    """The boundary's process does not begin: `missing`, `in-use`, `damaged`, `untrusted`, `not-begun`."""
+
+    def __init__(self, slug: str, text: str, help: str = "") -> None:
+        super().__init__(text)
+        self.slug = slug
+        self.help = help
+
+
+def program() -> Path | None:
+    """The program, in a checkout or as the package has it; None where it was not built."""
+    return next((each for each in (_BUILT, _PACKAGED) if each.is_file()), None)
+
+
+def kept_file(state: Path, vehicle: str) -> Path:
+    """What a boundary keeps of a vehicle, in a state folder."""
+    return state / "boundary" / f"vehicle-{quote(vehicle, safe='')}.kept"
+
+
+class BoundaryProcess:
+    """A boundary that runs. `measures` are those in force.
+
+    `own_seed` is that of the key that it signs its own evidence with; `user` is the user and group that it runs as,
+    None for ours. `paced`: the caller's time is not the machine's, as on a simulated vehicle that is flown faster.
+
+    Raises BoundaryError, and OSError for files that cannot be opened.
+    """
+
+    def __init__(
+        self, root: bytes, pinned: bytes, vehicle: str, state: Path, *, link_key: Path | None = None,
+        own_seed: bytes | None = None, user: tuple[int, int] | None = None, paced: bool = False,
+    ) -> None:  # fmt: skip
+        path = program()
+        if path is None:
+            text = "the boundary's program was not built"
+            raise BoundaryError("missing", text, "`make setup` builds it where there is a C compiler")
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        files: list[int] = [theirs.fileno()]
+        try:
+            words = ["--socket", str(files[0]), "--pin", pinned.hex(), "--vehicle", vehicle]
+            words += ["--paced"] if paced else []
+            for name, handle in self._handles(root, vehicle, state, link_key, own_seed):
+                files.append(handle)
+                words += [name, str(handle)]
+            if user is not None:
+                words += ["--user", str(user[0]), "--group", str(user[1])]
+            for end in (ours, theirs):
+                end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * _CALL)
+            self._process = subprocess.Popen(
+                [path, *words], pass_fds=files, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL, env={}, cwd="/", start_new_session=True,
+            )  # fmt: skip
+        except BaseException:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
+            for handle in files[1:]:
+                os.close(handle)
+        ours.settimeout(PATIENCE_S)
+        self._socket = ours
+        greeting = self._greeting()
+        self.measures = Measure(int.from_bytes(greeting[:4], "little"))
+        #: the name of the link's key
+        self.link_name = greeting[4:] if link_key is not None else None
+
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._process.pid
+
+    @property
+    def missing(self) -> Sequence[str]:
+        """The measures that are not in force, in words."""
+        return [text for measure, text in MISSING.items() if measure not in self.measures]
+
+    def call(self, octets: bytes) -> bytes:
+        """One call. Raises OSError when nobody answers; an empty answer says that it is gone."""
+        self._socket.send(octets)
+        return self._socket.recv(_ANSWER)
+
+    def close(self) -> None:
+        """Let it end: it does so when its socket is closed."""
+        self._socket.close()
+        try:
+            self._process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _handles(
+        self, root: bytes, vehicle: str, state: Path, link_key: Path | None, own_seed: bytes | None
+    ) -> Iterator[tuple[str, int]]:
+        place = kept_file(state, vehicle)
+        make_folder(place.parent, mode=PRIVATE_FOLDER)
+        try:
+            yield "--kept", lock(place)
+        except BlockingIOError:
+            text = f"another run's boundary holds what is kept of `{vehicle}`"
+            raise BoundaryError("in-use", text, "wait until that run is over") from None
+        for name, data in (("--root", root), ("--boundary-key", own_seed)):
+            if data is not None:
+                handle = os.memfd_create(name, os.MFD_CLOEXEC)
+                yield name, handle
+                os.pwrite(handle, data, 0)
+        if link_key is not None:
+            with open_regular(link_key) as file:
+                yield "--link-key", os.dup(file.fileno())
+
+    def _greeting(self) -> bytes:
+        try:
+            greeting = self._socket.recv(_ANSWER)
+        except TimeoutError:
+            greeting = b""
+        if len(greeting) == _GREETING:
+            return greeting
+        self._socket.close()
+        self._process.kill()
+        code = self._process.wait()
+        text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
+        raise BoundaryError({65: "untrusted", 78: "damaged"}.get(code, "not-begun"), text)

@@ -1,0 +1,258 @@
+"""A boundary elsewhere: in another process, or in a trusted world. What the runtime has of it is a way to call it.
+
+The calls are those of boundary/enforcement/calls.h: an octet that says which, and what follows it, big-endian; an
+answer is 0 and what is given back, or 1 and a slug. The other end verified the bundle itself, holds the keys, decides,
+and lets frames out; whatever this end does wrong, nothing moves that it did not permit. So this end may keep what it
+needs to fly by its own reading of the same bundle.
+"""
+
+from collections.abc import Callable, Mapping
+from struct import Struct
+from struct import error as struct_error
+from types import MappingProxyType
+from typing import Final
+
+from rtshcua.decision.session import InForce
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
+from rtshcua.mavlink.signing import Counts
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement import executor, frames
+from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.onboard.ports import BoundaryKey, Command, Dispatch
+from rtshcua.wire.boundary_chain import START
+from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
+from rtshcua.wire.preparation import Preparation
+from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt, decode
+from rtshcua.wire.receipt import encode as encode_receipt
+from rtshcua.wire.request import STEP
+from rtshcua.wire.response import Status, encode_refusal
+
+#: makes one call, and gives its answer
+Call = Callable[[bytes], bytes]
+
+(PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST) = (
+    range(1, 15)
+)
+#: octets of a bundle or a document that go in one call
+MAX_PART: Final = 60_000
+
+_FINE: Final = 0
+_TIME, _NOW = Struct(">q"), Struct(">qqq")
+_SIZED, _AT = Struct(">qqqI"), Struct(">BI")
+_SHOWN: Final = Struct(">qqqII")
+_STANDING: Final = Struct(">qBb")
+_PERMITTED: Final = Struct(">BhhQq")
+
+#: what an answer that makes no sense, or none at all, comes to
+LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or answers what makes no sense")
+NO_PREPARATION: Final = Refusal("preparation/not-here", "this boundary permits no parameters to be set")
+
+
+def _known(*modules: object) -> dict[str, Refusal]:
+    found = (each for module in modules for each in vars(module).values() if isinstance(each, Refusal))
+    return {refusal.slug: refusal for refusal in found}
+
+
+#: why a permit or a frame is refused, by slug: the texts are those of the boundary in this process
+_REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, frames))
+
+
+class Caller:
+    """Calls a boundary. Where nobody answers, or what makes no sense, that is `LOST`, and so is all from then on."""
+
+    def __init__(self, call: Call, *, signs: bool = False) -> None:
+        """`signs`: it has the link's key."""
+        self._call = call
+        self.signs = signs
+        #: whether the boundary is gone
+        self.lost = False
+
+    def __call__(self, kind: int, *parts: bytes) -> bytes | Refusal:
+        """What a call gives back, or why it is refused."""
+        if self.lost:
+            return LOST
+        try:
+            answer = self._call(bytes([kind]) + b"".join(parts))
+        except OSError:
+            answer = b""
+        if not answer:
+            return self.lose()
+        if answer[0] == _FINE:
+            return answer[1:]
+        slug = answer[1:].decode("ascii", "replace")
+        return _REFUSALS.get(slug) or Refusal(slug, "the boundary refuses it")
+
+    def lose(self) -> Refusal:
+        """Its answers make no sense: nothing more is asked."""
+        self.lost = True
+        return LOST
+
+    def put(self, what: int, octets: bytes) -> Refusal | None:
+        """Hand over what the next call of a kind is about, in parts."""
+        for at in range(0, len(octets) or 1, MAX_PART):
+            answer = self(PART, _AT.pack(what, at), octets[at : at + MAX_PART])
+            if isinstance(answer, Refusal):
+                return answer
+        return None
+
+    def load(self, bundle: bytes, now: Now) -> tuple[bytes, bool] | Refusal:
+        """Hand a bundle over: the id of its flight, which the boundary draws, and whether its mission was opened
+        before: then no step of it may begin.
+        """
+        refused = self.put(LOAD, bundle)
+        answer = refused or self(LOAD, _SIZED.pack(*_times(now), len(bundle)))
+        if isinstance(answer, Refusal):
+            return answer
+        return (answer[:-1], bool(answer[-1])) if len(answer) == FLIGHT_BYTES + 1 else self.lose()
+
+
+def _times(now: Now) -> tuple[int, int, int]:
+    return now.monotonic_us, now.utc_us, now.utc_error_us
+
+
+class IsolatedBoundary:
+    """`ports.Boundary` over calls. `in_force` and `commands` are this end's own reading of what is in force."""
+
+    def __init__(self, caller: Caller, in_force: InForce, commands: Commands) -> None:
+        self._caller = caller
+        self._in_force = in_force
+        self._commands = commands
+
+    def enforce(self, request: bytes) -> bytes:
+        """The boundary's response; of one that is gone, that nothing was decided."""
+        answer = self._caller(ENFORCE, request)
+        return encode_refusal(Status.MALFORMED) if isinstance(answer, Refusal) else answer
+
+    def consider(self, document: bytes, now: Now) -> None:
+        """Look at a document ahead, for what this end makes of it."""
+        self._in_force.consider(document, now)
+
+    def present(self, document: bytes, now: Now, released: int) -> bytes:
+        """The boundary's receipt; what it accepted is in force at this end too."""
+        if len(document) > MAX_DOCUMENT:
+            return encode_receipt(Receipt(UNKNOWN, "too-large", f"at most {MAX_DOCUMENT} bytes are read"))
+        refused = self._caller.put(PRESENT, document)
+        answer = refused or self._caller(PRESENT, _SHOWN.pack(*_times(now), released, len(document)))
+        if isinstance(answer, Refusal):
+            return encode_receipt(Receipt(UNKNOWN, answer.slug, answer.text))
+        receipt = decode(answer)
+        if isinstance(receipt, Refusal):
+            self._caller.lose()
+        elif receipt.accepted:
+            self._follow(document, now, receipt)
+        return answer
+
+    def _follow(self, document: bytes, now: Now, receipt: Receipt) -> None:
+        """What the boundary found good is found good here, but for the steps that are decided, which it alone knows."""
+        self._in_force.take(document, now, decided=0, released=receipt.step if receipt.kind == REPLACEMENT else 0)
+        self._commands.called_off = self._in_force.called_off
+        if receipt.kind == REPLACEMENT:
+            self._commands.replace(self._in_force.bundle.mission)
+
+
+class IsolatedGate:
+    """The gate over calls: `frames.Gate`, and `mavlink.signing.Verifier` where the boundary has the link's key."""
+
+    def __init__(self, caller: Caller, *, signs: bool) -> None:
+        self._caller = caller
+        self._signs = signs
+        #: what came, by what the boundary made of it
+        self.counts = Counts()
+
+    def stands(self, now_us: int) -> bool:
+        """Whether the vehicle is known to stand: not at this end, where nothing is set that depends on it."""
+        return False
+
+    def observe(self, frame: bytes, now_us: int = 0) -> None:
+        """Show it one good frame. With a key it has seen the frame when it verified it."""
+        if not self._signs:
+            self._caller(OBSERVE, _TIME.pack(now_us), frame)
+
+    def accept(self, frame: bytes, now_us: int) -> bool:
+        """Whether a frame proves where it comes from; one that does is observed at once."""
+        if not frame[FLAGS] & FLAG_SIGNED:
+            self.counts.unsigned += 1
+            return False
+        answer = self._caller(OBSERVE, _TIME.pack(now_us), frame)
+        names = ("accepted", "unsigned", "forged", "strayed", "stale", "crowded")
+        if isinstance(answer, Refusal) or len(answer) != 1 or answer[0] >= len(names):
+            return False
+        setattr(self.counts, names[answer[0]], getattr(self.counts, names[answer[0]]) + 1)
+        return answer[0] == 0
+
+    def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
+        """The octets to send for a frame, or why it is not sent."""
+        return self._caller(SEAL, _TIME.pack(now_us), frame)
+
+
+class IsolatedExecutor:
+    """`Executor` over calls. What is to be sent is looked up at this end; what may be is decided at the other."""
+
+    def __init__(self, caller: Caller, commands: Commands, gate: IsolatedGate) -> None:
+        self._caller = caller
+        self._commands = commands
+        self.frames = gate
+
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+        """What to send for a permit at a monotonic time, or why nothing is sent."""
+        return self._permitted(self._caller(DISPATCH, _TIME.pack(now_us), sealed))
+
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+        """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
+        return self._permitted(self._caller(STAND_IN, _STANDING.pack(now_us, kind, link), sealed))
+
+    def _permitted(self, answer: bytes | Refusal) -> Dispatch | Refusal:
+        if isinstance(answer, Refusal):
+            return answer
+        try:
+            kind, step, link, serial, not_after_us = _PERMITTED.unpack(answer)
+            command: Command = self._commands.command(kind, step, link, serial)
+        except (struct_error, LookupError):
+            return self._caller.lose()
+        return Dispatch(command, not_after_us, needs_record=kind == STEP)
+
+    def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
+        """Nothing is set through this boundary."""
+        return NO_PREPARATION
+
+    def prepared(self) -> None:
+        """Nothing was."""
+
+    def ended(self, token: int | None = None) -> None:
+        """The running step ended, or that command did."""
+        self._caller(ENDED, b"" if token is None else token.to_bytes(8, "big"))
+
+    def landed(self) -> None:
+        """The vehicle landed: standing permits lapse."""
+        self._caller(LANDED)
+
+    def release(self) -> None:
+        """Nothing more that moves the vehicle is to be sent."""
+        self._caller(RELEASE)
+
+
+class IsolatedAttestation:
+    """`Attestation` over calls: the other end has the key, which the caller gave it when it began."""
+
+    def __init__(self, caller: Caller) -> None:
+        self._caller = caller
+        self._begun = False
+
+    @property
+    def digest(self) -> bytes:
+        """The digest to keep for the next session, 32 octets; zero octets of a boundary that is gone."""
+        answer = self._caller(DIGEST)
+        return START if isinstance(answer, Refusal) else answer
+
+    def begin(self, key: BoundaryKey | None) -> None:
+        """The flight's log begins, with a session of this number. Raises RuntimeError for a second time."""
+        if self._begun:
+            raise RuntimeError("the boundary's session has begun already")
+        if key is not None:
+            self._begun = not isinstance(self._caller(BEGIN, key.session.to_bytes(8, "big"), key.before), Refusal)
+
+    def statement(self, *, final: bool = False) -> bytes | None:
+        """A signed statement, None without a key or after the final one."""
+        answer = self._caller(STATEMENT, bytes([final])) if self._begun else LOST
+        return None if isinstance(answer, Refusal) else answer

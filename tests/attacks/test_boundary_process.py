@@ -1,0 +1,236 @@
+"""Threat: the runtime is wholly taken over, and wants what only the boundary's process has: its keys, and frames that
+no permit covers. It has the socket, the files of its own user, and the rights of that user.
+
+Outcomes: the keys are not to be read; what is asked out of turn, ahead of time or with a seal of another session is
+refused; nonsense is answered and changes nothing; a second runtime finds the boundary held; when the boundary dies,
+nothing more leaves by it.
+"""
+
+import os
+import signal
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+from msgspec.structs import replace
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, Measure, kept_file, program
+from rtshcua.codec.frames import Codec
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.situation import Now, State
+from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, LOAD, LOST, OBSERVE, PART, SEAL, Caller
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.wire.permit import Permit, seal
+from rtshcua.wire.request import STEP, Request, encode
+from rtshcua.wire.response import Answer, Status, decode
+from virtual import case
+from virtual.shipped import shipped
+
+pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
+VEHICLE = "quad-07"
+ROOT_USER = pytest.mark.skipif(os.geteuid() != 0, reason="only root may start what runs as another user")
+
+
+def issued_us() -> int:
+    return time.time_ns() // 1_000 - 60_000_000
+
+
+def now() -> Now:
+    return Now(time.monotonic_ns() // 1_000, time.time_ns() // 1_000, 1_000)
+
+
+class Held:
+    """A boundary's process with a bundle in force, and the runtime's reading of it."""
+
+    def __init__(self, state: Path, user: tuple[int, int] | None = None, *, issued: int | None = None) -> None:
+        self.issued = issued or issued_us()
+        self.root, signed = case.root(self.issued)
+        pin = case.KEYS[next(iter(case.KEYS))].kid
+        self.process = BoundaryProcess(signed, pin, VEHICLE, state, user=user)
+        self.caller = Caller(self.process.call)
+        self.bundle = shipped("short", self.issued)
+
+    def load(self) -> Loaded:
+        loaded = load(
+            self.bundle, root=self.root, vehicle=VEHICLE, now=now(), mode=Mode.PROCESS, session_key=bytes(32),
+            flight=bytes(16), peer_is_own_simulator=False, caller=self.caller,
+        )  # fmt: skip
+        assert isinstance(loaded, Loaded), loaded
+        self.loaded = loaded
+        return loaded
+
+    def ask(self, step: int = 0, at: Now | None = None) -> Answer | Status | Refusal:
+        at = at or now()
+        policy, invocation = self.loaded.bundle.policy, self.loaded.bundle.mission.invocations[step]
+        state = State((None,) * policy.slots, (0,) * policy.slots, (4,) * len(policy.monitors))
+        released = self.loaded.in_force.received_us(0)
+        return decode(
+            self.loaded.boundary.enforce(encode(Request(STEP, step, -1, invocation.binding, at, state, released, 0, 0)))
+        )
+
+
+@pytest.fixture
+def held(tmp_path: Path) -> Iterator[Held]:
+    made = Held(tmp_path)
+    made.load()
+    yield made
+    made.process.close()
+
+
+def armed_frame() -> bytes:
+    return Codec(1, 191).pack(m.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+
+
+@ROOT_USER
+def test_another_user_reads_nothing_of_it(tmp_path: Path) -> None:
+    """As the runtime's user: not its memory, nor by ptrace, nor a core dump of it; and it may do next to nothing."""
+    held = Held(tmp_path, (65_534, 65_534))
+    try:
+        assert Measure.OWN_USER in held.process.measures
+        assert not set(held.process.missing) & {"Landlock: this kernel does not have it"}
+        status = Path(f"/proc/{held.process.pid}/status").read_text()
+        said = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
+        assert (said["Seccomp"].strip(), said["NoNewPrivs"].strip()) == ("2", "1")
+        assert int(said["CapEff"].strip(), 16) == 0
+        assert "0" in Path(f"/proc/{held.process.pid}/limits").read_text().split("Max core file size")[1].split()[:1]
+        for user in (65_533, 65_534):  # the runtime's, and its own
+            assert as_user(user, held.process.pid) == 0
+    finally:
+        held.process.close()
+
+
+def as_user(user: int, pid: int) -> int:
+    """A program of another user that tries to read a process; 0 where it reads nothing."""
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setgroups([])
+            os.setresgid(user, user, user)
+            os.setresuid(user, user, user)
+            got = 0
+            for name in ("mem", "maps", "environ", "syscall"):
+                try:
+                    with open(f"/proc/{pid}/{name}", "rb") as file:  # noqa: PTH123
+                        got += len(file.read(1))
+                except OSError:
+                    pass
+            import ctypes
+
+            libc = ctypes.CDLL(None, use_errno=True)
+            attach = 16
+            got += libc.ptrace(attach, pid, 0, 0) == 0
+            os._exit(min(got, 100))
+        finally:
+            os._exit(101)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def test_a_second_runtime_finds_it_held(held: Held, tmp_path: Path) -> None:
+    with pytest.raises(BoundaryError, match="another run") as refused:
+        Held(tmp_path)
+    assert refused.value.slug == "in-use"
+
+
+def test_no_permit_is_made_or_taken_over(held: Held, tmp_path: Path) -> None:
+    """One that the runtime seals, with any key that it has; and one of another session of the same bundle."""
+    at = struct.pack(">q", now().monotonic_us)
+    step = Permit(STEP, 0, -1, 1, 0, 0, 1 << 62)
+    for key in (bytes(32), b"\x01" * 32, os.urandom(32)):
+        answer = held.caller(DISPATCH, at, seal(step, key))
+        assert isinstance(answer, Refusal)
+        assert answer.slug == "permit/forged"
+    frame = held.caller(SEAL, at, armed_frame())
+    assert isinstance(frame, Refusal)
+
+
+def test_steps_have_their_turns(held: Held) -> None:
+    assert held.ask(2) is Status.NOT_CURRENT
+    first = held.ask(0)
+    assert isinstance(first, Answer)
+    assert not first.permit, "nothing is known of the vehicle"
+
+
+def test_no_time_is_made_up(held: Held) -> None:
+    """Nothing is decided ahead of its time, nor by a time that is long past: it has a clock of its own."""
+    here = now()
+    for by_us in (10_000_000, -10_000_000):
+        at = replace(here, monotonic_us=here.monotonic_us + by_us, utc_us=here.utc_us + by_us)
+        assert held.ask(0, at) is Status.MALFORMED
+        answer = held.caller(SEAL, struct.pack(">q", at.monotonic_us), armed_frame())
+        assert isinstance(answer, Refusal)
+        assert answer.slug == "time-apart"
+
+
+def test_a_bundle_flies_once_whatever_the_runtime_says(tmp_path: Path) -> None:
+    """Its marks are the boundary's own. A restart of it takes the bundle, and lets no step of it begin."""
+    first = Held(tmp_path)
+    first.load()
+    os.kill(first.process.pid, signal.SIGKILL)
+    first.process.close()
+    again = Held(tmp_path, issued=first.issued)
+    loaded = again.load()
+    assert again.ask(0) is Status.NOT_CURRENT
+    assert loaded.in_force.flight != first.loaded.in_force.flight
+    again.process.close()
+
+
+def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) -> None:
+    first = Held(tmp_path)
+    first.load()
+    first.process.close()
+    again = Held(tmp_path, issued=first.issued)
+    again.load()
+    assert isinstance(again.ask(0), Answer)
+    again.process.close()
+
+
+def test_what_it_kept_is_not_read_where_it_is_damaged(tmp_path: Path) -> None:
+    Held(tmp_path).process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    path.write_bytes(bytes(len(path.read_bytes())))
+    with pytest.raises(BoundaryError, match="damaged"):
+        Held(tmp_path)
+
+
+def test_nonsense_is_answered_and_changes_nothing(held: Held) -> None:
+    random = Random(5)
+    request = encode(
+        Request(
+            STEP,
+            0,
+            -1,
+            bytes(32),
+            now(),
+            State((None,) * held.loaded.bundle.policy.slots, (0,) * held.loaded.bundle.policy.slots, ()),
+            0,
+            0,
+            0,
+        )
+    )
+    for _ in range(3_000):
+        kind = random.choice(
+            (PART, LOAD, ENFORCE, 4, DISPATCH, 6, 7, 8, 9, OBSERVE, SEAL, 12, 13, 14, random.randrange(256))
+        )
+        body = random.choice((request, armed_frame(), random.randbytes(random.randrange(200))))
+        if kind == PART and random.random() < 0.5:
+            body = bytes([4]) + random.randbytes(4 + random.randrange(100))
+        elif kind == PART:
+            continue  # a bundle that is handed over anew takes the place of the one in force
+        answer = held.process.call(bytes([kind]) + body[: random.randrange(len(body) + 1)])
+        assert answer
+        assert answer[0] in (0, 1)
+        assert not (kind == SEAL and answer[0] == 0)
+    assert isinstance(held.ask(0), (Answer, Status))
+
+
+def test_when_it_dies_nothing_more_leaves(held: Held) -> None:
+    os.kill(held.process.pid, signal.SIGKILL)
+    gate = held.loaded.executor.frames
+    assert gate.seal(armed_frame(), now().monotonic_us) is LOST
+    assert held.ask(0) is Status.MALFORMED
+    assert held.caller.lost
+    assert held.caller(ENFORCE) is LOST

@@ -1,0 +1,182 @@
+"""Both boundaries at once: every call is made of the one in Python and of the one in C, and both answer the same."""
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+from msgspec.structs import replace as with_fields
+
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement import load as loading
+from rtshcua.onboard.enforcement.isolated import Caller, IsolatedBoundary, IsolatedExecutor, IsolatedGate
+from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.ports import BoundaryKey, Dispatch
+from rtshcua.wire.receipt import Receipt
+from rtshcua.wire.receipt import decode as read_receipt
+from rtshcua.wire.trust import TrustRoot
+from virtual import case
+
+#: what the boundary in C signs its own evidence with
+OWN_KEY = case.BOUNDARY_KEY.private.private_bytes_raw()
+
+
+class Differs(AssertionError):
+    """The two answered otherwise."""
+
+
+def same(what: str, one: Any, other: Any) -> None:
+    """Raises `Differs`."""
+    if one != other:
+        raise Differs(f"{what}: {one!r} in Python, {other!r} in C")
+
+
+def library(boundary: ctypes.CDLL) -> Callable[[bytes], bytes]:
+    """The boundary in C, called in this process; the caller's time is the only one."""
+    out = ctypes.create_string_buffer(2_048)
+
+    def call(octets: bytes) -> bytes:
+        size = boundary.rt_test_boundary_call(octets, len(octets), ctypes.c_int64(-1), out)
+        return out.raw[:size]
+
+    return call
+
+
+def begin(boundary: ctypes.CDLL, signed_root: bytes, pin: bytes, vehicle: str, session_key: bytes, now: Now) -> Caller:
+    """A boundary in C that begins, nothing opened on its vehicle before."""
+    boundary.rt_test_boundary_begin.restype = ctypes.c_char_p
+    boundary.rt_test_boundary_forget()
+    name = vehicle.encode()
+    refused = boundary.rt_test_boundary_begin(
+        signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, None, OWN_KEY,
+        (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us),
+    )  # fmt: skip
+    same("the trust root", None, refused)
+    return Caller(library(boundary))
+
+
+class BothAttestations:
+    """`Attestation`: the two sign the same."""
+
+    def __init__(self, here: Any, there: Any) -> None:
+        self._here, self._there = here, there
+
+    @property
+    def digest(self) -> bytes:
+        one: bytes = self._here.digest
+        same("the digest", one, self._there.digest)
+        return one
+
+    def begin(self, key: BoundaryKey | None) -> None:
+        self._here.begin(key)
+        self._there.begin(key)
+
+    def statement(self, *, final: bool = False) -> bytes | None:
+        one: bytes | None = self._here.statement(final=final)
+        same("a statement", one, self._there.statement(final=final))
+        return one
+
+
+class BothBoundaries:
+    """`ports.Boundary`."""
+
+    def __init__(self, here: Any, there: IsolatedBoundary, counts: dict[str, int]) -> None:
+        self._here, self._there, self._counts = here, there, counts
+
+    def enforce(self, request: bytes) -> bytes:
+        one: bytes = self._here.enforce(request)
+        same(f"enforce {request.hex()}", one, self._there.enforce(request))
+        self._counts["requests"] += 1
+        return one
+
+    def consider(self, document: bytes, now: Now) -> None:
+        self._here.consider(document, now)
+
+    def present(self, document: bytes, now: Now, released: int) -> bytes:
+        one: bytes = self._here.present(document, now, released)
+        here, there = read_receipt(one), read_receipt(self._there.present(document, now, released))
+        assert isinstance(here, Receipt)
+        assert isinstance(there, Receipt)
+        same(f"present {document.hex()}", with_fields(here, text=there.text), there)
+        self._counts["documents"] += 1
+        return one
+
+
+class BothGates:
+    """`frames.Gate`; whatever else is asked of it, Python answers."""
+
+    def __init__(self, here: Any, there: IsolatedGate, counts: dict[str, int]) -> None:
+        self._here, self._there, self._counts = here, there, counts
+
+    def observe(self, frame: bytes, now_us: int = 0) -> None:
+        self._here.observe(frame, now_us)
+        self._there.observe(frame, now_us)
+
+    def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
+        one: bytes | Refusal = self._here.seal(frame, now_us)
+        same(f"seal {frame.hex()}", one, self._there.seal(frame, now_us))
+        self._counts["refused frames" if isinstance(one, Refusal) else "frames"] += 1
+        return one
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._here, name)
+
+
+class BothExecutors:
+    """`Executor`."""
+
+    def __init__(self, here: Any, there: IsolatedExecutor, counts: dict[str, int]) -> None:
+        self._here, self._there, self._counts = here, there, counts
+        self.frames: Any = BothGates(here.frames, there.frames, counts)
+
+    def _both(self, what: str, one: Dispatch | Refusal, other: Dispatch | Refusal) -> Dispatch | Refusal:
+        same(what, one, other)
+        self._counts["refused permits" if isinstance(one, Refusal) else "dispatches"] += 1
+        return one
+
+    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+        return self._both("dispatch", self._here.dispatch(sealed, now_us), self._there.dispatch(sealed, now_us))
+
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+        there = self._there.stand_in(sealed, kind, link, now_us)
+        return self._both("stand_in", self._here.stand_in(sealed, kind, link, now_us), there)
+
+    def __getattr__(self, name: str) -> Any:
+        def both(*arguments: Any) -> Any:
+            getattr(self._there, name)(*arguments)
+            return getattr(self._here, name)(*arguments)
+
+        return both
+
+
+class Shadow:
+    """Puts both in the place of the one in Python, wherever `load` is called with a root that it was told of."""
+
+    def __init__(self, boundary: ctypes.CDLL) -> None:
+        self._library = boundary
+        self.roots: dict[TrustRoot, tuple[bytes, bytes]] = {}  # signed, and the key that it is pinned by
+        self.counts = dict.fromkeys(
+            ("requests", "documents", "frames", "refused frames", "dispatches", "refused permits"), 0
+        )
+
+    def know(self, root: TrustRoot, signed: bytes, pin: bytes) -> None:
+        """A root that flights are loaded under."""
+        self.roots[root] = signed, pin
+
+    def load(self, bundle: bytes, **given: Any) -> Loaded | Refusal:
+        """`load`, of both."""
+        signed, pin = self.roots[given["root"]]
+        caller = begin(self._library, signed, pin, given["vehicle"], given["session_key"], given["now"])
+        there = loading.load(bundle, **{**given, "mode": Mode.PROCESS, "caller": caller})
+        flight = given["flight"] if isinstance(there, Refusal) else there.in_force.flight
+        here = loading.load(bundle, **{**given, "flight": flight})
+        if isinstance(here, Refusal) or isinstance(there, Refusal):
+            slugs = [each.slug if isinstance(each, Refusal) else "loaded" for each in (here, there)]
+            same("load", *slugs)
+            return here
+        assert isinstance(there.boundary, IsolatedBoundary)
+        assert isinstance(there.executor, IsolatedExecutor)
+        boundary: Any = BothBoundaries(here.boundary, there.boundary, self.counts)
+        executor: Any = BothExecutors(here.executor, there.executor, self.counts)
+        attestation: Any = BothAttestations(here.attestation, there.attestation)
+        return with_fields(here, boundary=boundary, executor=executor, attestation=attestation)

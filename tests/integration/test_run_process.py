@@ -1,0 +1,42 @@
+"""`rtshcua run --mode process`, over UDP: by a boundary of its own process, under a user of its own, with the keys."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.boundary_process import program
+
+SPEED = 3
+AS = ("--boundary-user", "nobody") if os.geteuid() == 0 else ()
+pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
+
+
+def test_a_flight_by_a_boundary_of_its_own(ground: Any) -> None:
+    """It has the link's key: a vehicle that enforces signing obeys, and the log is what the boundary signed for."""
+    key = ground.folder / "link.key"
+    key.write_text("5a" * 32 + "\n")
+    key.chmod(0o600)
+    flown = ground.run(
+        ground.bundle(), "--mode", "process", *AS, "--signing-key", str(key), "--unsigned-radio", speed=SPEED
+    ).end()
+    assert flown.code == 0, flown.stderr
+    verified = ground.start("verify-log", "--audit", str(flown.folder), "--json").end()
+    assert verified.code == 0, verified.events
+    (said,) = verified.events
+    proven = {claim["slug"] for claim in said["proven"]}
+    assert "boundary" in proven, said
+    (kept,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("boundary/vehicle-quad-07.kept")
+    assert kept.stat().st_mode & 0o077 == 0
+
+
+def test_the_same_bundle_is_refused_by_the_boundary_where_the_run_has_forgotten_it(ground: Any) -> None:
+    """What a run remembers is its own, and in reach of who takes it over; the boundary remembers too."""
+    bundle = ground.bundle()
+    assert ground.run(bundle, "--mode", "process", speed=SPEED).end().code == 0
+    data = Path(ground.environment["RTSHCUA_DATA_DIR"])
+    for marker in data.rglob("replay/vehicle-quad-07/*"):
+        marker.unlink()
+    again = ground.run(bundle, "--mode", "process", speed=SPEED).end()
+    assert again.code == 5, again.stderr

@@ -36,7 +36,7 @@ bool rt_read_request(rt_bytes data, int64_t slots, uint32_t monitors, rt_request
         state->known[slot] = bits != half; /* the least integer stands for a value that is not known */
         if (bits > RT_MAX_VALUE && bits < half + (half - RT_MAX_VALUE) && bits != half)
             return false;
-        state->values[slot] = bits == half ? 0 : bits < half ? (int64_t)bits : -(int64_t)(half - (bits - half));
+        state->values[slot] = bits == half ? 0 : bits < half ? (int64_t)bits : -1 - (int64_t)(half - 1 - (bits - half));
     }
     for (uint32_t slot = 0; slot < count; slot++)
         state->ages[slot] = (int64_t)rt_take(&at, 4);

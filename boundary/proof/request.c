@@ -1,0 +1,16 @@
+/* What Frama-C's Eva runs: request.c on any bytes of any size, for the smallest state, a middling and the largest. */
+#include "__fc_builtin.h"
+#include "wire/request.h"
+
+static uint8_t input[RT_MAX_REQUEST];
+static rt_request request;
+
+int main(void) {
+    static const int64_t slots[] = {0, 9, RT_MAX_SLOTS};
+    static const uint32_t monitors[] = {0, 2, RT_MAX_MONITORS};
+    int number = Frama_C_interval(0, 2);
+    //@ split number;
+    Frama_C_make_unknown((char *)input, sizeof input);
+    rt_bytes data = {input, Frama_C_unsigned_int_interval(0, sizeof input)};
+    return rt_read_request(data, slots[number], monitors[number], &request);
+}

@@ -214,6 +214,8 @@ def test_places_and_ways_are_inside_of_areas_alike(native: Native) -> None:
             prepared, reach = PreparedZone(number, zone), 14 if number >= len(flat.ZONES) else 600 * M
             for _ in range(40):
                 path = tuple(of.randint(-reach, reach) for _ in range(2 * of.choice([1, 1, 2, 4])))
+                if of.random() < 0.3:  # a short leg
+                    path = (*path[:2], path[0] + of.randint(-2, 2), path[1] + of.randint(-2, 2))
                 error = of.choice([0, 0, 1, reach // 5])
                 truth = prepared.along(path, (-error, -error, error, error))
                 assert native.along(number, path, error) == truth, (zone, path, error)
@@ -289,6 +291,10 @@ def test_the_way_home_takes_as_much(native: Native) -> None:
         energy = Energy(flat.CONTRACTS[flat.GOTO], made, asked_for)
         for _ in range(20):
             distance = of.choice([0, 1, of.randrange(10 * M), of.randrange(1 << 29), 759_250_125])
+            if made.speeds is not None and of.random() < 0.5:  # it just comes to speed
+                homeward = min(asked_for or made.speeds.homeward, made.speeds.homeward)
+                speed = max(1, min(homeward, made.speeds.air - made.speeds.wind))
+                distance = max(speed * speed // made.speeds.acceleration - made.home_within, 0)
             low, high = sorted(
                 of.choice([0, 20 * M, -M, MAX_VALUE, -MAX_VALUE, of.randrange(1 << 30)]) for _ in range(2)
             )
@@ -475,4 +481,28 @@ def test_heights_at_floor_and_ceiling(native: Native) -> None:
                 native,
                 invocations[0],
                 [Question(flat.state({flat.HEIGHT: each}), flat.context(step), flat.NOW) for each in heights],
+            )
+
+
+def test_sums_of_the_height_over_a_volume(native: Native) -> None:
+    """The height is the one number that ranges; what of it cancels out does not."""
+    height, level = flat.signal(flat.HEIGHT), flat.const(15 * M)
+    sums = (height, flat.scaled(height, -1), flat.apply(Op.SUB, level, height), flat.apply(Op.SUB, height, height))
+    for op, number in product((Op.LT, Op.LE, Op.GT, Op.GE, Op.EQ, Op.NE), sums):
+        clauses = tuple(flat.clause("m", flat.apply(op, number, flat.const(at * M))) for at in (-20, -5, 0, 15, 20))
+        for clause in clauses:
+            contract = replace(
+                flat.CONTRACTS[flat.TAKEOFF], maintain=(clause,), reads=(flat.BATTERY, flat.HEIGHT, flat.WIND, flat.FIX)
+            )
+            contracts = tuple(contract if at == flat.TAKEOFF else one for at, one in enumerate(flat.CONTRACTS))
+            step = replace(flat.INVOCATIONS[0], contract=contract)
+            invocations = load(native, replace(flat.POLICY, contracts=contracts), rich_worlds.mission(step))
+            assert invocations
+            native.step(0)
+            heights = (0, 5 * M, 20 * M, 25 * M, None)
+            context = flat.context(step, phase=0)
+            agree(
+                native,
+                invocations[0],
+                [Question(flat.state({flat.HEIGHT: each}), context, flat.NOW) for each in heights],
             )

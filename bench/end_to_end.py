@@ -14,7 +14,7 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
 from time import perf_counter_ns, thread_time_ns
@@ -29,6 +29,7 @@ from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
+from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Ending, Event, Succeeded
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual import case
@@ -63,7 +64,7 @@ class Timed(VirtualVehicle):
             timeout_us = 0
         return super().poll(now_us, timeout_us)
 
-    def _take(self, datagrams: Sequence[bytes], events: list[Event]) -> None:
+    def _take(self, datagrams: Iterable[bytes], events: list[Event]) -> None:
         for datagram in datagrams:
             self.number += 1
             number, before = self.number, len(events)
@@ -77,7 +78,7 @@ class Timed(VirtualVehicle):
 
     def begin(self, command: Command, now_us: int) -> None:
         """Send, and take the time."""
-        if self._free:
+        if self._free and isinstance(self.frames, FrameSession):
             self.frames.open(command, now_us)
         events, frames = self.driver.begin(command, now_us)
         for frame in frames:

@@ -251,6 +251,10 @@ def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], 
         for descriptor, each in enumerate(given):
             os.dup2(each, descriptor)
             os.close(each)
+        # those of the process that was forked may be of a file, which has a place to return to
+        sys.stdin, sys.stdout, sys.stderr = (
+            os.fdopen(descriptor, mode, closefd=False) for descriptor, mode in enumerate(("r", "w", "w"))
+        )
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)

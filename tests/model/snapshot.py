@@ -31,6 +31,7 @@ from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.runtime import EventHandler
 from rtshcua.onboard.runtime.view import Decided, Stage
+from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.permit import AGAIN, SIZE, open_permit
 from rtshcua.wire.trust import TrustRoot
@@ -50,7 +51,8 @@ _ONCE = (PreparedInvocation, PreparedPolicy, Recorder, Limits, Enum, type, Funct
 _ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
     Admission: ("_last", "_repeated", "recent"),
     EventHandler: ("_gap", "_refused_us", "_unrecorded"),
-    SoftwareBoundary: ("_now_us",),
+    SoftwareBoundary: ("_now_us", "_last"),
+    BoundaryChain: ("_marks", "aside", "count", "declined", "digest", "frames", "left", "repeated", "stopped"),
     StateMonitor: ("_state", "_held"),
 }
 #: attributes that are read in these stages only, and are set anew whenever a run comes into them

@@ -65,7 +65,8 @@ class Processes:
         ):
             return None
         files = [[at for at, _ in group] for _, group in groupby(enumerate(session.items), lambda each: each[1].path)]
-        files.reverse()  # the next is the last
+        # the next is the last. Flights in real time take longest, and wait most: they come first
+        files.sort(key=lambda each: "integration" in session.items[each[0]].path.parts)
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  one folder for all processes
         try:
             for _ in range(min(self._number, len(files))):

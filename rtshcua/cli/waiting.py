@@ -171,6 +171,6 @@ class Waiting:
     def _tell(self, event: str, text: str, **more: object) -> None:
         """Say how it stands: a line for a person, an object for a program."""
         if self._as_json:
-            out_json(_encode({"event": event, "text": text} | more).decode())
+            out_json(_encode({"event": event, "text": text} | more).decode(), flush=True)
         else:
             say(text)

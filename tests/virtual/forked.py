@@ -252,9 +252,9 @@ def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], 
             os.dup2(each, descriptor)
             os.close(each)
         # those of the process that was forked may be of a file, which has a place to return to
-        sys.stdin, sys.stdout, sys.stderr = (
-            os.fdopen(descriptor, mode, closefd=False) for descriptor, mode in enumerate(("r", "w", "w"))
-        )
+        sys.stdin = os.fdopen(0, "r", closefd=False)
+        sys.stdout = os.fdopen(1, "w", buffering=1 if os.isatty(1) else -1, closefd=False)
+        sys.stderr = os.fdopen(2, "w", buffering=1, errors="backslashreplace", closefd=False)
         os.chdir(folder)
         os.environ.clear()
         os.environ.update(environment)

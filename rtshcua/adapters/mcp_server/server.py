@@ -26,6 +26,7 @@ from pydantic import AnyUrl
 
 from rtshcua import __version__
 from rtshcua.adapters.mcp_server.access import refusal
+from rtshcua.adapters.mcp_server.connections import CONNECTION, MOST, Connection
 
 INSTRUCTIONS: Final = (
     "Propose missions to a drone that waits. Read describe_policy first; check_mission costs nothing; a rejection "
@@ -49,10 +50,9 @@ _ENDS: Final = types.ToolAnnotations(readOnlyHint=False, destructiveHint=True, i
 _RESOURCES: Final = {"policy": "describe_policy", "schema": "schema", "log": "read_evidence", "flight": "flight"}
 #: those that change, and of which a host may be told when they do
 _CHANGING: Final = frozenset({"log", "flight"})
-#: sessions over HTTP at a time, how long one may be idle, in seconds, and connections at a time
+#: sessions over HTTP at a time, and how long one may be idle, in seconds
 _MOST_SESSIONS: Final = 8
 _IDLE_S: Final = 1_800.0
-_MOST_CONNECTIONS: Final = 64
 #: how many resources may be followed at once, by all hosts together; one more takes the place of the oldest
 _MOST_FOLLOWED: Final = 32
 
@@ -151,6 +151,7 @@ async def _speak(opening: Opening) -> None:
 def serve_http(make: Callable[[], Any], listener: socket.socket, token: bytes) -> None:
     """Speak over streamable HTTP at a socket that listens on this machine alone, until a signal ends it."""
     logging.getLogger("mcp").setLevel(logging.CRITICAL)
+    logging.getLogger("uvicorn.error").setLevel(logging.ERROR)  # it warns of every stranger that speaks nonsense
     anyio.run(_speak_http, Opening(make), listener, token)
 
 
@@ -165,6 +166,7 @@ async def _speak_http(opening: Opening, listener: socket.socket, token: bytes) -
         async def answer(scope: dict[str, Any], receive: Any, send: Any) -> None:
             refused = refusal(scope["path"], scope["headers"], token, port)
             if refused is None:
+                scope["state"][CONNECTION].admit()
                 await manager.handle_request(scope, receive, send)
                 return
             headers = [(b"content-length", b"0"), *([(b"www-authenticate", b"Bearer")] if refused == 401 else [])]
@@ -172,8 +174,8 @@ async def _speak_http(opening: Opening, listener: socket.socket, token: bytes) -
             await send({"type": "http.response.body", "body": b""})
 
         settings = uvicorn.Config(
-            answer, lifespan="off", ws="none", log_config=None, access_log=False, server_header=False,
-            limit_concurrency=_MOST_CONNECTIONS, timeout_graceful_shutdown=1,
+            answer, http=Connection, lifespan="off", ws="none", log_config=None, access_log=False, server_header=False,
+            backlog=MOST, timeout_graceful_shutdown=1,
         )  # fmt: skip
         async with manager.run():
             await uvicorn.Server(settings).serve(sockets=[listener])

@@ -1,8 +1,11 @@
 """`rtshcua mcp`: an agent proposes missions to a vehicle that waits, over the Model Context Protocol."""
 
+import gc
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -18,9 +21,6 @@ from rtshcua.wire.bundle import MAX_BUNDLE, envelopes, policy_digest
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import open_root
 from rtshcua.wire.untrusted import Untrusted
-
-if TYPE_CHECKING:
-    from rtshcua.adapters.mcp_server.desk import Desk
 
 app = typer.Typer(add_completion=False)
 _AGENT = "agent"
@@ -52,7 +52,8 @@ def mcp(
     or the port is taken, 4 for a key that is not an agent's, or a token that others may read.
     """
     try:
-        from rtshcua.adapters.mcp_server.server import serve, serve_http
+        with _loading():
+            from rtshcua.adapters.mcp_server.server import serve, serve_http
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in ("mcp", "anyio"):
             raise
@@ -75,14 +76,18 @@ def mcp(
     for path in with_:
         read_regular(path, 1)
 
-    def make() -> "Desk":
+    with _loading():  # before the host is greeted: it may call a tool at once, and that has 100 ms
         from rtshcua import library
         from rtshcua.adapters.mcp_server.desk import Desk, Signer
         from rtshcua.adapters.mcp_server.flight import Following
         from rtshcua.adapters.mcp_server.missions import Missions
 
+    def make() -> Desk:
         signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))
-        return Desk(Missions(with_, str(library.root())), signer, to, Following(to))
+        with _loading():
+            desk = Desk(Missions(with_, str(library.root())), signer, to, Following(to))
+            gc.freeze()
+        return desk
 
     if http is None or token_file is None:
         serve(make)
@@ -101,6 +106,18 @@ def mcp(
         say(f"serves http://{HOST}:{listener.getsockname()[1]}{PATH} to whoever sends the token in `{token_file}`")
         serve_http(make, listener, token)
     return ExitCode.OK
+
+
+@contextmanager
+def _loading() -> Iterator[None]:
+    """While something is loaded that stays: to look through it for garbage takes a tenth of the start."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _sources(store: KeyStore, key: SigningKey) -> tuple[str, ...]:

@@ -287,6 +287,18 @@ def test_who_subscribed_is_told_when_the_flight_changes_and_not_after(ground: An
     session_of(ground, base, place, work, heard=updated.append)
 
 
+def test_what_the_first_call_needs_is_loaded_before_the_host_is_greeted(ground: Any, base: str, place: Path) -> None:
+    """A call that comes with the greeting finds the compiler there, and waits for the policy alone."""
+    words = ["mcp", base, "--to", str(place), "--with", str(POLICY)]
+    command = [sys.executable, "-X", "importtime", "-m", "rtshcua.cli.app", *words]
+    ended = subprocess.run(
+        command, cwd=ground.folder, env=ground.environment, stdin=subprocess.DEVNULL, capture_output=True, check=True
+    )
+    loaded = {line.split("|")[-1].strip() for line in ended.stderr.decode().splitlines()}
+    assert {"rtshcua.adapters.mcp_server.desk", "rtshcua.ground.compiler.program"} <= loaded
+    assert "rtshcua.onboard.runtime.controller" not in loaded, "nor anything that only flies"
+
+
 def test_a_key_that_may_speak_for_others_is_refused(ground: Any, base: str, place: Path) -> None:
     (key,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("mission-operator.key")
     run = ground.start("mcp", base, "--to", str(place), "--with", str(POLICY), "--mission-key", str(key))

@@ -28,7 +28,6 @@ from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.quantity import Dimension, display
-from rtshcua.onboard.runtime.controller import REPLAN
 from rtshcua.onboard.runtime.seen import value_in_words
 from rtshcua.wire.binding import bind, binding_of
 from rtshcua.wire.bundle import Bundle, mission_payload, policy_digest, policy_payload, seal_under
@@ -54,7 +53,7 @@ _TELLING: Final = frozenset(
 )
 _AWAITED: Final = "approval/awaited"
 #: the effects of which the last says whether another step is waited for
-_AFTER_REPLAN: Final = frozenset({REPLAN, "replacement", "dispatched", "cancellation", "recall"})
+_AFTER_REPLAN: Final = frozenset({"replan", "replacement", "dispatched", "cancellation", "recall"})
 _REPLANS: Final = (
     "`replan` with this `from_step`; the vehicle holds meanwhile, and falls back when nothing comes in time"
 )
@@ -285,7 +284,7 @@ class Desk:
             "stage": seen.stage,
             "over": seen.stage in ("ended", "unreachable"),
             "replan": {"from_step": asked.get("step"), "within": asked.get("detail"), "how": _REPLANS}
-            if asked.get("event") == REPLAN and seen.stage == "flying"
+            if asked.get("event") == "replan" and seen.stage == "flying"
             else None,
             "ending": seen.close.get("ending"),
             "decision": None if decided is None else {key: decided.get(key) for key in _DECIDED},

@@ -1,6 +1,12 @@
-"""`rtshcua agent-bundle`: what hosts ask of a plug-in, that it holds no secret, and what its hook refuses."""
+"""`rtshcua agent-bundle`: what hosts ask of a plug-in, that it holds no secret, and what its hook refuses.
+
+What hosts ask: Claude Code's published schema of manifests, hooks and servers (SchemaStore, of 2026-04-23:
+`claude-code-plugin-manifest.json`), and the specification of Agent Skills. Whoever has Claude Code names the program in
+RTSHCUA_CLAUDE, and its own validator is asked too; that of 2.1.330 was.
+"""
 
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -54,19 +60,26 @@ def test_a_plug_in_has_what_hosts_ask_for_and_no_secret(
     assert re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", manifest["name"])
     assert re.fullmatch(r"\d+\.\d+\.\d+([-+].+)?", manifest["version"])
     assert (manifest["name"], manifest["version"]) == (NAME, __version__)
-    assert set(manifest) <= {"name", "version", "description", "author", "keywords"}
-    assert manifest["author"]["name"]
+    assert set(manifest) == {"name", "version", "description", "author", "keywords"}
+    assert [*manifest["author"]] == ["name"]
+    texts = [manifest["description"], manifest["author"]["name"], *manifest["keywords"]]
+    assert all(isinstance(text, str) and text for text in texts)
     ((name, server),) = read(plug / ".mcp.json")["mcpServers"].items()
     assert name == NAME
     assert set(server) <= {"command", "args", "env"}
+    assert all(isinstance(word, str) for word in (*server["args"], *server.get("env", {}).values()))
     assert Path(server["command"]).is_absolute()
     at = server["args"].index("mcp")
     assert server["args"][at:] == ["mcp", str(base), "--to", SOCKET, "--with", str(POLICY)]
-    for event, matchers in read(plug / "hooks/hooks.json")["hooks"].items():
+    hooks = read(plug / "hooks/hooks.json")
+    assert set(hooks) == {"description", "hooks"}
+    for event, matchers in hooks["hooks"].items():
         assert event in EVENTS
         for matcher in matchers:
+            assert set(matcher) == {"matcher", "hooks"}
             assert re.compile(matcher["matcher"])
             for hook in matcher["hooks"]:
+                assert set(hook) == {"type", "command", "timeout"}
                 assert hook["type"] == "command"
                 assert hook["timeout"] > 0
     whole = b"".join((plug / file).read_bytes() for file in files)
@@ -76,6 +89,36 @@ def test_a_plug_in_has_what_hosts_ask_for_and_no_secret(
     assert base.read_bytes() not in whole
 
 
+@pytest.mark.skipif(
+    "RTSHCUA_CLAUDE" not in os.environ, reason="names the program of Claude Code, which is not ours to have"
+)
+def test_claude_codes_own_validator_takes_it_and_refuses_what_is_wrong(base: Path, tmp_path: Path) -> None:
+    def validated(plug: Path) -> bool:
+        command = [os.environ["RTSHCUA_CLAUDE"], "plugin", "validate", "--strict", "--json", str(plug)]
+        settings = {"HOME": str(tmp_path), "DISABLE_AUTOUPDATER": "1", "CLAUDE_CODE_DISABLE_NONESSENTIAL_TRAFFIC": "1"}
+        ended = subprocess.run(command, env=os.environ | settings, capture_output=True, check=False, timeout=60)
+        told = json.loads(ended.stdout)
+        assert told["success"] is (ended.returncode == 0)
+        if told["success"]:
+            assert [each["name"] for each in told["provides"]["mcpServers"]] == [NAME]
+            assert told["provides"]["skills"] == [f"{NAME}:{NAME}"]
+            assert [each["event"] for each in told["provides"]["hooks"]] == ["PreToolUse"]
+        return bool(told["success"])
+
+    plug = tmp_path / "plug"
+    assert made(base, plug) == 0
+    assert validated(plug)
+    for name, word, other in (
+        (".claude-plugin/plugin.json", f'"name": "{NAME}"', f'"name": "{NAME} {NAME}"'),
+        (".mcp.json", '"command"', '"comand"'),
+        ("hooks/hooks.json", "PreToolUse", "PreTool"),
+    ):
+        text = (plug / name).read_text("utf-8")
+        (plug / name).write_text(text.replace(word, other, 1), "utf-8")
+        assert not validated(plug), name
+        (plug / name).write_text(text, "utf-8")
+
+
 def test_the_skill_is_one_by_the_specification_of_skills(base: Path, tmp_path: Path) -> None:
     assert made(base, tmp_path / "plug") == 0
     text = (tmp_path / f"plug/skills/{NAME}/SKILL.md").read_text("utf-8")
@@ -83,6 +126,9 @@ def test_the_skill_is_one_by_the_specification_of_skills(base: Path, tmp_path: P
     fields = dict(line.split(": ", 1) for line in front.splitlines())
     assert set(fields) == {"name", "description"}
     assert fields["name"] == NAME, "that of its folder"
+    assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", fields["name"])
+    assert len(fields["name"]) <= 64
+    assert not re.search(r"[<>]|: | #", fields["description"]), "plain text, in YAML too"
     assert 0 < len(fields["description"]) <= 1024
     tools = set(re.findall(r"`([a-z]+_[a-z]+|cancel|replan)`", body))
     server = (CHECKOUT / "rtshcua/adapters/mcp_server/server.py").read_text("utf-8")

@@ -67,7 +67,7 @@ def test_bash_completes_all_of_it(tab: Complete) -> None:
     }  # fmt: skip
     assert "--if-missing" in tab("keys", "init", "--i")
     assert tab("check", "--deny") == ["--deny-warnings"]
-    assert tab("run", "--mode", "") == ["none", "software"]
+    assert tab("run", "--mode", "") == ["none", "process", "software"]
     assert tab("explain", "E031") == [f"E031{digit}" for digit in range(10)]
     assert tab("explain", "datum") == ["datum-mismatch", "datum-not-allowed"]
     assert tab("lint", "--format", "") == ["github", "human", "json", "junit", "sarif"]

@@ -93,7 +93,7 @@ def test_fish_completes(place: Path, capsys: pytest.CaptureFixture[str]) -> None
     asking = "source .script; " + "; ".join(f'complete -C "{line}" | string split -f1 \\t; echo .' for line in lines)
     done = subprocess.run(["fish", "--no-config", "-c", asking], capture_output=True, text=True, check=True)
     assert [sorted(part.split()) for part in done.stdout.split(".\n")[:3]] == [
-        ["verify-log", "verify-proof"], ["none", "software"], ["datum-mismatch", "datum-not-allowed"],
+        ["verify-log", "verify-proof"], ["none", "process", "software"], ["datum-mismatch", "datum-not-allowed"],
     ]  # fmt: skip
     assert done.stdout.endswith("b.bundle\nsub/\n.\n")
 

@@ -30,6 +30,8 @@ COPIED: Final = (f"skills/{NAME}/SKILL.md", "hooks/keep_out.py")
 #: tools of a host that may reach for files
 _REACHING: Final = "Bash|Read|Edit|Write|NotebookEdit"
 _DATA: Final = "RTSHCUA_DATA_DIR"
+#: what tells where the user's data lies, and hosts do not hand on to the servers that they start
+_CHOOSING: Final = (_DATA, "XDG_DATA_HOME")
 
 
 @app.command("agent-bundle")
@@ -95,7 +97,7 @@ def plugin(words: list[str], socket: str, policy: str, vehicle: str) -> dict[str
     script = Path(sys.executable).parent / NAME
     command = [str(script)] if script.is_file() else [sys.executable, "-P", "-m", "rtshcua.cli.app"]
     server: dict[str, object] = {"command": command[0], "args": [*command[1:], *words]}
-    if os.environ.get(_DATA):
+    if any(map(os.environ.get, _CHOOSING)):
         server["env"] = {_DATA: _whole(data_folder())}
     manifest = {
         "name": NAME,

@@ -18,7 +18,7 @@ import pytest
 
 from rtshcua import __version__
 from rtshcua.adapters.files.folders import data_folder
-from rtshcua.cli.agent_bundle import COPIED, NAME
+from rtshcua.cli.agent_bundle import COPIED, NAME, plugin
 from rtshcua.cli.app import main
 from rtshcua.wire.keys import Duty
 
@@ -196,3 +196,18 @@ def test_where_there_is_no_script_the_module_is_started_from_the_path_of_the_int
     assert made(base, tmp_path / "plug") == 0
     server = read(tmp_path / "plug/.mcp.json")["mcpServers"][NAME]
     assert [server["command"], *server["args"][:3]] == [str(tmp_path / "python3"), "-P", "-m", "rtshcua.cli.app"]
+
+
+@pytest.mark.parametrize(
+    ("variable", "below"), [("RTSHCUA_DATA_DIR", ""), ("XDG_DATA_HOME", "rtshcua"), (None, None)]
+)  # fmt: skip
+def test_a_server_finds_the_key_store_of_who_made_its_plug_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str | None, below: str | None
+) -> None:
+    for each in ("RTSHCUA_DATA_DIR", "XDG_DATA_HOME"):
+        monkeypatch.delenv(each, raising=False)
+    if variable is not None:
+        monkeypatch.setenv(variable, str(tmp_path))
+    (server,) = json.loads(plugin([], SOCKET, "p@1", "quad")[".mcp.json"])["mcpServers"].values()
+    told = None if below is None else {"RTSHCUA_DATA_DIR": str(tmp_path / below)}
+    assert server.get("env") == told

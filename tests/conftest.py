@@ -203,23 +203,6 @@ class Measured:
             self._begun = False
 
 
-def spread(paths: set[Path], waiting: Path) -> dict[Path, tuple[float, Path]]:
-    """Where each file comes: those that wait much, for processes and for real time, among those that compute.
-
-    The last third is for those that compute: a file whose tests wait one for the other would be waited for in the end.
-    """
-    groups = (
-        sorted(path for path in paths if path.is_relative_to(waiting)),
-        sorted(path for path in paths if not path.is_relative_to(waiting)),
-    )
-    ends = (2 / 3, 1)
-    return {
-        path: (end * at / len(group), path)
-        for end, group in zip(ends, groups, strict=True)
-        for at, path in enumerate(group)
-    }
-
-
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Begin the process from which commands are forked, if a test asks for it: it loads while the first tests run.
 
@@ -240,11 +223,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     What only a random example reaches is covered by luck: it gets a case of its own.
     """
     tests = CHECKOUT / "tests"
-    places = spread({item.path for item in items}, tests / "integration")
-    items.sort(key=lambda item: places[item.path])  # the same order in every process
-    covering = {path for path in places if any(path.is_relative_to(tests / folder) for folder in COVERING)}
+    covering = tuple(tests / folder for folder in COVERING)
     for item in items:
-        if item.path not in covering or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+        drawn = getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
+        if drawn or not any(item.path.is_relative_to(folder) for folder in covering):
             item.add_marker("unmeasured")
 
 

@@ -283,6 +283,7 @@ def test_without_enforcement_it_does_not_hold() -> None:
     assert breaks("a permit for what is inadmissible", UNENFORCED)
 
 
+@pytest.mark.altered
 @pytest.mark.parametrize("number", range(len(decide.STEPS)), ids=[step.__name__ for _, step in decide.STEPS])
 def test_a_decision_that_forgets_a_step_is_noticed(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decide, "STEPS", decide.STEPS[:number] + decide.STEPS[number + 1 :])

@@ -204,6 +204,7 @@ def test_a_link_flies_where_it_may(ref: Ref, values: dict[int, int | None], skil
         assert decision == Decision(ALLOW, Reason.ADMITTED, 8, None, None, decision.target, AT_US + LINK_VALID_US)
 
 
+@pytest.mark.altered
 def test_where_neither_a_rule_nor_the_chain_has_a_link_there_is_no_target() -> None:
     """The chain ends with a landing that needs nothing; without it, every link needs a fix."""
     of = Asked()

@@ -23,6 +23,13 @@ typedef struct {
 /* Why something is refused, the slug of the Python refusal; NULL where all is well. */
 typedef const char *rt_refusal;
 
+/* The octets of a slug. */
+static inline rt_bytes rt_words(rt_refusal slug) {
+    rt_bytes words = {(const uint8_t *)slug, 0};
+    while (slug[words.size] != 0) words.size++;
+    return words;
+}
+
 static inline bool rt_same(rt_bytes one, rt_bytes other) {
     return one.size == other.size && (one.size == 0 || memcmp(one.at, other.at, one.size) == 0);
 }

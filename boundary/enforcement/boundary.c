@@ -121,6 +121,8 @@ rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup) {
     boundary->loaded = boundary->opened = boundary->to_keep = false;
     boundary->bundle_size = boundary->document_size = boundary->document_count = 0;
     boundary->flights = 0;
+    boundary->serial = 1;
+    rt_issuer_begin(&boundary->issuer, setup->settings, setup->owed);
     memset(&boundary->executor, 0, sizeof boundary->executor);
     memset(&boundary->chain, 0, sizeof boundary->chain);
     boundary->executor.gate.chain = &boundary->chain;
@@ -175,8 +177,7 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
     }
     memset(&boundary->chain, 0, sizeof boundary->chain);
     boundary->attests = boundary->answered = false;
-    rt_executor_begin(executor, boundary->keys->session, &bundle->policy, &bundle->mission);
-    boundary->serial = 1;
+    rt_executor_begin(executor, boundary->keys->session, &bundle->policy, &bundle->mission, boundary->serial);
     boundary->version = bundle->policy.version;
     boundary->now_us = 0;
     boundary->document_count = 0;
@@ -224,8 +225,7 @@ uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, 
     boundary->document_size = 0;
     /* texts are for who shows them: the slug says all */
     const char *slug = taken.refused == NULL ? "accepted" : taken.refused;
-    rt_bytes text = {(const uint8_t *)slug, 0};
-    while (slug[text.size] != 0) text.size++;
+    const rt_bytes text = rt_words(slug);
     const rt_receipt receipt = {taken.kind, text, text, taken.step, taken.role, taken.granted, taken.expires_us,
                                 {boundary->chain.digest, RT_DIGEST_BYTES}};
     return rt_write_receipt(&receipt, out);

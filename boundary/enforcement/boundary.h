@@ -27,6 +27,7 @@ typedef struct {
     rt_bytes vehicle;      /* the identity of the one that we are on */
     bool signs;            /* the link has a key */
     bool has_key;          /* and so has the boundary itself */
+    const rt_preparation *settings, *owed; /* what is set of the vehicle, and what is owed to it; NULL for nothing */
     rt_now now;
 } rt_setup;
 
@@ -41,6 +42,7 @@ typedef struct {
     int64_t expires_us; /* when no step of the bundle is fresh any more, UTC */
     rt_session session;
     rt_executor executor;
+    rt_issuer issuer; /* of preparation permits */
     uint64_t serial;   /* of the next permit */
     int64_t version;   /* of the policy: latched, a newer one comes with another bundle, after landing */
     int64_t now_us;    /* of the last request: time does not go back */

@@ -80,7 +80,10 @@ static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_byte
     const uint32_t most = document ? RT_MAX_DOCUMENT : RT_MAX_BUNDLE;
     if (!document && what != RT_CALL_LOAD) return "malformed";
     if (document ? !boundary->loaded : boundary->loaded && boundary->executor.flies) return document ? "not-loaded" : "flies";
-    if (!document) boundary->loaded = false;
+    if (!document) {
+        (void)rt_give_back(boundary); /* what nothing was sent of may be loaded again */
+        boundary->loaded = false;
+    }
     if (at == 0) *size = 0;
     if (at != *size) return "malformed";
     if (part.size > most - *size) return "too-large";
@@ -103,7 +106,6 @@ static void draw_flight(rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BYTES]) 
 
 static uint32_t load(rt_boundary *boundary, const rt_now *now, uint8_t *out) {
     rt_refusal refused;
-    (void)rt_give_back(boundary); /* what nothing was sent of may be waited with again */
     draw_flight(boundary, out + 1);
     refused = rt_load(boundary, out + 1, now);
     if (refused != NULL) return refuse(refused, out);
@@ -128,6 +130,22 @@ static uint32_t answer_staged(rt_boundary *boundary, int64_t kind, reader *left,
     if (!boundary->loaded) return refuse("not-loaded", out);
     out[0] = 0;
     return 1 + rt_present(boundary, &now, released, out + 1);
+}
+
+/* What is set of the vehicle before a flight, and put back after it. */
+static uint32_t answer_preparation(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
+    uint32_t size = 0;
+    rt_refusal refused = NULL;
+    int64_t now_us = kind == RT_CALL_PREPARED ? 0 : take(left, 8);
+    if (left->short_ || !is_time(now_us)) return refuse("malformed", out);
+    if (kind != RT_CALL_PREPARED && rt_is_apart(now_us, own_us)) return refuse("time-apart", out);
+    if (kind == RT_CALL_PERMIT)
+        refused = rt_permit_preparation(&boundary->issuer, boundary->executor.key, rest_of(left), now_us, out + 1, &size);
+    else if (kind == RT_CALL_PREPARE) refused = rt_executor_prepare(&boundary->executor, rest_of(left), now_us);
+    else rt_gate_prepared(&boundary->executor.gate);
+    if (refused != NULL) return refuse(refused, out);
+    out[0] = 0;
+    return 1 + size;
 }
 
 /* What the flight's executor is told, of a permit or of how a command ended. */
@@ -175,12 +193,23 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
     case RT_CALL_LANDED:
     case RT_CALL_RELEASE:
         return boundary->loaded ? answer_executor(boundary, kind, &left, own_us, out) : refuse("not-loaded", out);
+    case RT_CALL_PERMIT:
+    case RT_CALL_PREPARE:
+    case RT_CALL_PREPARED:
+        return boundary->loaded ? answer_preparation(boundary, kind, &left, own_us, out) : refuse("not-loaded", out);
+    case RT_CALL_STANDS:
     case RT_CALL_OBSERVE: /* and what leaves always leaves, before a bundle is in force too */
     case RT_CALL_SEAL:
         now_us = take(&left, 8);
         if (left.short_ || !is_time(now_us)) break;
         refused = "time-apart";
         if (rt_is_apart(now_us, own_us)) break;
+        if (kind == RT_CALL_STANDS) {
+            out[1] = rt_gate_stands(&boundary->executor.gate, now_us) ? 1 : 0;
+            size = 1;
+            refused = NULL;
+            break;
+        }
         if (kind == RT_CALL_OBSERVE) return observe(boundary, rest_of(&left), now_us, out);
         refused = rt_gate_seal(&boundary->executor.gate, rest_of(&left), now_us, out + 1, &size);
         break;

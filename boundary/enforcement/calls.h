@@ -22,7 +22,11 @@ enum {
     RT_CALL_SEAL = 11,    /* now (8), a frame -> the octets to send */
     RT_CALL_BEGIN = 12,     /* session (8), the digest that was kept of the one before (32) */
     RT_CALL_STATEMENT = 13, /* whether it is the last (1) -> a signed statement of the boundary's own evidence */
-    RT_CALL_DIGEST = 14     /* -> the digest of that (32) */
+    RT_CALL_DIGEST = 14,    /* -> the digest of that (32) */
+    RT_CALL_PERMIT = 15,    /* now (8), what is to be set -> its preparation permit */
+    RT_CALL_PREPARE = 16,   /* now (8), a preparation permit */
+    RT_CALL_PREPARED = 17,  /* nothing more is set */
+    RT_CALL_STANDS = 18     /* now (8) -> whether the vehicle is known to stand on the ground (1) */
 };
 
 #define RT_MAX_PART 60000 /* octets */

@@ -5,17 +5,22 @@
 #define UNTOUCHED (RT_DEGRADE_LINK - 1)
 #define ALWAYS INT64_MAX /* us */
 
-void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], const rt_policy *policy, const rt_mission *mission) {
+void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], const rt_policy *policy, const rt_mission *mission,
+                       uint64_t first) {
     const rt_signed_link signer = executor->gate.signer; /* the link stays as it is */
     const bool signs = executor->gate.signs;
     rt_chain *chain = executor->gate.chain;
+    uint8_t prepared[sizeof executor->prepared]; /* and so do the serials of preparations, which are never sealed again */
+    memcpy(prepared, executor->prepared, sizeof prepared);
     memset(executor, 0, sizeof *executor);
     executor->gate.signer = signer;
     executor->gate.signs = signs;
     executor->gate.chain = chain;
+    memcpy(executor->prepared, prepared, sizeof prepared);
     memcpy(executor->key, key, RT_KEY_BYTES);
     executor->policy = policy;
     executor->mission = mission;
+    executor->first = first;
     executor->step = executor->fallback_step = -1;
     executor->fallback_link = executor->contingency = UNTOUCHED;
 }
@@ -180,22 +185,25 @@ static rt_refusal dispatch(rt_executor *executor, const rt_permit *permit, int64
 /* A permit by which nothing is sent: why, at a monotonic time. */
 static rt_refusal chained(rt_executor *executor, rt_refusal refused, int64_t now_us) {
     uint8_t time[8], *at = time;
-    rt_bytes slug = {(const uint8_t *)refused, 0};
     if (refused == NULL) return NULL;
-    while (refused[slug.size] != 0) slug.size++;
     rt_put(&at, (uint64_t)now_us, 8);
-    rt_chain_add(executor->gate.chain, RT_TAG_REFUSED, (rt_bytes){time, sizeof time}, slug);
+    rt_chain_add(executor->gate.chain, RT_TAG_REFUSED, (rt_bytes){time, sizeof time}, rt_words(refused));
     return refused;
 }
 
+/* Whether this session sealed it. */
+static bool is_ours(const rt_executor *executor, rt_bytes sealed, rt_permit *permit) {
+    return rt_open_permit(sealed, executor->key, permit) && permit->serial >= executor->first;
+}
+
 rt_refusal rt_dispatch(rt_executor *executor, rt_bytes sealed, int64_t now_us, rt_permit *permit) {
-    bool ours = rt_open_permit(sealed, executor->key, permit);
+    bool ours = is_ours(executor, sealed, permit);
     return chained(executor, ours ? dispatch(executor, permit, now_us) : "permit/forged", now_us);
 }
 
 static rt_refusal stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit) {
     rt_permit standing;
-    if (!rt_open_permit(sealed, executor->key, &standing))
+    if (!is_ours(executor, sealed, &standing))
         return "permit/forged";
     bool fallback = kind == RT_FALLBACK_LINK;
     if (link < 0 || link >= (fallback ? standing.fallbacks : standing.contingencies))
@@ -216,6 +224,32 @@ static rt_refusal stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind,
 
 rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit) {
     return chained(executor, stand_in(executor, sealed, kind, link, now_us, permit), now_us);
+}
+
+static rt_refusal unprepared(const rt_executor *executor, const rt_preparation *permit, int64_t now_us) {
+    if (executor->gate.chain->over) return "permit/session-over";
+    if (executor->prepared[permit->serial / 8] >> permit->serial % 8 & 1) return "permit/used";
+    if (now_us > permit->not_after_us) return "permit/late";
+    return rt_gate_stands(&executor->gate, now_us) ? NULL : "permit/not-down";
+}
+
+rt_refusal rt_executor_prepare(rt_executor *executor, rt_bytes sealed, int64_t now_us) {
+    rt_preparation permit;
+    const rt_bytes nothing = {NULL, 0};
+    const bool ours = rt_open_preparation(sealed, executor->key, &permit) && permit.serial < RT_MOST_PREPARATIONS;
+    rt_refusal refused = ours ? unprepared(executor, &permit, now_us) : "permit/forged";
+    if (refused != NULL) {
+        rt_chain_add(executor->gate.chain, RT_TAG_UNPREPARED, rt_words(refused), nothing);
+        return refused;
+    }
+    uint8_t payload[2 + RT_MAX_WRITES * 24], *at = payload;
+    rt_put(&at, permit.restoring, 1);
+    rt_put(&at, permit.count, 1);
+    at += rt_put_writes(&permit, at);
+    rt_chain_add(executor->gate.chain, RT_TAG_PREPARED, (rt_bytes){payload, (uint32_t)(at - payload)}, nothing);
+    executor->prepared[permit.serial / 8] |= (uint8_t)(1 << permit.serial % 8);
+    rt_gate_prepare(&executor->gate, &permit);
+    return NULL;
 }
 
 void rt_ended(rt_executor *executor) {

@@ -3,6 +3,7 @@
 #define RT_ENFORCEMENT_EXECUTOR_H
 
 #include "frames.h"
+#include "preparation.h"
 #include "wire/permit.h"
 
 /* how many permits may be dispatched in one session: more than any flight has, and what the table holds */
@@ -14,8 +15,10 @@ typedef struct {
     const rt_mission *mission; /* a replacement puts another in its place */
     bool called_off;           /* no step may be sent any more */
     rt_gate gate;
+    uint64_t first;            /* the least serial of this session: a boundary may load one bundle in the place of another */
     uint64_t used[RT_MOST_DISPATCHED]; /* serials, ascending */
     uint32_t used_count;
+    uint8_t prepared[RT_MOST_PREPARATIONS / 8]; /* the serials of preparations that were begun */
     int64_t step; /* the last step that was sent, -1 before, */
     uint64_t serial;
     bool running;
@@ -27,12 +30,17 @@ typedef struct {
     bool homeward, final;
 } rt_executor;
 
-void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], const rt_policy *policy, const rt_mission *mission);
+void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], const rt_policy *policy, const rt_mission *mission,
+                       uint64_t first);
 
 /* Send the command of a permit, or of a link by the standing permit of a step that was sent: the gate is open for it then.
    Answer why not, or NULL and what is permitted. */
 rt_refusal rt_dispatch(rt_executor *executor, rt_bytes sealed, int64_t now_us, rt_permit *permit);
 rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit);
+
+/* What may be set of the vehicle from now on, by a preparation permit, or why nothing may. It is good once, on the ground, until
+   `rt_gate_prepared`, a dispatch, or its time is over. */
+rt_refusal rt_executor_prepare(rt_executor *executor, rt_bytes sealed, int64_t now_us);
 
 void rt_ended(rt_executor *executor);                        /* the running step ended, however it did */
 void rt_ended_command(rt_executor *executor, uint64_t token); /* that command ended; another since runs on */

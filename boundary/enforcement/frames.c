@@ -10,7 +10,7 @@ void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us
     gate->not_after_us = not_after_us;
     gate->begun = false;
     gate->leg = -1;
-    gate->prepared_count = 0;
+    rt_gate_prepared(gate);
     if (!gate->settled_known || command->kind == RT_CLIMB) {
         gate->settled_known = gate->home_known;
         gate->settled_amsl = gate->home_amsl;
@@ -18,6 +18,17 @@ void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us
 }
 
 void rt_gate_close(rt_gate *gate) { gate->open = false; }
+
+void rt_gate_prepare(rt_gate *gate, const rt_preparation *preparation) {
+    gate->prepared_count = preparation->count;
+    gate->prepared_us = preparation->not_after_us;
+    for (uint32_t at = 0; at < preparation->count; at++) {
+        memcpy(gate->prepared[at].name, preparation->writes[at].name, RT_NAME_OCTETS);
+        gate->prepared[at].value = preparation->writes[at].value;
+    }
+}
+
+void rt_gate_prepared(rt_gate *gate) { gate->prepared_count = 0; }
 
 bool rt_gate_stands(const rt_gate *gate, int64_t now_us) {
     int64_t oldest = gate->armed_us < gate->stands_us ? gate->armed_us : gate->stands_us;

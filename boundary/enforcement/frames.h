@@ -5,8 +5,7 @@
 #include "allow_list.h"
 #include "mavlink/signing.h"
 #include "wire/boundary_chain.h"
-
-#define RT_MOST_WRITES 32
+#include "wire/preparation.h"
 
 typedef struct {
     rt_chain *chain; /* where what leaves is chained */
@@ -25,7 +24,7 @@ typedef struct {
     int64_t armed_us, stands_us;
     bool types_known;
     uint32_t types;
-    rt_setting prepared[RT_MOST_WRITES];
+    rt_setting prepared[RT_MAX_WRITES];
     uint32_t prepared_count;
     int64_t prepared_us;
     bool home_known, settled_known;
@@ -34,6 +33,10 @@ typedef struct {
 
 void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us);
 void rt_gate_close(rt_gate *gate);
+/* Let these parameters be set, as long as the vehicle stands on the ground; then let none be set any more. */
+void rt_gate_prepare(rt_gate *gate, const rt_preparation *preparation);
+void rt_gate_prepared(rt_gate *gate);
+/* Whether it is known to be on the ground, disarmed, and nothing that was permitted is under way. */
 bool rt_gate_stands(const rt_gate *gate, int64_t now_us);
 
 /* Take in one good frame from the link, its signature verified where there is a key. */

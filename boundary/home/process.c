@@ -2,7 +2,10 @@
    given at its start: the trust root, the identity of the vehicle, the keys and one file of its own.
 
        rtshcua-boundary --socket FD --root FD --pin HEX --vehicle IDENTITY --kept FD [--link-key FD] [--boundary-key FD]
-                        [--user UID --group GID] [--paced]
+                        [--user UID --group GID] [--settings FD] [--owed FD] [--paced]
+
+   SETTINGS are the parameters that are set of the vehicle before a flight, OWED those that an earlier run set and did not put back,
+   each as the body of a preparation (wire/preparation.h).
 
    Every file is opened by who starts it, so that it needs no path and, once it began, no right to open one. It first sends one
    message: the measures that are in force (4 octets, isolation.h), and the name of the link's key (8 octets, 0 without one). It ends with 0 when the socket is closed, 64 for a wrong command
@@ -32,7 +35,7 @@ static rt_kept slots[2];
 static uint8_t call[RT_MAX_CALL], result[RT_MAX_RESULT];
 
 typedef struct {
-    int socket, root, kept, link_key, boundary_key;
+    int socket, root, kept, link_key, boundary_key, settings, owed;
     const char *vehicle, *pin;
     uint32_t user, group;
     int paced;
@@ -46,10 +49,10 @@ static int number(const char *text, uint32_t *value) {
 }
 
 static int read_options(int count, char **words, options *given) {
-    *given = (options){-1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0};
+    *given = (options){-1, -1, -1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0};
     struct { const char *name; int *file; } files[] = {
         {"--socket", &given->socket}, {"--root", &given->root}, {"--kept", &given->kept},
-        {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key},
+        {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key}, {"--settings", &given->settings}, {"--owed", &given->owed},
     };
     for (int at = 1; at < count; at++) {
         uint32_t value;
@@ -211,6 +214,15 @@ static int read_key(int file, uint8_t key[RT_KEY_BYTES]) {
     return fine;
 }
 
+/* Parameters in a file; `*listed` is NULL where there is none. 0 for one that lists none. */
+static int read_writes(int file, rt_preparation *into, const rt_preparation **listed) {
+    static uint8_t data[RT_MAX_PREPARATION];
+    *listed = NULL;
+    if (file < 0) return 1;
+    *listed = into;
+    return rt_read_preparation((rt_bytes){data, (uint32_t)read_all(file, data, sizeof data)}, into);
+}
+
 #define LINK_NAME 8
 
 /* A name for a key that gives nothing of it away: `fingerprint` of adapters/files/signing.py. */
@@ -242,6 +254,10 @@ int main(int count, char **words) {
         return IO;
     if (given.boundary_key >= 0 && !read_key(given.boundary_key, keys->boundary))
         return IO;
+    static rt_preparation settings, owed;
+    const rt_preparation *meant, *left;
+    if (!read_writes(given.settings, &settings, &meant) || !read_writes(given.owed, &owed, &left))
+        return USAGE;
     kept->restarts++;
     if (!write_kept(given.kept, kept))
         return IO;
@@ -251,7 +267,7 @@ int main(int count, char **words) {
     static uint8_t pin[RT_KEY_BYTES];
     const rt_setup setup = {
         keys, kept, root_bytes, {pin, given.pin == NULL ? 0 : from_hex(given.pin, pin, sizeof pin)},
-        {(const uint8_t *)given.vehicle, (uint32_t)strlen(given.vehicle)}, given.link_key >= 0, given.boundary_key >= 0,
+        {(const uint8_t *)given.vehicle, (uint32_t)strlen(given.vehicle)}, given.link_key >= 0, given.boundary_key >= 0, meant, left,
         {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
     if (rt_boundary_begin(&boundary, &setup) != NULL)
         return UNTRUSTED;

@@ -80,6 +80,13 @@ static uint32_t nearest(int64_t value) {
     return sign | exponent << 23 | ((uint32_t)mantissa & FRACTION);
 }
 
+/* A number that orders finite floats as they are ordered; -0 is 0. */
+static int64_t order_of(uint32_t bits) { return with_sign(bits, bits & 0x7FFFFFFFU); }
+
+bool rt_lies_within(uint32_t bits, int32_t first, int32_t last) {
+    return rt_is_finite(bits) && order_of(bits) >= order_of(nearest(first)) && order_of(bits) <= order_of(nearest(last));
+}
+
 bool rt_bits_of(uint32_t raw, uint8_t kind, bool bytewise, uint32_t *bits) {
     if (bytewise && kind >= 1 && kind <= 6) { /* MAV_PARAM_TYPE: UINT8, INT8, UINT16, INT16, UINT32, INT32 */
         static const uint8_t widths[] = {8, 8, 16, 16, 32, 32};

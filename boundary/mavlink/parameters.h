@@ -7,6 +7,7 @@
 bool rt_is_finite(uint32_t bits);
 bool rt_is_nan(uint32_t bits);
 bool rt_is_zero(uint32_t bits);             /* -0 too */
+bool rt_lies_within(uint32_t bits, int32_t first, int32_t last); /* a number from the one to the other, both counting */
 bool rt_is_whole(uint32_t bits, int64_t value); /* whether it is just this integer */
 /* The integer that is left when what is behind the point is cut off; false for what is beyond 2**62, or no number. */
 bool rt_cut(uint32_t bits, int64_t *value);

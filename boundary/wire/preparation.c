@@ -51,13 +51,8 @@ bool rt_open_preparation(rt_bytes sealed, const uint8_t key[RT_KEY_BYTES], rt_pr
     return rt_equal(mac, body.at + body.size, sizeof mac) && rt_read_preparation(body, preparation);
 }
 
-uint32_t rt_seal_preparation(const rt_preparation *preparation, const uint8_t key[RT_KEY_BYTES], uint8_t *out) {
+uint32_t rt_put_writes(const rt_preparation *preparation, uint8_t *out) {
     uint8_t *at = out;
-    rt_put(&at, VERSION, 1);
-    rt_put(&at, preparation->restoring, 1);
-    rt_put(&at, preparation->serial, 8);
-    rt_put(&at, (uint64_t)preparation->not_after_us, 8);
-    rt_put(&at, preparation->count, 1);
     for (uint32_t i = 0; i < preparation->count; i++) {
         const rt_write *each = &preparation->writes[i];
         memcpy(at, each->name, RT_PARAMETER_NAME);
@@ -65,7 +60,17 @@ uint32_t rt_seal_preparation(const rt_preparation *preparation, const uint8_t ke
         rt_put(&at, each->before, 4);
         rt_put(&at, each->value, 4);
     }
-    uint32_t size = HEAD + preparation->count * WRITE;
+    return preparation->count * WRITE;
+}
+
+uint32_t rt_seal_preparation(const rt_preparation *preparation, const uint8_t key[RT_KEY_BYTES], uint8_t *out) {
+    uint8_t *at = out;
+    rt_put(&at, VERSION, 1);
+    rt_put(&at, preparation->restoring, 1);
+    rt_put(&at, preparation->serial, 8);
+    rt_put(&at, (uint64_t)preparation->not_after_us, 8);
+    rt_put(&at, preparation->count, 1);
+    uint32_t size = HEAD + rt_put_writes(preparation, at);
     mac_of((rt_bytes){out, size}, key, out + size);
     return size + RT_DIGEST_BYTES;
 }

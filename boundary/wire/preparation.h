@@ -29,6 +29,9 @@ bool rt_read_preparation(rt_bytes body, rt_preparation *preparation);
 /* False for bytes that this key did not seal, too. */
 bool rt_open_preparation(rt_bytes sealed, const uint8_t key[RT_KEY_BYTES], rt_preparation *preparation);
 
+/* The writes alone, into `out`; how many octets. */
+uint32_t rt_put_writes(const rt_preparation *preparation, uint8_t *out);
+
 /* The permit's bytes, into `out` of RT_MAX_PREPARATION; how many. */
 uint32_t rt_seal_preparation(const rt_preparation *preparation, const uint8_t key[RT_KEY_BYTES], uint8_t *out);
 

@@ -7,7 +7,7 @@ which is never read here. One process at a time holds that file: two runtimes ca
 import os
 import socket
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import IntFlag
 from pathlib import Path
 from typing import Final
@@ -79,7 +79,9 @@ def kept_file(state: Path, vehicle: str) -> Path:
 class BoundaryProcess:
     """A boundary that runs. `measures` are those in force.
 
-    `own_seed` is that of the key that it signs its own evidence with; `user` is the user and group that it runs as,
+    `own_seed` is that of the key that it signs its own evidence with; `settings` are the parameters that are set of the
+    vehicle before the flight, and `owed` those that earlier runs set and did not put back, each as the body of a
+    preparation (`wire.preparation`); `user` is the user and group that it runs as,
     None for ours. `paced`: the caller's time is not the machine's, as on a simulated vehicle that is flown faster.
 
     Raises BoundaryError, and OSError for files that cannot be opened.
@@ -87,7 +89,8 @@ class BoundaryProcess:
 
     def __init__(
         self, root: bytes, pinned: bytes, vehicle: str, state: Path, *, link_key: Path | None = None,
-        own_seed: bytes | None = None, user: tuple[int, int] | None = None, paced: bool = False,
+        own_seed: bytes | None = None, settings: bytes | None = None, owed: bytes | None = None,
+        user: tuple[int, int] | None = None, paced: bool = False,
     ) -> None:  # fmt: skip
         path = program()
         if path is None:
@@ -98,7 +101,8 @@ class BoundaryProcess:
         try:
             words = ["--socket", str(files[0]), "--pin", pinned.hex(), "--vehicle", vehicle]
             words += ["--paced"] if paced else []
-            for name, handle in self._handles(root, vehicle, state, link_key, own_seed):
+            given = {"--root": root, "--boundary-key": own_seed, "--settings": settings, "--owed": owed}
+            for name, handle in self._handles(vehicle, state, link_key, given):
                 files.append(handle)
                 words += [name, str(handle)]
             if user is not None:
@@ -148,7 +152,7 @@ class BoundaryProcess:
             self._process.wait()
 
     def _handles(
-        self, root: bytes, vehicle: str, state: Path, link_key: Path | None, own_seed: bytes | None
+        self, vehicle: str, state: Path, link_key: Path | None, given: Mapping[str, bytes | None]
     ) -> Iterator[tuple[str, int]]:
         place = kept_file(state, vehicle)
         make_folder(place.parent, mode=PRIVATE_FOLDER)
@@ -157,7 +161,7 @@ class BoundaryProcess:
         except BlockingIOError:
             text = f"another run's boundary holds what is kept of `{vehicle}`"
             raise BoundaryError("in-use", text, "wait until that run is over") from None
-        for name, data in (("--root", root), ("--boundary-key", own_seed)):
+        for name, data in given.items():
             if data is not None:
                 handle = os.memfd_create(name, os.MFD_CLOEXEC)
                 yield name, handle

@@ -56,6 +56,7 @@ from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.isolated import IsolatedGate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
 from rtshcua.onboard.ports import Ending, Event
 from rtshcua.onboard.rehearsal import stranded
 from rtshcua.wire import cose
@@ -164,8 +165,7 @@ def launch(order: Launch) -> ExitCode:
             root, signed_root = trust.root, trust.signed
             own_key, keyless = _boundary_key(order, root, loaded, clock)
             _expect_boundary_key(keyless, resumed=not order.dry_run)
-            loaded.preparation.owes(debts.left)
-            loaded, apart = _apart(order, loaded, bundle, trust, own_key, clock, stack)
+            loaded, apart = _apart(order, loaded, bundle, trust, own_key, debts.left, clock, stack)
             signing = _sign(order, loaded, clock, apart)
             stack.callback(signing.close)
             _hear(order, loaded, signing)
@@ -247,17 +247,20 @@ def launch(order: Launch) -> ExitCode:
 
 
 def _apart(
-    order: Launch, loaded: Loaded, bundle: bytes, trust: Trusted, own_key: SigningKey | None, clock: LinkClock,
-    stack: ExitStack,
+    order: Launch, loaded: Loaded, bundle: bytes, trust: Trusted, own_key: SigningKey | None, owed: Mapping[str, Owed],
+    clock: LinkClock, stack: ExitStack,
 ) -> tuple[Loaded, BoundaryProcess | None]:  # fmt: skip
     """The bundle in force in a boundary that runs apart, where that is asked for, until the stack is closed. What may
     have expired is brought down by the one in this process, which does not ask. Raises `Refused` and OSError.
     """
     if order.mode is not Mode.PROCESS or order.dry_run or trust.distrust is not None:
+        if isinstance(loaded.preparation, PreparationIssuer):
+            loaded.preparation.owes(owed)
         return loaded, None
     apart = isolate(
         bundle, loaded.vehicle, trust.root, trust.signed, order.state, clock.now(),
         link_key=order.signing_key, own_key=own_key, user=order.boundary_user, paced=order.speed != 1,
+        settings=order.settings, owed=owed,
     )  # fmt: skip
     stack.callback(apart.process.close)
     return apart.loaded, apart.process

@@ -168,11 +168,10 @@ class VirtualFlight:
         loaded = load(
             bundle, root=trusted, vehicle=policy.vehicle.identity, now=now, mode=mode,
             session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=True,
-            settings=settings,
+            settings=settings, owed=owed or {},
         )  # fmt: skip
         if isinstance(loaded, Refusal):
             raise ValueError(f"{loaded.slug}: {loaded.text}")
-        loaded.preparation.owes(owed or {})
         self.loaded = loaded
         if vehicle is None:
             config = simulated if isinstance(simulated, SimulationConfig) else simulated(policy)

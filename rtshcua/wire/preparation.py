@@ -15,7 +15,7 @@ VERSION: Final = 1
 _DOMAIN: Final = b"rtshcua/preparation\x00"
 _HEAD: Final = Struct(">B?QqB")
 _WRITE: Final = Struct(">16sII")
-_MAC: Final = 32
+MAC_BYTES: Final = 32
 #: how many parameters one permit may list
 MOST: Final = 32
 
@@ -73,5 +73,5 @@ def seal(preparation: Preparation, key: bytes) -> bytes:
 
 def open_preparation(data: bytes, key: bytes) -> Preparation | None:
     """The permit, or None for bytes that this key did not seal. The MAC is compared in constant time."""
-    body, mac = data[:-_MAC], data[-_MAC:]
+    body, mac = data[:-MAC_BYTES], data[-MAC_BYTES:]
     return decode(body) if compare_digest(mac, digest(key, _DOMAIN + body, "sha256")) else None

@@ -42,10 +42,9 @@ def prepares(settings: dict[str, float], owed: dict[str, Owed] | None = None) ->
     configured = {name: bits(value) for name, value in settings.items()}
     of = load(
         sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY, flight=FLIGHT,
-        peer_is_own_simulator=False, settings=configured,
+        peer_is_own_simulator=False, settings=configured, owed=owed or {},
     )  # fmt: skip
     assert isinstance(of, Loaded)
-    of.preparation.owes(owed or {})
     says(of, ON_GROUND)
     return of
 

@@ -1,17 +1,26 @@
 """Both boundaries at once: every call is made of the one in Python and of the one in C, and both answer the same."""
 
 import ctypes
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 from msgspec.structs import replace as with_fields
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import load as loading
-from rtshcua.onboard.enforcement.isolated import Caller, IsolatedBoundary, IsolatedExecutor, IsolatedGate
+from rtshcua.onboard.enforcement.isolated import (
+    Caller,
+    IsolatedBoundary,
+    IsolatedExecutor,
+    IsolatedGate,
+    IsolatedIssuer,
+)
 from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import BoundaryKey, Dispatch
+from rtshcua.wire.preparation import MOST, Preparation
 from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.receipt import decode as read_receipt
 from rtshcua.wire.trust import TrustRoot
@@ -42,17 +51,56 @@ def library(boundary: ctypes.CDLL) -> Callable[[bytes], bytes]:
     return call
 
 
-def begin(boundary: ctypes.CDLL, signed_root: bytes, pin: bytes, vehicle: str, session_key: bytes, now: Now) -> Caller:
+def begin(
+    boundary: ctypes.CDLL, signed_root: bytes, pin: bytes, vehicle: str, session_key: bytes, now: Now,
+    settings: Mapping[str, int] = MappingProxyType({}), owed: Mapping[str, Owed] = MappingProxyType({}),
+) -> Caller:  # fmt: skip
     """A boundary in C that begins, nothing opened on its vehicle before."""
     boundary.rt_test_boundary_begin.restype = ctypes.c_char_p
     boundary.rt_test_boundary_forget()
     name = vehicle.encode()
     refused = boundary.rt_test_boundary_begin(
         signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, None, OWN_KEY,
+        listed({name: Owed(0, value) for name, value in settings.items()}), listed(owed),
         (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us),
     )  # fmt: skip
     same("the trust root", None, refused)
     return Caller(library(boundary))
+
+
+class _Write(ctypes.Structure):
+    _fields_: ClassVar = [("name", ctypes.c_char * 16), ("before", ctypes.c_uint32), ("value", ctypes.c_uint32)]
+
+
+class _Preparation(ctypes.Structure):
+    """`rt_preparation`."""
+
+    _fields_: ClassVar = [
+        ("serial", ctypes.c_uint64), ("restoring", ctypes.c_bool), ("not_after_us", ctypes.c_int64),
+        ("writes", _Write * MOST), ("count", ctypes.c_uint32),
+    ]  # fmt: skip
+
+
+def listed(parameters: Mapping[str, Owed]) -> Any:
+    """Parameters as the boundary in C is given them when it begins."""
+    made = _Preparation(count=len(parameters))
+    for at, (name, each) in enumerate(parameters.items()):
+        made.writes[at] = _Write(name.encode(), each.before, each.value)
+    return ctypes.byref(made)
+
+
+class BothIssuers:
+    """`PreparationIssuer`."""
+
+    def __init__(self, here: Any, there: IsolatedIssuer, counts: dict[str, int]) -> None:
+        self._here, self._there, self._counts = here, there, counts
+        self.settings = here.settings
+
+    def permit(self, ask: bytes, now_us: int) -> bytes | Refusal:
+        one: bytes | Refusal = self._here.permit(ask, now_us)
+        same(f"permit {ask.hex()}", one, self._there.permit(ask, now_us))
+        self._counts["preparations"] += not isinstance(one, Refusal)
+        return one
 
 
 class BothAttestations:
@@ -118,6 +166,11 @@ class BothGates:
         self._counts["refused frames" if isinstance(one, Refusal) else "frames"] += 1
         return one
 
+    def stands(self, now_us: int) -> bool:
+        one: bool = self._here.stands(now_us)
+        same("stands", one, self._there.stands(now_us))
+        return one
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self._here, name)
 
@@ -141,6 +194,11 @@ class BothExecutors:
         there = self._there.stand_in(sealed, kind, link, now_us)
         return self._both("stand_in", self._here.stand_in(sealed, kind, link, now_us), there)
 
+    def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
+        one: Preparation | Refusal = self._here.prepare(sealed, now_us)
+        same(f"prepare {sealed.hex()}", one, self._there.prepare(sealed, now_us))
+        return one
+
     def __getattr__(self, name: str) -> Any:
         def both(*arguments: Any) -> Any:
             getattr(self._there, name)(*arguments)
@@ -156,7 +214,7 @@ class Shadow:
         self._library = boundary
         self.roots: dict[TrustRoot, tuple[bytes, bytes]] = {}  # signed, and the key that it is pinned by
         self.counts = dict.fromkeys(
-            ("requests", "documents", "frames", "refused frames", "dispatches", "refused permits"), 0
+            ("requests", "documents", "frames", "refused frames", "dispatches", "refused permits", "preparations"), 0
         )
 
     def know(self, root: TrustRoot, signed: bytes, pin: bytes) -> None:
@@ -166,7 +224,8 @@ class Shadow:
     def load(self, bundle: bytes, **given: Any) -> Loaded | Refusal:
         """`load`, of both."""
         signed, pin = self.roots[given["root"]]
-        caller = begin(self._library, signed, pin, given["vehicle"], given["session_key"], given["now"])
+        caller = begin(self._library, signed, pin, given["vehicle"], given["session_key"], given["now"],
+                       given.get("settings", {}), given.get("owed", {}))  # fmt: skip
         there = loading.load(bundle, **{**given, "mode": Mode.PROCESS, "caller": caller})
         flight = given["flight"] if isinstance(there, Refusal) else there.in_force.flight
         here = loading.load(bundle, **{**given, "flight": flight})
@@ -176,7 +235,9 @@ class Shadow:
             return here
         assert isinstance(there.boundary, IsolatedBoundary)
         assert isinstance(there.executor, IsolatedExecutor)
+        assert isinstance(there.preparation, IsolatedIssuer)
         boundary: Any = BothBoundaries(here.boundary, there.boundary, self.counts)
         executor: Any = BothExecutors(here.executor, there.executor, self.counts)
         attestation: Any = BothAttestations(here.attestation, there.attestation)
-        return with_fields(here, boundary=boundary, executor=executor, attestation=attestation)
+        issuer: Any = BothIssuers(here.preparation, there.preparation, self.counts)
+        return with_fields(here, boundary=boundary, executor=executor, attestation=attestation, preparation=issuer)

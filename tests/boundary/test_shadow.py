@@ -23,9 +23,8 @@ from virtual.shipped import NAMES, shipped, simulated
 FLAVOURS = ("px4", "ardupilot")
 
 
-@pytest.fixture
-def shadow(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
-    """Flights of this test have both boundaries."""
+def watched(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
+    """Flights have both boundaries from now on."""
     made = Shadow(boundary)
 
     def spied(data: bytes, *, pinned: bytes | None, now_us: int) -> TrustRoot:
@@ -35,6 +34,13 @@ def shadow(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
 
     monkeypatch.setattr(rtshcua.virtual.flight, "open_root", spied)
     monkeypatch.setattr(rtshcua.virtual.flight, "load", made.load)
+    return made
+
+
+@pytest.fixture
+def shadow(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
+    """Flights of this test have both boundaries."""
+    made = watched(boundary, monkeypatch)
     made.know(ROOT, ROOT.sign(ROOT_KEY), ROOT_KEY.verification().public)
 
     def both(mission: Mission) -> Loaded:
@@ -99,7 +105,13 @@ def test_a_boundary_that_answers_otherwise_is_noticed(shadow: Shadow, monkeypatc
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("name", NAMES)
 def test_all_flights_are_the_same_under_both(name: str, flavour: str, shadow: Shadow) -> None:
-    for faults in ((), ("gps,at=60s",), ("battery,at=90s,level=15%",), ("wind,at=50s,speed=14",), ("takeover,at=70s",)):
+    for faults in (
+        (),
+        ("gps-loss,at=60s",),
+        ("battery,at=90s,level=15%",),
+        ("wind,at=50s,speed=14",),
+        ("pilot,at=70s",),
+    ):
         fly(name, flavour, *faults)
 
 

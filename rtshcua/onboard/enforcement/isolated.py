@@ -17,12 +17,13 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.signing import Counts
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement import executor, frames
+from rtshcua.onboard.enforcement import executor, frames, preparation
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import BoundaryKey, Command, Dispatch
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
-from rtshcua.wire.preparation import Preparation
+from rtshcua.wire.preparation import MAC_BYTES, Preparation
+from rtshcua.wire.preparation import decode as decode_preparation
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt, decode
 from rtshcua.wire.receipt import encode as encode_receipt
 from rtshcua.wire.request import STEP
@@ -31,9 +32,10 @@ from rtshcua.wire.response import Status, encode_refusal
 #: makes one call, and gives its answer
 Call = Callable[[bytes], bytes]
 
-(PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST) = (
-    range(1, 15)
-)
+(
+    PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
+    PERMIT, PREPARE, PREPARED, STANDS,
+) = range(1, 19)  # fmt: skip
 #: octets of a bundle or a document that go in one call
 MAX_PART: Final = 60_000
 
@@ -46,7 +48,6 @@ _PERMITTED: Final = Struct(">BhhQq")
 
 #: what an answer that makes no sense, or none at all, comes to
 LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or answers what makes no sense")
-NO_PREPARATION: Final = Refusal("preparation/not-here", "this boundary permits no parameters to be set")
 
 
 def _known(*modules: object) -> dict[str, Refusal]:
@@ -55,7 +56,7 @@ def _known(*modules: object) -> dict[str, Refusal]:
 
 
 #: why a permit or a frame is refused, by slug: the texts are those of the boundary in this process
-_REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, frames))
+_REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, frames, preparation))
 
 
 class Caller:
@@ -161,8 +162,8 @@ class IsolatedGate:
         self.counts = Counts()
 
     def stands(self, now_us: int) -> bool:
-        """Whether the vehicle is known to stand: not at this end, where nothing is set that depends on it."""
-        return False
+        """Whether the vehicle is known to be on the ground, disarmed, and nothing permitted is under way."""
+        return self._caller(STANDS, _TIME.pack(now_us)) == b"\1"
 
     def observe(self, frame: bytes, now_us: int = 0) -> None:
         """Show it one good frame. With a key it has seen the frame when it verified it."""
@@ -213,11 +214,15 @@ class IsolatedExecutor:
         return Dispatch(command, not_after_us, needs_record=kind == STEP)
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
-        """Nothing is set through this boundary."""
-        return NO_PREPARATION
+        """What may be set of the vehicle from now on, by a preparation permit, or why nothing may."""
+        refused = self._caller(PREPARE, _TIME.pack(now_us), sealed)
+        if isinstance(refused, Refusal):
+            return refused
+        return decode_preparation(sealed[:-MAC_BYTES]) or self._caller.lose()
 
     def prepared(self) -> None:
-        """Nothing was."""
+        """What was to be set is set, or was given up."""
+        self._caller(PREPARED)
 
     def ended(self, token: int | None = None) -> None:
         """The running step ended, or that command did."""
@@ -230,6 +235,19 @@ class IsolatedExecutor:
     def release(self) -> None:
         """Nothing more that moves the vehicle is to be sent."""
         self._caller(RELEASE)
+
+
+class IsolatedIssuer:
+    """`PreparationIssuer` over calls: the other end was told what is configured, and what is owed, when it began."""
+
+    def __init__(self, caller: Caller, settings: Mapping[str, int]) -> None:
+        self._caller = caller
+        #: what is set before the flight
+        self.settings = dict(settings)
+
+    def permit(self, ask: bytes, now_us: int) -> bytes | Refusal:
+        """The permit for what is asked for, at a monotonic time."""
+        return self._caller(PERMIT, _TIME.pack(now_us), ask)
 
 
 class IsolatedAttestation:

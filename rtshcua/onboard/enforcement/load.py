@@ -25,8 +25,9 @@ from rtshcua.onboard.enforcement.isolated import (
     IsolatedBoundary,
     IsolatedExecutor,
     IsolatedGate,
+    IsolatedIssuer,
 )
-from rtshcua.onboard.enforcement.preparation import PreparationIssuer
+from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
 from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.bundle import Bundle, open_bundle
@@ -57,7 +58,7 @@ class Loaded(msgspec.Struct, frozen=True):
     policy: PreparedPolicy
     vehicle: str
     mode: Mode
-    preparation: PreparationIssuer
+    preparation: PreparationIssuer | IsolatedIssuer
     attestation: Attestation | IsolatedAttestation
 
     @property
@@ -89,14 +90,15 @@ def load(
     flight: bytes,
     peer_is_own_simulator: bool,
     settings: Mapping[str, int] = MappingProxyType({}),
+    owed: Mapping[str, Owed] = MappingProxyType({}),
     caller: Caller | None = None,
 ) -> Loaded | Refusal:
     """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else;
     `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log. `settings` are
-    the parameters that an operator has set before it.
+    the parameters that an operator has set before it, `owed` those that earlier runs left to be put back.
 
     `now` is when the bundle was received (paper symbol `t_r`). With a `caller` the boundary is elsewhere: it opens the
-    bundle itself, and draws the id of the flight.
+    bundle itself, draws the id of the flight, and was told what is `owed` when it began.
 
     Raises ValueError for a session key or an id of another length; whatever is wrong with the bundle is a `Refusal`.
     """
@@ -119,8 +121,8 @@ def load(
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")
-    issuer = PreparationIssuer(session_key, settings)
     if caller is None:
+        issuer = PreparationIssuer(session_key, settings, owed)
         in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
         return session(in_force, policy, vehicle, mode, session_key, issuer, bundle=bundle)
     answer = caller.load(bundle, now)
@@ -132,7 +134,8 @@ def load(
     commands.called_off = reopened
     boundary = IsolatedBoundary(caller, in_force, commands)
     executor = IsolatedExecutor(caller, commands, IsolatedGate(caller, signs=caller.signs))
-    return Loaded(boundary, executor, in_force, policy, vehicle, mode, issuer, IsolatedAttestation(caller))
+    settable = IsolatedIssuer(caller, settings)
+    return Loaded(boundary, executor, in_force, policy, vehicle, mode, settable, IsolatedAttestation(caller))
 
 
 def session(

@@ -6,6 +6,7 @@ this session, or the record that an earlier run left, says it was before.
 """
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.refusal import Refusal
@@ -14,6 +15,9 @@ from rtshcua.wire.preparation import Preparation, decode, seal
 
 #: how long a preparation permit may be used, in us: all of its parameters are asked for again several times
 VALID_US: Final = 30_000_000
+
+#: how many permits one session seals: what remembers which were used has a fixed size elsewhere
+MOST_PERMITS: Final = 1_023
 
 #: what may be set at all, and to what: bounds of the autopilot's own fence, what it does there (hold, return, land),
 #: and the height of its return. Ranges are those of the parameter references of ArduCopter 4.7 and PX4 1.16.
@@ -35,6 +39,7 @@ SETTABLE: Final[Mapping[str, tuple[float, ...] | range]] = {
 # why nothing is permitted
 MALFORMED: Final = Refusal("preparation/malformed", "what is asked for is no preparation")
 NOT_CONFIGURED: Final = Refusal("preparation/not-configured", "a parameter, or its value, is not what was configured")
+TOO_MANY: Final = Refusal("preparation/too-many", f"a session permits {MOST_PERMITS} preparations at most")
 NOT_AS_BEFORE: Final = Refusal("preparation/not-as-before", "a value is not the one that the parameter had before")
 
 
@@ -62,13 +67,17 @@ class Owed(NamedTuple):
 
 
 class PreparationIssuer:
-    """Seals preparation permits under the session key. `settings` is what was configured, by name."""
+    """Seals preparation permits under the session key. `settings` is what was configured, by name;
+    `owed`, what earlier runs left to be put back.
+    """
 
-    def __init__(self, key: bytes, settings: Mapping[str, int]) -> None:
+    def __init__(
+        self, key: bytes, settings: Mapping[str, int], owed: Mapping[str, Owed] = MappingProxyType({})
+    ) -> None:
         #: what is set before the flight
         self.settings = dict(settings)
         self._key = key
-        self._owed: dict[str, Owed] = {}
+        self._owed = dict(owed)
         self._serial = 0
 
     def owes(self, owed: Mapping[str, Owed]) -> None:
@@ -80,6 +89,8 @@ class PreparationIssuer:
         asked = decode(ask)
         if asked is None or not asked.writes or len({each.name for each in asked.writes}) < len(asked.writes):
             return MALFORMED
+        if self._serial == MOST_PERMITS:
+            return TOO_MANY
         refused = self._restoring(asked) if asked.restoring else self._setting(asked)
         if refused is not None:
             return refused

@@ -1,0 +1,53 @@
+"""One boundary in C may take a bundle in the place of another, as long as nothing flies."""
+
+import ctypes
+
+from msgspec.structs import replace
+
+from boundary.shadow import begin
+from reference.flat_case import MISSION
+from reference.world import FLIGHT, ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, allowed, sealed
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.onboard.enforcement.executor import FORGED
+from rtshcua.onboard.enforcement.isolated import Caller
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.ports import Dispatch
+
+
+def held(boundary: ctypes.CDLL) -> Caller:
+    pin = ROOT_KEY.verification().public
+    return begin(boundary, ROOT.sign(ROOT_KEY), pin, VEHICLE, SESSION_KEY, START)
+
+
+def into(caller: Caller, bundle: bytes) -> Loaded:
+    made = load(
+        bundle, root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=SESSION_KEY, flight=FLIGHT,
+        peer_is_own_simulator=False, caller=caller,
+    )  # fmt: skip
+    assert isinstance(made, Loaded), made
+    return made
+
+
+def test_a_permit_of_the_bundle_before_sends_nothing(boundary: ctypes.CDLL) -> None:
+    """Its number means another step now, which was not asked for."""
+    caller = held(boundary)
+    permit = allowed(into(caller, sealed()))
+    other = into(caller, sealed(mission=replace(MISSION, name="other")))
+    assert other.executor.dispatch(permit, START.monotonic_us) is FORGED
+    assert isinstance(other.executor.dispatch(allowed(other), START.monotonic_us), Dispatch)
+
+
+def test_what_nothing_was_sent_of_may_be_loaded_again(boundary: ctypes.CDLL) -> None:
+    caller = held(boundary)
+    into(caller, sealed())
+    into(caller, sealed(mission=replace(MISSION, name="other")))
+    allowed(into(caller, sealed()))
+
+
+def test_no_bundle_is_taken_while_one_flies(boundary: ctypes.CDLL) -> None:
+    caller = held(boundary)
+    made = into(caller, sealed())
+    assert isinstance(made.executor.dispatch(allowed(made), START.monotonic_us), Dispatch)
+    refused = caller.load(sealed(), START)
+    assert isinstance(refused, Refusal)
+    assert refused.slug == "flies"

@@ -179,12 +179,14 @@ def test_a_bundle_flies_once_whatever_the_runtime_says(tmp_path: Path) -> None:
 
 
 def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) -> None:
+    """By the next process, and by this one, which then has forgotten what it decided."""
     first = Held(tmp_path)
     first.load()
     first.process.close()
     again = Held(tmp_path, issued=first.issued)
-    again.load()
-    assert isinstance(again.ask(0), Answer)
+    for _ in range(2):
+        again.load()
+        assert isinstance(again.ask(0), Answer)
     again.process.close()
 
 

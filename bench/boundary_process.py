@@ -1,0 +1,155 @@
+"""The boundary as a process of its own: what it adds to one request over mode `software`, and how long a start takes.
+
+Both are asked the same in turns: a step that is allowed, in a session begun for it, and a link of the contingency that
+is allowed and dispatched. The start is measured from the call that starts the program: to its greeting, and to the
+answer that the bundle is in force. The machine is noisy, so the percentiles are those of a block, and the quietest
+block counts; the median block stands beside it: there, whatever else runs counts too. Exits with 1 when a limit is
+missed.
+"""
+
+import sys
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter_ns, sleep, time_ns
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from msgspec.structs import replace
+
+from reference import flat_case as flat
+from reference.world import ROOT, ROOT_KEY, START, VEHICLE, loaded, renewed, request_for, sealed_again
+from rtshcua.adapters.boundary_process import BoundaryProcess
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.isolated import Caller
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.ports import Boundary, Dispatch
+from rtshcua.wire.request import CONTINGENCY_LINK
+from rtshcua.wire.response import Answer, decode
+from virtual import case
+from virtual.shipped import shipped
+
+ADDED_MEDIAN_US, ADDED_P99_US, START_MS = 300.0, 1_000.0, 150.0
+BLOCKS, ROUNDS, STARTS = 31, 100, 15
+PAUSE_S = 0.002
+"""Before each request: a runtime asks ten times a second or so, and does not keep the processor busy between."""
+PIN = ROOT_KEY.verification().public
+
+Blocks = list[list[float]]
+
+
+def isolated(caller: Caller, bundle: bytes) -> Loaded:
+    """The bundle in force in the process that this calls."""
+    found = load(
+        bundle, root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=bytes(32), flight=bytes(16),
+        peer_is_own_simulator=False, caller=caller,
+    )  # fmt: skip
+    assert isinstance(found, Loaded), found
+    return found
+
+
+def asked(boundary: Boundary, request: bytes) -> tuple[bytes, float]:
+    """The permit of a request that must be allowed, and how long that took, us."""
+    begin = perf_counter_ns()
+    answer = boundary.enforce(request)
+    taken = perf_counter_ns() - begin
+    said = decode(answer)
+    assert isinstance(said, Answer), said
+    assert said.permit, said
+    return said.permit, taken / 1e3
+
+
+def dispatched(of: Loaded, request: bytes) -> float:
+    """How long a link takes that is allowed and dispatched, us."""
+    permit, taken = asked(of.boundary, request)
+    begin = perf_counter_ns()
+    sent = of.executor.dispatch(permit, START.monotonic_us)
+    assert isinstance(sent, Dispatch), sent
+    return taken + (perf_counter_ns() - begin) / 1e3
+
+
+def added(name: str, here: Blocks, there: Blocks) -> bool:
+    """Print what the process adds, of blocks that were measured in turns, and say whether the limits hold."""
+    held = True
+    for share, limit in ((50, ADDED_MEDIAN_US), (99, ADDED_P99_US)):
+        figures = [[sorted(block)[len(block) * share // 100] for block in blocks] for blocks in (here, there)]
+        (software, usual), (process, usually) = ((min(each), median(each)) for each in figures)
+        held = held and process - software <= limit
+        print(
+            f"{'held  ' if process - software <= limit else 'MISSED'}  {name}, {'median' if share == 50 else 'p99'}: "
+            f"process adds {process - software:.0f} us to {software:.0f} us in software, limit {limit:.0f} us "
+            f"(median block: {usually - usual:.0f} to {usual:.0f} us)"
+        )
+    return held
+
+
+def requests(folder: Path) -> bool:
+    """Measure requests of both, and say whether the limits hold."""
+    survey = replace(flat.INVOCATIONS[flat.INSPECTION_STEP], step=0)
+    software = loaded(mission=replace(flat.MISSION, invocations=(survey,)))
+    bundle = sealed_again(software)
+    step = request_for(software, state=flat.state())
+    link = request_for(software, CONTINGENCY_LINK, -1, 0, state=flat.state())
+    process = BoundaryProcess(ROOT.sign(ROOT_KEY), PIN, VEHICLE, folder, paced=True)
+    try:
+        caller = Caller(process.call)
+        apart = isolated(caller, bundle)
+        steps: tuple[Blocks, Blocks] = ([], [])
+        links: tuple[Blocks, Blocks] = ([], [])
+        for block in range(BLOCKS):
+            for of in steps:
+                of.append([])
+            for _ in range(ROUNDS):
+                steps[0][block].append(asked(renewed(software).boundary, step)[1])
+                # nothing of it was sent, so it may be loaded again
+                assert isinstance(caller.load(bundle, START), tuple)
+                sleep(PAUSE_S)
+                steps[1][block].append(asked(apart.boundary, step)[1])
+        for _ in range(BLOCKS):
+            pairs = []
+            for _ in range(ROUNDS):
+                sleep(PAUSE_S)
+                pairs.append((dispatched(software, link), dispatched(apart, link)))
+            for of, taken in zip(links, zip(*pairs, strict=True), strict=True):
+                of.append(list(taken))
+        allowed, sent = added("a step allowed", *steps), added("a link allowed and dispatched", *links)
+        return allowed and sent
+    finally:
+        process.close()
+
+
+def starts() -> bool:
+    """Measure starts with a bundle that ships, each in an empty folder, and say whether the limit holds."""
+    issued_us = time_ns() // 1_000 - 60_000_000  # it trusts a root by its own clock
+    signed, bundle = case.root(issued_us)[1], shipped("standard", issued_us)
+    now = Now(START.monotonic_us, issued_us + 60_000_000, START.utc_error_us)
+    pin = case.KEYS[next(iter(case.KEYS))].kid
+    greeted, ready = [], []
+    for _ in range(STARTS):
+        with TemporaryDirectory() as name:
+            begin = perf_counter_ns()
+            process = BoundaryProcess(signed, pin, VEHICLE, Path(name), paced=True)
+            greeted.append((perf_counter_ns() - begin) / 1e6)
+            answer = Caller(process.call).load(bundle, now)
+            ready.append((perf_counter_ns() - begin) / 1e6)
+            process.close()
+            assert isinstance(answer, tuple), answer
+    held = max(ready) <= START_MS
+    print(
+        f"{'held  ' if held else 'MISSED'}  start: greeting after {median(greeted):.0f} ms, bundle of {len(bundle)} "
+        f"octets in force after {median(ready):.0f} ms; the slowest of {STARTS}: {max(greeted):.0f} and "
+        f"{max(ready):.0f} ms, limit {START_MS:.0f} ms"
+    )
+    return held
+
+
+def main() -> int:
+    """Measures, prints, and says whether the limits held."""
+    with TemporaryDirectory() as name:
+        added_little = requests(Path(name))
+    started_soon = starts()
+    return int(not (added_little and started_soon))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

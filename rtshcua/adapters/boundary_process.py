@@ -22,7 +22,7 @@ PATIENCE_S: Final = 20.0
 _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
 _BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
 #: octets of the largest call and answer
-_CALL, _ANSWER = MAX_PART + 64, 1_024
+_CALL, _ANSWER = MAX_PART + 64, 2_112
 _GREETING: Final = 12
 
 

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -24,9 +25,12 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, LOAD, LOST, OBSERVE, PART, SEAL, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.ports import BoundaryKey
+from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS
 from rtshcua.wire.permit import Permit, seal
 from rtshcua.wire.request import STEP, Request, encode
 from rtshcua.wire.response import Answer, Status, decode
+from rtshcua.wire.statement import open_statement
 from virtual import case
 from virtual.shipped import shipped
 
@@ -46,11 +50,13 @@ def now() -> Now:
 class Held:
     """A boundary's process with a bundle in force, and the runtime's reading of it."""
 
-    def __init__(self, state: Path, user: tuple[int, int] | None = None, *, issued: int | None = None) -> None:
+    def __init__(
+        self, state: Path, user: tuple[int, int] | None = None, *, issued: int | None = None, **more: Any
+    ) -> None:
         self.issued = issued or issued_us()
         self.root, signed = case.root(self.issued)
         pin = case.KEYS[next(iter(case.KEYS))].kid
-        self.process = BoundaryProcess(signed, pin, VEHICLE, state, user=user)
+        self.process = BoundaryProcess(signed, pin, VEHICLE, state, user=user, **more)
         self.caller = Caller(self.process.call)
         self.bundle = shipped("short", self.issued)
 
@@ -227,6 +233,21 @@ def test_nonsense_is_answered_and_changes_nothing(held: Held) -> None:
         assert answer[0] in (0, 1)
         assert not (kind == SEAL and answer[0] == 0)
     assert isinstance(held.ask(0), (Answer, Status))
+
+
+def test_the_longest_statement_comes_whole(tmp_path: Path) -> None:
+    """Whoever floods it with requests must not make its evidence unreadable: all marks that one statement may hold."""
+    held = Held(tmp_path, own_seed=case.BOUNDARY_KEY.private.private_bytes_raw())
+    held.load()
+    held.loaded.attestation.begin(BoundaryKey(case.BOUNDARY_KEY, 1, bytes(32)))
+    for _ in range(2 * MOST_MARKS):
+        held.caller(DISPATCH, struct.pack(">q", now().monotonic_us), bytes(56))
+    signed = held.loaded.attestation.statement()
+    held.process.close()
+    assert signed is not None
+    kid = case.BOUNDARY_KEY.kid
+    said = open_statement(signed, {kid: case.BOUNDARY_KEY.verification(vehicles=("*",))})
+    assert len(said.marks) == MARK_BYTES * MOST_MARKS
 
 
 def test_when_it_dies_nothing_more_leaves(held: Held) -> None:

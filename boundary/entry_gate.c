@@ -9,13 +9,16 @@ EXPORT void rt_test_gate_open(int64_t kind, int64_t altitude, int64_t speed, con
 EXPORT void rt_test_gate_close(void);
 EXPORT void rt_test_gate_observe(const uint8_t *frame, uint32_t size, int64_t now_us);
 EXPORT const char *rt_test_gate_seal(const uint8_t *frame, uint32_t size, int64_t now_us, uint8_t *out, uint32_t *sealed);
+EXPORT const char *rt_test_gate_sign_ahead(const uint8_t *frame, uint32_t size, int64_t now_us);
 EXPORT void rt_test_link_begin(const uint8_t *key, int64_t timestamp, const int64_t *streams, uint32_t count, int64_t utc_us,
                                int64_t monotonic_us, uint8_t id);
 EXPORT uint32_t rt_test_link_sign(uint8_t *frame, uint32_t size, int64_t now_us);
 EXPORT int rt_test_link_accept(const uint8_t *frame, uint32_t size, int64_t now_us);
-EXPORT int64_t rt_test_link_ahead(void);
+EXPORT uint32_t rt_test_link_sign_ahead(uint8_t *frame, uint32_t size, int64_t now_us);
+EXPORT int64_t rt_test_link_signed_up_to(void);
 
 static rt_gate gate;
+static rt_command last; /* that it was opened for */
 static rt_chain chain;
 static rt_signed_link link;
 
@@ -28,6 +31,7 @@ void rt_test_gate_open(int64_t kind, int64_t altitude, int64_t speed, const uint
                        const int64_t *projection, int64_t not_after_us) {
     rt_command command = {1, kind, altitude, speed, {path, path + size, count}, false, {0, 0},
                           {projection[0], projection[1], projection[2], projection[3]}};
+    last = command;
     rt_gate_open(&gate, &command, not_after_us);
 }
 
@@ -39,6 +43,11 @@ void rt_test_gate_observe(const uint8_t *frame, uint32_t size, int64_t now_us) {
 
 const char *rt_test_gate_seal(const uint8_t *frame, uint32_t size, int64_t now_us, uint8_t *out, uint32_t *sealed) {
     return rt_gate_seal(&gate, (rt_bytes){frame, size}, now_us, out, sealed);
+}
+
+const char *rt_test_gate_sign_ahead(const uint8_t *frame, uint32_t size, int64_t now_us) {
+    uint8_t out[RT_STAMPED];
+    return rt_gate_sign_ahead(&gate, &last, (rt_bytes){frame, size}, now_us, out);
 }
 
 void rt_test_link_begin(const uint8_t *key, int64_t timestamp, const int64_t *streams, uint32_t count, int64_t utc_us,
@@ -55,4 +64,6 @@ int rt_test_link_accept(const uint8_t *frame, uint32_t size, int64_t now_us) {
     return (int)rt_accept_frame(&link, (rt_bytes){frame, size}, now_us);
 }
 
-int64_t rt_test_link_ahead(void) { return link.ahead; }
+uint32_t rt_test_link_sign_ahead(uint8_t *frame, uint32_t size, int64_t now_us) { return rt_sign_ahead(&link, frame, size, now_us); }
+
+int64_t rt_test_link_signed_up_to(void) { return rt_signed_up_to(&link); }

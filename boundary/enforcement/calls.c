@@ -168,6 +168,34 @@ static uint32_t answer_executor(rt_boundary *boundary, int64_t kind, reader *lef
     return 1;
 }
 
+/* AHEAD: all frames of one link, or none. */
+static uint32_t answer_ahead(rt_boundary *boundary, reader *left, int64_t own_us, uint8_t *out) {
+    rt_executor *executor = &boundary->executor;
+    rt_permit permit;
+    rt_command command;
+    uint8_t *at = out;
+    int64_t now_us = take(left, 8), kind = take(left, 1), link = take(left, 1);
+    if (left->short_ || left->left < RT_PERMIT_BYTES || !is_time(now_us)) return refuse("malformed", out);
+    if (rt_is_apart(now_us, own_us)) return refuse("time-apart", out);
+    const rt_bytes sealed = {left->at, RT_PERMIT_BYTES};
+    left->at += RT_PERMIT_BYTES;
+    left->left -= RT_PERMIT_BYTES;
+    rt_refusal refused = rt_may_stand_in(executor, sealed, kind, link, now_us, &permit, &command);
+    if (refused != NULL) return refuse(refused, out);
+    put(&at, 0, 1);
+    put(&at, (int64_t)permit.serial, 8);
+    for (uint32_t count = 0; left->left > 0; count++) {
+        int64_t size = take(left, 2);
+        if (left->short_ || size < 0 || size > left->left || count == RT_MOST_AHEAD) return refuse("malformed", out);
+        refused = rt_gate_sign_ahead(&executor->gate, &command, (rt_bytes){left->at, (uint32_t)size}, now_us, at);
+        if (refused != NULL) return refuse(refused, out);
+        left->at += size;
+        left->left -= (uint32_t)size;
+        at += executor->gate.signs ? RT_STAMPED : 0;
+    }
+    return (uint32_t)(at - out);
+}
+
 uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t *out) {
     reader left = {call.at, call.size, false};
     int64_t kind = take(&left, 1), now_us;
@@ -187,6 +215,8 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
         size = rt_enforce(boundary, rest_of(&left), own_us, out + 1);
         refused = NULL;
         break;
+    case RT_CALL_AHEAD:
+        return boundary->loaded ? answer_ahead(boundary, &left, own_us, out) : refuse("not-loaded", out);
     case RT_CALL_DISPATCH:
     case RT_CALL_STAND_IN:
     case RT_CALL_ENDED:

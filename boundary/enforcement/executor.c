@@ -145,8 +145,8 @@ static void follow(rt_executor *executor, const rt_permit *permit, int64_t motio
     }
 }
 
-static rt_refusal dispatch(rt_executor *executor, const rt_permit *permit, int64_t now_us) {
-    rt_command command;
+/* Why nothing is sent for a permit at a monotonic time; NULL where its command may be. */
+static rt_refusal refuse(const rt_executor *executor, const rt_permit *permit, int64_t now_us, rt_command *command) {
     if (executor->gate.chain->over)
         return "permit/session-over";
     if (is_used(executor, permit->serial))
@@ -156,8 +156,16 @@ static rt_refusal dispatch(rt_executor *executor, const rt_permit *permit, int64
     rt_refusal refused = permit->kind == RT_STEP ? refuse_step(executor, permit) : refuse_link(executor, permit);
     if (refused != NULL)
         return refused;
-    if (executor->used_count == RT_MOST_DISPATCHED || !command_of(executor, permit, &command))
+    if (executor->used_count == RT_MOST_DISPATCHED || !command_of(executor, permit, command))
         return "permit/not-covered";
+    return NULL;
+}
+
+static rt_refusal dispatch(rt_executor *executor, const rt_permit *permit, int64_t now_us) {
+    rt_command command;
+    rt_refusal refused = refuse(executor, permit, now_us, &command);
+    if (refused != NULL)
+        return refused;
     use(executor, permit->serial);
     if (permit->kind == RT_STEP) {
         executor->step = permit->step;
@@ -201,7 +209,8 @@ rt_refusal rt_dispatch(rt_executor *executor, rt_bytes sealed, int64_t now_us, r
     return chained(executor, ours ? dispatch(executor, permit, now_us) : "permit/forged", now_us);
 }
 
-static rt_refusal stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit) {
+/* What the standing permit of a step that was sent permits of a link; or why it does not. */
+static rt_refusal standing_for(const rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, rt_permit *permit) {
     rt_permit standing;
     if (!is_ours(executor, sealed, &standing))
         return "permit/forged";
@@ -219,7 +228,12 @@ static rt_refusal stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind,
             serial++;
     }
     *permit = (rt_permit){kind, fallback ? standing.step : -1, link, serial, 0, 0, ALWAYS};
-    return dispatch(executor, permit, now_us);
+    return NULL;
+}
+
+static rt_refusal stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit) {
+    rt_refusal refused = standing_for(executor, sealed, kind, link, permit);
+    return refused != NULL ? refused : dispatch(executor, permit, now_us);
 }
 
 rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit) {
@@ -250,6 +264,12 @@ rt_refusal rt_executor_prepare(rt_executor *executor, rt_bytes sealed, int64_t n
     executor->prepared[permit.serial / 8] |= (uint8_t)(1 << permit.serial % 8);
     rt_gate_prepare(&executor->gate, &permit);
     return NULL;
+}
+
+rt_refusal rt_may_stand_in(const rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us,
+                           rt_permit *permit, rt_command *command) {
+    rt_refusal refused = standing_for(executor, sealed, kind, link, permit);
+    return refused != NULL ? refused : refuse(executor, permit, now_us, command);
 }
 
 void rt_ended(rt_executor *executor) {

@@ -42,6 +42,10 @@ rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int
    `rt_gate_prepared`, a dispatch, or its time is over. */
 rt_refusal rt_executor_prepare(rt_executor *executor, rt_bytes sealed, int64_t now_us);
 
+/* What `rt_stand_in` would permit now, and its command; or why it would not. Nothing is sent, and nothing changes. */
+rt_refusal rt_may_stand_in(const rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us,
+                           rt_permit *permit, rt_command *command);
+
 void rt_ended(rt_executor *executor);                        /* the running step ended, however it did */
 void rt_ended_command(rt_executor *executor, uint64_t token); /* that command ended; another since runs on */
 void rt_landed(rt_executor *executor);                       /* standing permits lapse */

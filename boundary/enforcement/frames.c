@@ -111,6 +111,16 @@ static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t no
     return NULL;
 }
 
+/* What no frame may be, whatever is permitted. */
+static rt_refusal refuse_always(const rt_gate *gate, const rt_frame *frame) {
+    if (frame->system != gate->system || frame->component != RT_MAV_COMP_ID_ONBOARD_COMPUTER)
+        return "frame/not-ours";
+    if (frame->has_target &&
+        (frame->target_system != gate->system || frame->target_component != RT_MAV_COMP_ID_AUTOPILOT1))
+        return "frame/wrong-target";
+    return rt_is_forced_arming(frame) ? "frame/forced-arming" : NULL;
+}
+
 /* Why a frame does not leave; `*carries` where it does, and carries out a command. */
 static rt_refusal refuse(rt_gate *gate, rt_bytes octets, int64_t now_us, bool *carries) {
     rt_frame frame;
@@ -120,14 +130,10 @@ static rt_refusal refuse(rt_gate *gate, rt_bytes octets, int64_t now_us, bool *c
         return "frame/not-one-frame";
     if (gate->system == 0) /* a vehicle may wait to be spoken to; what we are is all that it is told then */
         return rt_is_greeting(&frame) && frame.component == RT_MAV_COMP_ID_ONBOARD_COMPUTER ? NULL : "frame/no-vehicle";
-    if (frame.system != gate->system || frame.component != RT_MAV_COMP_ID_ONBOARD_COMPUTER)
-        return "frame/not-ours";
-    if (frame.has_target &&
-        (frame.target_system != gate->system || frame.target_component != RT_MAV_COMP_ID_AUTOPILOT1))
-        return "frame/wrong-target";
     /* 2. never, whatever is permitted */
-    if (rt_is_forced_arming(&frame))
-        return "frame/forced-arming";
+    rt_refusal refused = refuse_always(gate, &frame);
+    if (refused != NULL)
+        return refused;
     /* 3. always, or before the flight */
     if (rt_is_housekeeping(&frame))
         return NULL;
@@ -156,5 +162,40 @@ rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *
     if (carries) rt_chain_leave(gate->chain, frame);
     memcpy(out, frame.at, frame.size);
     *size = gate->signs ? rt_sign_frame(&gate->signer, out, frame.size, now_us) : frame.size;
+    return NULL;
+}
+
+/* Why a frame is not signed ahead for a command: as at the gate, if that were open for it. */
+static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, rt_bytes octets) {
+    rt_frame frame;
+    rt_point point, first;
+    if (!rt_read_frame(octets, &frame))
+        return "frame/not-one-frame";
+    if (gate->system == 0)
+        return "frame/no-vehicle";
+    rt_refusal refused = refuse_always(gate, &frame);
+    if (refused != NULL)
+        return refused;
+    if (!rt_carries_out(&frame, command, gate->autopilot, gate->home_known, gate->home_amsl))
+        return "frame/not-covered";
+    if (!rt_point_of(&frame, &point))
+        return NULL;
+    bool is_first = rt_point_at(command, 0, &first.latitude, &first.longitude) && point.latitude == first.latitude &&
+                    point.longitude == first.longitude; /* the others wait until the vehicle is there */
+    return is_first ? NULL : "frame/out-of-order";
+}
+
+rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes frame, int64_t now_us, uint8_t *out) {
+    uint8_t octets[RT_LARGEST_FRAME];
+    rt_refusal refused = refuse_ahead(gate, command, frame);
+    if (refused != NULL) {
+        rt_chain_stop(gate->chain, frame);
+        return refused;
+    }
+    if (gate->signs) {
+        memcpy(octets, frame.at, frame.size);
+        uint32_t size = rt_sign_ahead(&gate->signer, octets, frame.size, now_us);
+        memcpy(out, octets + size - RT_STAMPED, RT_STAMPED);
+    }
     return NULL;
 }

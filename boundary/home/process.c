@@ -184,7 +184,7 @@ static int64_t own_time_us(clockid_t clock) {
 /* The link's timestamps, so many ahead of what was used. */
 static void gather(rt_kept *kept, int64_t ahead) {
     rt_signed_link *link = &boundary.executor.gate.signer;
-    kept->link_timestamp = link->ahead + ahead;
+    kept->link_timestamp = rt_signed_up_to(link) + ahead;
     kept->stream_count = link->stream_count;
     memcpy(kept->streams, link->streams, sizeof kept->streams);
     for (uint64_t each = 0; each < kept->stream_count; each++) kept->streams[each].last += ahead;

@@ -6,6 +6,7 @@
 #define MINUTE 6000000LL
 #define SECOND 100000LL
 #define LAST ((1LL << 48) - 366LL * 24 * 60 * MINUTE) /* what claims the last year of the 48 bits is believed no more */
+#define LEADS_EVERY_US 1000000LL /* who is given what is signed ahead makes time run this much faster at most: RT_LEAD in a second */
 #define STAMP 6
 #define TAG 6
 
@@ -52,19 +53,38 @@ void rt_signed_link_begin(rt_signed_link *link, const uint8_t key[RT_KEY_BYTES],
     }
 }
 
-uint32_t rt_sign_frame(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t now_us) {
-    link->ahead++;
-    link->ahead = local_time(link, now_us);
+/* Put a signature of this timestamp behind a frame; its new size. */
+static uint32_t signed_at(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t timestamp) {
     rt_set_flags(frame, RT_FLAG_SIGNED);
     frame[size++] = link->link;
     for (uint32_t octet = 0; octet < STAMP; octet++)
-        frame[size++] = (uint8_t)(link->ahead >> 8 * octet & 0xFF);
+        frame[size++] = (uint8_t)(timestamp >> 8 * octet & 0xFF);
     link->has_own = true;
     link->own_system = frame[5];
     link->own_component = frame[6];
     tag_of(link, frame, size, frame + size);
     return size + TAG;
 }
+
+uint32_t rt_sign_frame(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t now_us) {
+    link->ahead++;
+    link->ahead = local_time(link, now_us);
+    return signed_at(link, frame, size, link->ahead);
+}
+
+uint32_t rt_sign_ahead(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t now_us) {
+    if (link->promised == 0 || now_us - link->promised_us >= LEADS_EVERY_US) {
+        int64_t begins = local_time(link, now_us) + RT_LEAD;
+        if (begins > link->promised)
+            link->promised = begins;
+        link->promised_us = now_us;
+        link->news = true;
+    }
+    link->promised++;
+    return signed_at(link, frame, size, link->promised);
+}
+
+int64_t rt_signed_up_to(const rt_signed_link *link) { return link->promised > link->ahead ? link->promised : link->ahead; }
 
 /* How many of so many streams are left without those whose last frame is over a minute old. */
 static uint32_t prune(rt_stream *streams, uint32_t count, int64_t local) {

@@ -21,6 +21,11 @@ EPOCH_US: Final = 1_420_070_400_000_000  # 1 January 2015 in UTC us (guide, "Tim
 UNIT_US: Final = 10
 MINUTE: Final = 6_000_000
 _SECOND: Final = 100_000
+#: What is signed ahead begins so far, in timestamps, above what is signed now: as long as normal frames go on, it is
+#: good for that long.
+LEAD: Final = 3_000_000
+#: It begins anew no more often than this, in us: who is given it makes time run no faster than `LEAD` in a second.
+_LEADS_EVERY_US: Final = 1_000_000
 #: as many as the C library keeps (MAVLINK_MAX_SIGNING_STREAMS)
 MOST_STREAMS: Final = 16
 #: Timestamps have 48 bits, until 2104; what claims the last year is believed no more, so that ours never run out.
@@ -86,6 +91,8 @@ class SignedLink:
         self._ahead = max(timestamp_of(utc_us), stored.timestamp)
         self._since_us = monotonic_us - self._ahead * UNIT_US
         self._streams = dict(stored.streams)
+        self._promised = 0  # the last timestamp of a frame that was signed ahead,
+        self._promised_us = 0  # and when these last began anew
         self._own: Stream | None = None
         recent = [stream for stream, last in stored.streams.items() if last >= self._ahead - MINUTE]
         self._heard_by = {stream[:2]: stream[2] for stream in sorted(recent, key=stored.streams.__getitem__)}
@@ -96,13 +103,28 @@ class SignedLink:
     @property
     def state(self) -> State:
         """What to keep. May be asked for by another thread than the one that signs."""
-        return State(self._ahead, self._streams.copy())
+        return State(max(self._ahead, self._promised), self._streams.copy())
 
     def sign(self, frame: bytes, now_us: int) -> bytes:
         """The signed frame for an unsigned one."""
         # "All timestamps generated must be at least 1 more than the previous timestamp sent."
         self._ahead = max(self._ahead + 1, self._clock(now_us))
-        signed = with_flags(frame, FLAG_SIGNED) + bytes([self._link]) + self._ahead.to_bytes(_STAMP, "little")
+        return self._signed_at(frame, self._ahead)
+
+    def sign_ahead(self, frame: bytes, now_us: int) -> bytes:
+        """The same for a frame that is to be sent only when nothing more is signed: its timestamp is above all that
+        were promised before, and about `LEAD` above what is signed now. Whatever leaves once that time has come
+        voids it.
+        """
+        if not self._promised or now_us - self._promised_us >= _LEADS_EVERY_US:
+            self._promised = max(self._promised, max(self._ahead, self._clock(now_us)) + LEAD)
+            self._promised_us = now_us
+            self.on_news()
+        self._promised += 1
+        return self._signed_at(frame, self._promised)
+
+    def _signed_at(self, frame: bytes, timestamp: int) -> bytes:
+        signed = with_flags(frame, FLAG_SIGNED) + bytes([self._link]) + timestamp.to_bytes(_STAMP, "little")
         self._own = frame[5], frame[6], self._link
         return signed + self._tag(signed)
 

@@ -1,15 +1,21 @@
 """Both boundaries at once: every call is made of the one in Python and of the one in C, and both answer the same."""
 
 import ctypes
+from collections import deque
 from collections.abc import Callable, Mapping
+from itertools import product
 from types import MappingProxyType
 from typing import Any, ClassVar
 
 from msgspec.structs import replace as with_fields
 
+from rtshcua.adapters.vehicle import messages
+from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import load as loading
+from rtshcua.onboard.enforcement.frames import OURS
 from rtshcua.onboard.enforcement.isolated import (
     Caller,
     IsolatedBoundary,
@@ -23,11 +29,21 @@ from rtshcua.onboard.ports import BoundaryKey, Dispatch
 from rtshcua.wire.preparation import MOST, Preparation
 from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.receipt import decode as read_receipt
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 from rtshcua.wire.trust import TrustRoot
 from virtual import case
 
 #: what the boundary in C signs its own evidence with
 OWN_KEY = case.BOUNDARY_KEY.private.private_bytes_raw()
+
+#: frames that links are flown by, on either autopilot
+LINKS = [
+    Codec(1, OURS).pack(message)
+    for message in (
+        *(messages.set_mode(1, mode) for mode in (Px4Mode.RETURN, Px4Mode.LAND)), messages.stop_here(1),
+        *(messages.set_mode(1, mode) for mode in (CopterMode.RTL, CopterMode.LAND, CopterMode.BRAKE)),
+    )
+]  # fmt: skip
 
 
 class Differs(AssertionError):
@@ -155,6 +171,8 @@ class BothGates:
 
     def __init__(self, here: Any, there: IsolatedGate, counts: dict[str, int]) -> None:
         self._here, self._there, self._counts = here, there, counts
+        #: frames that were to leave
+        self.lately: deque[bytes] = deque(maxlen=8)
 
     def observe(self, frame: bytes, now_us: int = 0) -> None:
         self._here.observe(frame, now_us)
@@ -164,6 +182,7 @@ class BothGates:
         one: bytes | Refusal = self._here.seal(frame, now_us)
         same(f"seal {frame.hex()}", one, self._there.seal(frame, now_us))
         self._counts["refused frames" if isinstance(one, Refusal) else "frames"] += 1
+        self.lately.append(frame)
         return one
 
     def stands(self, now_us: int) -> bool:
@@ -181,13 +200,25 @@ class BothExecutors:
     def __init__(self, here: Any, there: IsolatedExecutor, counts: dict[str, int]) -> None:
         self._here, self._there, self._counts = here, there, counts
         self.frames: Any = BothGates(here.frames, there.frames, counts)
+        self._sealed = b""  # the last permit that came, and when
+        self._now_us = 0
 
     def _both(self, what: str, one: Dispatch | Refusal, other: Dispatch | Refusal) -> Dispatch | Refusal:
         same(what, one, other)
         self._counts["refused permits" if isinstance(one, Refusal) else "dispatches"] += 1
+        self._look_ahead()
         return one
 
+    def _look_ahead(self) -> None:
+        """Both sign the same ahead, of each link, by the permit that came last."""
+        for kind, link in product((STEP, FALLBACK_LINK, CONTINGENCY_LINK), range(-1, 4)):
+            for frames in ((), LINKS[:2], *([frame] for frame in (*LINKS, *self.frames.lately))):
+                one = self._here.ahead(self._sealed, kind, link, frames, self._now_us)
+                same(f"ahead {kind} {link}", one, self._there.ahead(self._sealed, kind, link, frames, self._now_us))
+                self._counts["ahead"] += not isinstance(one, Refusal) and bool(frames)
+
     def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+        self._sealed, self._now_us = sealed, now_us
         return self._both("dispatch", self._here.dispatch(sealed, now_us), self._there.dispatch(sealed, now_us))
 
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
@@ -202,7 +233,9 @@ class BothExecutors:
     def __getattr__(self, name: str) -> Any:
         def both(*arguments: Any) -> Any:
             getattr(self._there, name)(*arguments)
-            return getattr(self._here, name)(*arguments)
+            answer = getattr(self._here, name)(*arguments)
+            self._look_ahead()
+            return answer
 
         return both
 
@@ -214,7 +247,17 @@ class Shadow:
         self._library = boundary
         self.roots: dict[TrustRoot, tuple[bytes, bytes]] = {}  # signed, and the key that it is pinned by
         self.counts = dict.fromkeys(
-            ("requests", "documents", "frames", "refused frames", "dispatches", "refused permits", "preparations"), 0
+            (
+                "requests",
+                "documents",
+                "frames",
+                "refused frames",
+                "dispatches",
+                "refused permits",
+                "preparations",
+                "ahead",
+            ),
+            0,
         )
 
     def know(self, root: TrustRoot, signed: bytes, pin: bytes) -> None:

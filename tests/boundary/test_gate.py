@@ -35,7 +35,7 @@ class InC:
 
     def __init__(self, boundary: ctypes.CDLL) -> None:
         self._lib = boundary
-        boundary.rt_test_gate_seal.restype = ctypes.c_char_p
+        boundary.rt_test_gate_seal.restype = boundary.rt_test_gate_sign_ahead.restype = ctypes.c_char_p
         boundary.rt_test_gate_begin()
 
     def open(self, command: Command, projection: Projection, not_after_us: int) -> None:
@@ -53,6 +53,11 @@ class InC:
 
     def observe(self, frame: bytes, now_us: int) -> None:
         self._lib.rt_test_gate_observe(frame, len(frame), ctypes.c_int64(now_us))
+
+    def sign_ahead(self, frame: bytes, now_us: int) -> str | None:
+        """For the command that it was opened for last; why not."""
+        slug = self._lib.rt_test_gate_sign_ahead(frame, len(frame), ctypes.c_int64(now_us))
+        return slug and slug.decode()
 
     def seal(self, frame: bytes, now_us: int) -> bytes | str:
         out, size = ctypes.create_string_buffer(512), ctypes.c_uint32()
@@ -148,7 +153,11 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
     random = Random(seed)
     here, there = FrameSession(), InC(boundary)
     autopilot, home, now_us, left = random.choice(AUTOPILOTS), random.choice(HOMES), 1_000_000, 0
-    command = drawn_command(random, home)
+    command = opened = drawn_command(random, home)
+    here.open(command, now_us)
+    there.open(command, home, now_us)
+    here.close()
+    there.close()
     for report in (m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3), None)[: random.randrange(3)]:
         frame = pack(report, 1) if report is not None else drawn_report(random, command, autopilot)
         here.observe(frame, now_us)
@@ -157,7 +166,7 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
         now_us += random.choice((0, 1_000, 400_000, 4_000_000))
         chance = random.random()
         if chance < 0.08:
-            command = drawn_command(random, home)
+            command = opened = drawn_command(random, home)
             here.open(command, now_us + 500_000)
             there.open(command, home, now_us + 500_000)
         elif chance < 0.1:
@@ -172,6 +181,8 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
             one, other = here.seal(frame, now_us), there.seal(frame, now_us)
             assert other == (one.slug if isinstance(one, Refusal) else one), (seed, frame.hex())
             left += not isinstance(one, Refusal)
+            ahead = here.sign_ahead(frame, opened, now_us)
+            assert there.sign_ahead(frame, now_us) == (ahead.slug if isinstance(ahead, Refusal) else None), frame.hex()
     return left
 
 
@@ -193,16 +204,18 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
         key, ctypes.c_int64(stored.timestamp), (ctypes.c_int64 * max(1, len(words)))(*words), len(streams),
         ctypes.c_int64(utc_us), ctypes.c_int64(now_us), 0,
     )  # fmt: skip
-    boundary.rt_test_link_ahead.restype = ctypes.c_int64
+    boundary.rt_test_link_signed_up_to.restype = ctypes.c_int64
     names = ("accepted", "unsigned", "forged", "strayed", "stale", "crowded")
     seen, believed = [], 0
     for _ in range(80):
         now_us += random.choice((0, 10, 100_000, 70_000_000))
         frame = pack(long(512, 148), random.randrange(1, 40), random.choice((SYSTEM, 1, 2)))
         if random.random() < 0.3:
-            signed = here.sign(frame, now_us)
+            ahead = random.random() < 0.4
+            signed = (here.sign_ahead if ahead else here.sign)(frame, now_us)
             buffer = ctypes.create_string_buffer(frame, 300)
-            size = boundary.rt_test_link_sign(buffer, len(frame), ctypes.c_int64(now_us))
+            sign = boundary.rt_test_link_sign_ahead if ahead else boundary.rt_test_link_sign
+            size = sign(buffer, len(frame), ctypes.c_int64(now_us))
             assert buffer.raw[:size] == signed
             assert unsigned(signed) == frame
             seen.append(signed)
@@ -222,7 +235,7 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
             why = next(at for at, name in enumerate(names) if getattr(here.counts, name) != before[name])
             assert boundary.rt_test_link_accept(signed, len(signed), ctypes.c_int64(now_us)) == why, seed
             believed += accepted
-        assert boundary.rt_test_link_ahead() == here.state.timestamp
+        assert boundary.rt_test_link_signed_up_to() == here.state.timestamp
     return believed
 
 

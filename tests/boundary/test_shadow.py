@@ -64,7 +64,7 @@ def fly(name: str, flavour: str, *faults: str) -> Flown:
 def test_a_flight_is_the_same_under_both(flavour: str, shadow: Shadow) -> None:
     assert fly("short", flavour).ending is Ending.COMPLETED
     assert fly("short", flavour, "battery,at=15s,level=10%").ending is Ending.ABORTED
-    assert min(shadow.counts[each] for each in ("requests", "frames", "dispatches")) > 0
+    assert min(shadow.counts[each] for each in ("requests", "frames", "dispatches", "ahead")) > 0
 
 
 def meddled(seed: int) -> None:

@@ -9,7 +9,7 @@ and that chains go forward only. A standing permit is good for each of its links
 """
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
@@ -42,6 +42,15 @@ OUT_OF_TURN: Final = Refusal("permit/out-of-turn", "it is for a step while anoth
 MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing began, or the mission was called off")
 NOT_DOWN: Final = Refusal("permit/not-down", "the vehicle is not known to stand on the ground, disarmed")
 BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one that was flown")
+
+
+class Ahead(NamedTuple):
+    """A link, signed ahead: the token of its command, and of each frame the timestamp and signature; these are empty
+    where there is no key.
+    """
+
+    token: int
+    stamps: tuple[bytes, ...]
 
 
 class Commands:
@@ -155,6 +164,11 @@ class Executor:
         return found
 
     def _stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+        permit = self._standing_for(sealed, kind, link)
+        return permit if isinstance(permit, Refusal) else self._dispatch(permit, now_us)
+
+    def _standing_for(self, sealed: bytes, kind: int, link: int) -> Permit | Refusal:
+        """What the standing permit of a step that was sent permits of a link; or why it does not."""
         permit = open_permit(sealed, self._key)
         if permit is None:
             return FORGED
@@ -168,7 +182,25 @@ class Executor:
         if not fallback and link == permit.contingencies - 1:
             again = range(serial, serial + AGAIN)
             serial = next((each for each in again if each not in self._used), serial + AGAIN)
-        return self._dispatch(Permit(kind, step, link, serial, 0, 0, _ALWAYS), now_us)
+        return Permit(kind, step, link, serial, 0, 0, _ALWAYS)
+
+    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+        """Sign the frames of a link ahead, to be sent when no boundary is there any more: as far as the standing permit
+        of a step that was sent would let the link be flown now, and each frame would pass. Nothing is sent or opened.
+        """
+        permit = self._standing_for(sealed, kind, link)
+        refused = permit if isinstance(permit, Refusal) else self._refuse(permit, now_us)
+        if isinstance(permit, Refusal) or refused is not None:
+            assert refused is not None
+            return refused
+        command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial)
+        stamps: list[bytes] = []
+        for frame in frames:
+            stamp = self.frames.sign_ahead(frame, command, now_us)
+            if isinstance(stamp, Refusal):
+                return stamp
+            stamps.append(stamp)
+        return Ahead(permit.serial, tuple(stamps))
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
         """What may be set of the vehicle from now on, by a preparation permit, or why nothing may. It is good once, on
@@ -198,14 +230,18 @@ class Executor:
         """What was to be set is set, or was given up."""
         self.frames.prepared()
 
-    def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | Refusal:
+    def _refuse(self, permit: Permit, now_us: int) -> Refusal | None:
+        """Why nothing is sent for a permit at a monotonic time."""
         if self._chain.over:
             return SESSION_OVER
         if permit.serial in self._used:
             return USED
         if now_us > permit.not_after_us:
             return LATE
-        refusal = self._refuse_step(permit) if permit.kind == STEP else self._refuse_link(permit)
+        return self._refuse_step(permit) if permit.kind == STEP else self._refuse_link(permit)
+
+    def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | Refusal:
+        refusal = self._refuse(permit, now_us)
         if refusal is not None:
             return refusal
         command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial)

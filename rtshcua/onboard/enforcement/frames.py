@@ -18,6 +18,7 @@ from typing import Final, Protocol
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
+from rtshcua.mavlink.framing import SIGNATURE
 from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
 from rtshcua.mavlink.modes import KNOWN
 from rtshcua.mavlink.parameters import is_bytewise, value_of
@@ -38,6 +39,8 @@ HOME_MOVES: Final = 10_000
 
 #: us: how old a heartbeat, and a word of the ground, may be of a vehicle that counts as standing there
 STANDS_US: Final = 3_000_000
+#: octets of a timestamp and a signature, as they stand at the end of a frame
+STAMPED: Final = SIGNATURE - 1
 
 _LANDED: Final = LAYOUTS[EXTENDED_SYS_STATE].at("landed_state")
 _KIND: Final = LAYOUTS[HEARTBEAT].at("autopilot")
@@ -70,6 +73,10 @@ class Signer(Protocol):
 
     def sign(self, frame: bytes, now_us: int) -> bytes:
         """The signed frame for an unsigned one. `now_us` is monotonic."""
+        ...
+
+    def sign_ahead(self, frame: bytes, now_us: int) -> bytes:
+        """The same, for a frame that is sent only when nothing more is signed."""
         ...
 
 
@@ -185,6 +192,16 @@ class FrameSession:
             self.chain.leave(frame)
         return sealed
 
+    def sign_ahead(self, frame: bytes, command: Command, now_us: int) -> bytes | Refusal:
+        """Sign a frame of a command ahead, to be sent only when no boundary is there any more: its timestamp and
+        signature, nothing without a key; or why not. The gate stays as it is.
+        """
+        refused = self._refuse_ahead(frame, command)
+        if refused is not None:
+            self.chain.stop(frame)
+            return refused
+        return b"" if self._signer is None else self._signer.sign_ahead(frame, now_us)[-STAMPED:]
+
     def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
         """Why a frame does not leave, or else whether it carries out a command."""
         # 1. it is what it will be taken for: one frame, from us, to the autopilot that was heard, and to nobody else
@@ -193,14 +210,10 @@ class FrameSession:
             return NOT_ONE_FRAME
         if not self._system:  # a vehicle may wait to be spoken to; what we are is all that it is told then
             return False if allow_list.is_greeting(frame) and frame.component == OURS else NO_VEHICLE
-        if (frame.system, frame.component) != (self._system, OURS):
-            return NOT_OURS
-        target = frame.target
-        if target is not None and target != (self._system, AUTOPILOT):
-            return WRONG_TARGET
         # 2. never, whatever is permitted
-        if allow_list.is_forced_arming(frame):
-            return FORCED_ARMING
+        refused = self._refuse_always(frame)
+        if refused is not None:
+            return refused
         # 3. always, or before the flight
         if allow_list.is_housekeeping(frame):
             return False
@@ -215,6 +228,29 @@ class FrameSession:
             return NOT_LISTED
         # 4. what is permitted now
         return self._refuse_motion(frame, now_us) or True
+
+    def _refuse_always(self, frame: Frame) -> Refusal | None:
+        """What no frame may be, whatever is permitted."""
+        if (frame.system, frame.component) != (self._system, OURS):
+            return NOT_OURS
+        if frame.target is not None and frame.target != (self._system, AUTOPILOT):
+            return WRONG_TARGET
+        return FORCED_ARMING if allow_list.is_forced_arming(frame) else None
+
+    def _refuse_ahead(self, octets: bytes, command: Command) -> Refusal | None:
+        """Why a frame is not signed ahead for a command: as at the gate, if that were open for it."""
+        frame = read_frame(octets)
+        if frame is None:
+            return NOT_ONE_FRAME
+        if not self._system:
+            return NO_VEHICLE
+        refused = self._refuse_always(frame)
+        if refused is not None:
+            return refused
+        if not allow_list.carries_out(frame, command, self._autopilot, self._home_amsl):
+            return NOT_COVERED
+        point = allow_list.point_of(frame)  # the others wait until the vehicle is there
+        return None if point is None or point == command.geo[:2] else OUT_OF_ORDER
 
     def _refuse_motion(self, frame: Frame, now_us: int) -> Refusal | None:
         session = self._session

@@ -6,7 +6,7 @@ and lets frames out; whatever this end does wrong, nothing moves that it did not
 needs to fly by its own reading of the same bundle.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from struct import Struct
 from struct import error as struct_error
 from types import MappingProxyType
@@ -18,7 +18,8 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.signing import Counts
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import executor, frames, preparation
-from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.onboard.enforcement.executor import Ahead, Commands
+from rtshcua.onboard.enforcement.frames import STAMPED
 from rtshcua.onboard.ports import BoundaryKey, Command, Dispatch
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
@@ -34,8 +35,8 @@ Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
-    PERMIT, PREPARE, PREPARED, STANDS,
-) = range(1, 19)  # fmt: skip
+    PERMIT, PREPARE, PREPARED, STANDS, AHEAD,
+) = range(1, 20)  # fmt: skip
 #: octets of a bundle or a document that go in one call
 MAX_PART: Final = 60_000
 
@@ -45,6 +46,7 @@ _SIZED, _AT = Struct(">qqqI"), Struct(">BI")
 _SHOWN: Final = Struct(">qqqII")
 _STANDING: Final = Struct(">qBb")
 _PERMITTED: Final = Struct(">BhhQq")
+_SERIAL_BYTES: Final = 8
 
 #: what an answer that makes no sense, or none at all, comes to
 LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or answers what makes no sense")
@@ -223,6 +225,18 @@ class IsolatedExecutor:
     def prepared(self) -> None:
         """What was to be set is set, or was given up."""
         self._caller(PREPARED)
+
+    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+        """Have the frames of a link signed ahead: as `Executor.ahead`."""
+        listed = (len(frame).to_bytes(2) + frame for frame in frames)
+        answer = self._caller(AHEAD, _STANDING.pack(now_us, kind, link), sealed, *listed)
+        if isinstance(answer, Refusal):
+            return answer
+        each = STAMPED if self._caller.signs else 0
+        if len(answer) != _SERIAL_BYTES + each * len(frames):
+            return self._caller.lose()
+        begins = (_SERIAL_BYTES + each * number for number in range(len(frames)))
+        return Ahead(int.from_bytes(answer[:_SERIAL_BYTES]), tuple(answer[at : at + each] for at in begins))
 
     def ended(self, token: int | None = None) -> None:
         """The running step ended, or that command did."""

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import signing, tlog
 from rtshcua.mavlink.framing import FLAG_SIGNED, checksum, unsigned, with_flags
-from rtshcua.mavlink.signing import EPOCH_US, MINUTE, MOST_STREAMS, SignedLink, State, stream_of, timestamp_of
+from rtshcua.mavlink.signing import EPOCH_US, LEAD, MINUTE, MOST_STREAMS, SignedLink, State, stream_of, timestamp_of
 
 KEY = bytes(range(32))
 UTC = EPOCH_US + 11 * 366 * 86_400_000_000
@@ -274,3 +274,70 @@ def test_no_frame_comes_in_twice_and_none_over_a_minute_late(arrivals: list[tupl
         assert ours.accept(at(stamp, of=frame(component=component)), now_s * 1_000_000) == good
         if good:
             last[component], local = stamp, max(local, stamp)
+
+
+# ---------------------------------------------------------------- signed ahead
+
+
+def stamp(signed: bytes) -> int:
+    return int.from_bytes(signed[-12:-6], "little")
+
+
+def vehicle() -> SignedLink:
+    """An autopilot with the C library, which has heard us."""
+    return SignedLink(KEY, NEW, UTC, 0, as_library=True)
+
+
+def test_what_is_signed_ahead_is_above_all_that_is_signed_for_a_while() -> None:
+    ours = link()
+    ahead = [ours.sign_ahead(frame(mode), 0) for mode in range(3)]
+    assert [stamp(each) - timestamp_of(UTC) for each in ahead] == [LEAD + 1, LEAD + 2, LEAD + 3]
+    assert stamp(ours.sign(frame(), 20_000_000)) < stamp(ahead[0]) < stamp(ours.sign(frame(), 31_000_000))
+
+
+def test_a_vehicle_takes_it_once_nothing_more_is_signed_however_late() -> None:
+    """The last frame that was signed, then what was signed ahead, minutes later, in its order; none of it twice."""
+    ours, autopilot = link(), vehicle()
+    ahead = [ours.sign_ahead(frame(mode), 0) for mode in range(3)]
+    assert autopilot.accept(ours.sign(frame(), 20_000_000), 20_000_000)
+    late = 600_000_000
+    assert [autopilot.accept(each, late) for each in (ahead[0], ahead[2], ahead[1], ahead[2])] == [
+        True, True, False, False,
+    ]  # fmt: skip
+
+
+def test_what_is_signed_later_voids_it() -> None:
+    """Who holds it back while the flight goes on holds nothing soon: not for the next step, nor for the next flight."""
+    ours, autopilot = link(), vehicle()
+    held_back = ours.sign_ahead(frame(1), 0)
+    again = ours.sign_ahead(frame(2), 20_000_000)
+    assert autopilot.accept(ours.sign(frame(), 31_000_000), 31_000_000)
+    assert not autopilot.accept(held_back, 31_000_000)
+    assert autopilot.accept(again, 31_000_000)
+
+
+def test_no_timestamp_is_promised_twice() -> None:
+    ours = link()
+    promised = [stamp(ours.sign_ahead(frame(), now_us)) for now_us in (0, 0, 500_000, 1_000_000, 1_000_000, 900_000)]
+    assert promised == sorted(set(promised))
+    assert ours.state.timestamp == promised[-1]
+    after = link(stored=ours.state)
+    assert stamp(after.sign(frame(), 0)) > promised[-1]
+    assert stamp(after.sign_ahead(frame(), 0)) > promised[-1] + LEAD
+
+
+def test_who_is_given_it_all_the_time_cannot_use_up_the_timestamps() -> None:
+    """Whoever has it signed, sends it, and shows the vehicle's answer, as fast as can be."""
+    ours, autopilot = link(), vehicle()
+    for now_us in range(0, 10_000_000, 10_000):
+        assert autopilot.accept(ours.sign_ahead(frame(), now_us), now_us)
+        assert ours.accept(autopilot.sign(frame(component=2), now_us), now_us)
+    assert ours.state.timestamp - timestamp_of(UTC) < 11 * LEAD
+
+
+def test_it_is_news_to_keep() -> None:
+    ours, news = link(), []
+    ours.on_news = lambda: news.append(ours.state.timestamp)
+    for now_us in (0, 0, 10_000, 20_000_000):
+        ours.sign_ahead(frame(), now_us)
+    assert len(news) == 2

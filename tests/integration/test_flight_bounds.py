@@ -92,12 +92,11 @@ def wrong(first: int) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("ten", range(3))
-def test_no_bound_is_exceeded_in_flight(ten: int) -> None:
-    assert wrong(1_000 * ten) == []
+def test_no_bound_is_exceeded_in_flight() -> None:
+    assert wrong(0) == []
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("ten", range(3, 50))
+@pytest.mark.parametrize("ten", range(1, 50))
 def test_no_bound_of_many_is_exceeded_in_flight(ten: int) -> None:
     assert wrong(1_000 * ten) == []

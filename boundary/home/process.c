@@ -9,7 +9,7 @@
 
    Every file is opened by who starts it, so that it needs no path and, once it began, no right to open one. It first sends one
    message: the measures that are in force (4 octets, isolation.h), and the name of the link's key (8 octets, 0 without one). It ends with 0 when the socket is closed, 64 for a wrong command
-   line, 65 where the root is not to be trusted, 74 where its file cannot be read or written, 78 where that file is damaged. */
+   line, 65 where the root is not to be trusted, 66 where the link's key is none, 74 where its file cannot be read or written, 78 where that file is damaged. */
 #define _GNU_SOURCE
 #include "isolation.h"
 
@@ -25,7 +25,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, IO = 74, DAMAGED = 78 };
+enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, NO_KEY = 66, IO = 74, DAMAGED = 78 };
 /* how far ahead of what was used the link's timestamp is kept, in its units of 10 us, and how often: signing.py */
 #define RESERVE 300000LL
 #define EVERY_US 1000000LL
@@ -191,27 +191,35 @@ static void gather(rt_kept *kept, int64_t ahead) {
     link->news = false;
 }
 
-static uint32_t from_hex(const char *text, uint8_t *into, uint32_t most) {
-    uint32_t size = 0;
-    for (; text[0] != 0 && text[1] != 0 && size < most; text += 2) {
-        const char digits[3] = {text[0], text[1], 0};
-        char *end;
-        into[size++] = (uint8_t)strtoul(digits, &end, 16);
-        if (*end != 0) return 0;
-    }
-    return size;
+static int digit(uint8_t sign) {
+    if (sign >= '0' && sign <= '9') return sign - '0';
+    sign |= 0x20;
+    return sign >= 'a' && sign <= 'f' ? sign - 'a' + 10 : -1;
 }
 
-/* A key in a file that its owner alone may read: 32 octets, or 64 hexadecimal digits. */
+/* How many octets are said by pairs of digits, with spaces between them at most; 0 for anything else, and for more than `most`. */
+static uint32_t from_hex(const uint8_t *text, size_t size, uint8_t *into, uint32_t most) {
+    uint32_t found = 0;
+    for (size_t at = 0; at < size; at++) {
+        if (text[at] == ' ' || (text[at] >= '\t' && text[at] <= '\r')) continue;
+        int high = digit(text[at]), low = at + 1 < size ? digit(text[at + 1]) : -1;
+        if (high < 0 || low < 0 || found == most) return 0;
+        into[found++] = (uint8_t)(high << 4 | low);
+        at++;
+    }
+    return found;
+}
+
+/* A key in a file: 32 octets or 64 hexadecimal digits, not all 0, as `read_link_key` of adapters/files/signing.py has it. */
 static int read_key(int file, uint8_t key[RT_KEY_BYTES]) {
-    char data[80];
-    size_t size = read_all(file, data, sizeof data - 1);
-    data[size] = 0;
-    int fine = size == RT_KEY_BYTES;
-    if (fine) memcpy(key, data, RT_KEY_BYTES);
-    else fine = size >= 2 * RT_KEY_BYTES && from_hex(data, key, RT_KEY_BYTES) == RT_KEY_BYTES;
+    uint8_t data[1024], any = 0;
+    size_t size = read_all(file, data, sizeof data);
+    uint32_t found = RT_KEY_BYTES;
+    if (size == RT_KEY_BYTES) memcpy(key, data, RT_KEY_BYTES);
+    else found = from_hex(data, size, key, RT_KEY_BYTES);
     rt_wipe(data, sizeof data);
-    return fine;
+    for (int octet = 0; octet < RT_KEY_BYTES; octet++) any |= key[octet];
+    return found == RT_KEY_BYTES && any != 0;
 }
 
 /* Parameters in a file; `*listed` is NULL where there is none. 0 for one that lists none. */
@@ -251,9 +259,9 @@ int main(int count, char **words) {
         return DAMAGED;
     rt_bytes root_bytes = {root, (uint32_t)read_all(given.root, root, sizeof root)};
     if (given.link_key >= 0 && !read_key(given.link_key, keys->link))
-        return IO;
+        return NO_KEY;
     if (given.boundary_key >= 0 && !read_key(given.boundary_key, keys->boundary))
-        return IO;
+        return USAGE;
     static rt_preparation settings, owed;
     const rt_preparation *meant, *left;
     if (!read_writes(given.settings, &settings, &meant) || !read_writes(given.owed, &owed, &left))
@@ -266,7 +274,7 @@ int main(int count, char **words) {
     measures |= rt_isolate(given.user, given.group);
     static uint8_t pin[RT_KEY_BYTES];
     const rt_setup setup = {
-        keys, kept, root_bytes, {pin, given.pin == NULL ? 0 : from_hex(given.pin, pin, sizeof pin)},
+        keys, kept, root_bytes, {pin, given.pin == NULL ? 0 : from_hex((const uint8_t *)given.pin, strlen(given.pin), pin, sizeof pin)},
         {(const uint8_t *)given.vehicle, (uint32_t)strlen(given.vehicle)}, given.link_key >= 0, given.boundary_key >= 0, meant, left,
         {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
     if (rt_boundary_begin(&boundary, &setup) != NULL)

@@ -13,12 +13,14 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
-from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.files.signing import no_link_key, open_link_key
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, lock, make_folder
-from rtshcua.onboard.enforcement.isolated import MAX_PART
+from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 
-#: how long one answer may take, in s: a mission of many steps is looked at as a whole when it is loaded
+#: how long it may take to begin, and to load a bundle, whose mission is looked at as a whole, in s;
 PATIENCE_S: Final = 20.0
+#: and any other answer: one that stands still is as good as gone, and something flies
+ANSWER_S: Final = 1.0
 _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
 _BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
 #: octets of the largest call and answer
@@ -49,6 +51,7 @@ MISSING: Final = {
     Measure.SECRET_MEMORY: "memfd_secret: the kernel can read its keys (`secretmem.enable=1`)",
 }
 
+_NO_KEY: Final = 66
 _ENDED: Final = {
     64: "its command line is wrong",
     65: "it does not trust the trust root",
@@ -84,7 +87,7 @@ class BoundaryProcess:
     preparation (`wire.preparation`); `user` is the user and group that it runs as,
     None for ours. `paced`: the caller's time is not the machine's, as on a simulated vehicle that is flown faster.
 
-    Raises BoundaryError, and OSError for files that cannot be opened.
+    Raises BoundaryError, LinkKeyError, and OSError for files that cannot be opened.
     """
 
     def __init__(
@@ -122,10 +125,11 @@ class BoundaryProcess:
                 os.close(handle)
         ours.settimeout(PATIENCE_S)
         self._socket = ours
-        greeting = self._greeting()
+        greeting = self._greeting(link_key)
         self.measures = Measure(int.from_bytes(greeting[:4], "little"))
         #: the name of the link's key
         self.link_name = greeting[4:] if link_key is not None else None
+        ours.settimeout(ANSWER_S)
 
     @property
     def pid(self) -> int:
@@ -140,7 +144,12 @@ class BoundaryProcess:
     def call(self, octets: bytes) -> bytes:
         """One call. Raises OSError when nobody answers; an empty answer says that it is gone."""
         self._socket.send(octets)
-        return self._socket.recv(_ANSWER)
+        if octets[0] != LOAD:
+            return self._socket.recv(_ANSWER)
+        self._socket.settimeout(PATIENCE_S)
+        answer = self._socket.recv(_ANSWER)
+        self._socket.settimeout(ANSWER_S)
+        return answer
 
     def close(self) -> None:
         """Let it end: it does so when its socket is closed."""
@@ -167,10 +176,10 @@ class BoundaryProcess:
                 yield name, handle
                 os.pwrite(handle, data, 0)
         if link_key is not None:
-            with open_regular(link_key) as file:
+            with open_link_key(link_key) as file:
                 yield "--link-key", os.dup(file.fileno())
 
-    def _greeting(self) -> bytes:
+    def _greeting(self, link_key: Path | None) -> bytes:
         try:
             greeting = self._socket.recv(_ANSWER)
         except TimeoutError:
@@ -180,5 +189,7 @@ class BoundaryProcess:
         self._socket.close()
         self._process.kill()
         code = self._process.wait()
+        if link_key is not None and code == _NO_KEY:
+            raise no_link_key(link_key)
         text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
         raise BoundaryError({65: "untrusted", 78: "damaged"}.get(code, "not-begun"), text)

@@ -257,11 +257,14 @@ def _apart(
         if isinstance(loaded.preparation, PreparationIssuer):
             loaded.preparation.owes(owed)
         return loaded, None
-    apart = isolate(
-        bundle, loaded.vehicle, trust.root, trust.signed, order.state, clock.now(),
-        link_key=order.signing_key, own_key=own_key, user=order.boundary_user, paced=order.speed != 1,
-        settings=order.settings, owed=owed,
-    )  # fmt: skip
+    try:
+        apart = isolate(
+            bundle, loaded.vehicle, trust.root, trust.signed, order.state, clock.now(),
+            link_key=order.signing_key, own_key=own_key, user=order.boundary_user, paced=order.speed != 1,
+            settings=order.settings, owed=owed,
+        )  # fmt: skip
+    except LinkKeyError as error:
+        raise _of_link_key(error) from None
     stack.callback(apart.process.close)
     return apart.loaded, apart.process
 

@@ -20,6 +20,7 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, Measure, kept_file, program
+from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now, State
@@ -204,6 +205,42 @@ def test_what_it_kept_is_not_read_where_it_is_damaged(tmp_path: Path) -> None:
         Held(tmp_path)
 
 
+LINK_KEYS = {
+    "octets": bytes(range(32)), "digits": b"5a" * 32, "a line": b"5A" * 32 + b"\n", "spaces": b" 5a" * 32 + b" \r\n",
+    "nothing": b"", "short": b"5a" * 31, "long": b"5a" * 33, "an octet more": bytes(33), "no digits": b"5x" * 32,
+    "zeros": bytes(32), "zero digits": b"0" * 64, "something behind it": b"5a" * 32 + b"\n#",
+    "a split octet": b"5 a" * 32, "an odd digit": b"5a" * 32 + b"5", "a sign": b"+a" * 32,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", LINK_KEYS)
+def test_it_takes_the_key_files_that_a_run_without_it_takes(what: str, tmp_path: Path) -> None:
+    key = tmp_path / "link.key"
+    key.write_bytes(LINK_KEYS[what])
+    key.chmod(0o600)
+    try:
+        name, refused = fingerprint(read_link_key(key)), ""
+    except LinkKeyError as error:
+        name, refused = "", str(error)
+    if refused:
+        with pytest.raises(LinkKeyError) as raised:
+            Held(tmp_path, link_key=key)
+        assert (raised.value.slug, str(raised.value)) == ("malformed", refused)
+    else:
+        held = Held(tmp_path, link_key=key)
+        assert held.process.link_name is not None
+        assert held.process.link_name.hex() == name
+        held.process.close()
+
+
+def test_a_key_file_that_others_may_read_is_not_taken(tmp_path: Path) -> None:
+    key = tmp_path / "link.key"
+    key.write_bytes(LINK_KEYS["digits"])
+    key.chmod(0o640)
+    with pytest.raises(LinkKeyError, match="its mode is 0640"):
+        Held(tmp_path, link_key=key)
+
+
 def test_nonsense_is_answered_and_changes_nothing(held: Held) -> None:
     random = Random(5)
     request = encode(
@@ -248,6 +285,15 @@ def test_the_longest_statement_comes_whole(tmp_path: Path) -> None:
     kid = case.BOUNDARY_KEY.kid
     said = open_statement(signed, {kid: case.BOUNDARY_KEY.verification(vehicles=("*",))})
     assert len(said.marks) == MARK_BYTES * MOST_MARKS
+
+
+def test_one_that_stands_still_is_as_good_as_gone(held: Held) -> None:
+    os.kill(held.process.pid, signal.SIGSTOP)
+    begun_s = time.monotonic()
+    assert held.caller(ENFORCE, b"anything") is LOST
+    assert time.monotonic() - begun_s < 2
+    os.kill(held.process.pid, signal.SIGCONT)
+    assert held.caller(ENFORCE, b"anything") is LOST, "an answer that comes late is not taken for another's"
 
 
 def test_when_it_dies_nothing_more_leaves(held: Held) -> None:

@@ -15,7 +15,7 @@ import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 from urllib.parse import quote
 
 from rtshcua.adapters.store.reading import exposed, open_regular, read_if_there
@@ -41,11 +41,18 @@ class LinkKeyError(Exception):
         self.help = help
 
 
+def open_link_key(path: Path) -> BinaryIO:
+    """The file of a key, which its owner alone may read. Raises LinkKeyError and OSError."""
+    file = open_regular(path)
+    if why := exposed(file):
+        file.close()
+        raise LinkKeyError("exposed", f"others may read the key `{path}`: {why}", "`chmod 600`")
+    return file
+
+
 def read_link_key(path: Path) -> bytes:
-    """The key in a file that its owner alone may read. Raises LinkKeyError and OSError."""
-    with open_regular(path) as file:
-        if why := exposed(file):
-            raise LinkKeyError("exposed", f"others may read the key `{path}`: {why}", "`chmod 600`")
+    """The key in such a file. Raises LinkKeyError and OSError."""
+    with open_link_key(path) as file:
         data = file.read(_LONGEST)
     if len(data) != KEY_OCTETS:
         try:
@@ -53,9 +60,14 @@ def read_link_key(path: Path) -> bytes:
         except ValueError:
             data = b""
     if len(data) != KEY_OCTETS or not any(data):  # zeros switch signing off (SETUP_SIGNING)
-        what = f"{KEY_OCTETS} octets, or {2 * KEY_OCTETS} hexadecimal digits, not all 0"
-        raise LinkKeyError("malformed", f"`{path}` is no link key", f"{what}; `rtshcua keys link` makes one")
+        raise no_link_key(path)
     return data
+
+
+def no_link_key(path: Path) -> LinkKeyError:
+    """What a file says is no key."""
+    what = f"{KEY_OCTETS} octets, or {2 * KEY_OCTETS} hexadecimal digits, not all 0"
+    return LinkKeyError("malformed", f"`{path}` is no link key", f"{what}; `rtshcua keys link` makes one")
 
 
 def write_link_key(path: Path, key: bytes) -> None:

@@ -51,12 +51,11 @@ MISSING: Final = {
     Measure.SECRET_MEMORY: "memfd_secret: the kernel can read its keys (`secretmem.enable=1`)",
 }
 
-_NO_KEY: Final = 66
+_UNTRUSTED, _NO_KEY, _DAMAGED = 65, 66, 78
 _ENDED: Final = {
     64: "its command line is wrong",
-    65: "it does not trust the trust root",
+    _UNTRUSTED: "it does not trust the trust root",
     74: "its file cannot be read or written",
-    78: "what it kept is damaged",
 }
 
 
@@ -125,7 +124,7 @@ class BoundaryProcess:
                 os.close(handle)
         ours.settimeout(PATIENCE_S)
         self._socket = ours
-        greeting = self._greeting(link_key)
+        greeting = self._greeting(link_key, kept_file(state, vehicle))
         self.measures = Measure(int.from_bytes(greeting[:4], "little"))
         #: the name of the link's key
         self.link_name = greeting[4:] if link_key is not None else None
@@ -179,7 +178,7 @@ class BoundaryProcess:
             with open_link_key(link_key) as file:
                 yield "--link-key", os.dup(file.fileno())
 
-    def _greeting(self, link_key: Path | None) -> bytes:
+    def _greeting(self, link_key: Path | None, kept: Path) -> bytes:
         try:
             greeting = self._socket.recv(_ANSWER)
         except TimeoutError:
@@ -191,5 +190,8 @@ class BoundaryProcess:
         code = self._process.wait()
         if link_key is not None and code == _NO_KEY:
             raise no_link_key(link_key)
+        if code == _DAMAGED:
+            text = f"`{kept}` is damaged: which bundles the boundary has opened is not known"
+            raise BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
         text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
-        raise BoundaryError({65: "untrusted", 78: "damaged"}.get(code, "not-begun"), text)
+        raise BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text)

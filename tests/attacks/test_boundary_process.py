@@ -201,7 +201,7 @@ def test_what_it_kept_is_not_read_where_it_is_damaged(tmp_path: Path) -> None:
     Held(tmp_path).process.close()
     path = kept_file(tmp_path, VEHICLE)
     path.write_bytes(bytes(len(path.read_bytes())))
-    with pytest.raises(BoundaryError, match="damaged"):
+    with pytest.raises(BoundaryError, match=f"`{path}` is damaged"):
         Held(tmp_path)
 
 

@@ -152,11 +152,11 @@ void rt_test_replace(void) {
 }
 
 uint32_t rt_test_about(uint32_t step, const int64_t now[3], int64_t *out) {
-    rt_approval found[64];
+    static rt_approval found[RT_MAX_ANSWERS];
     rt_invocation invocation;
     rt_now moment = {now[0], now[1], now[2]};
     rt_invocation_at(&test_bundle.mission, step, &invocation);
-    uint32_t count = rt_answers_about(&test_approvals, &test_bundle.policy, &invocation, &moment, found, 64);
+    uint32_t count = rt_answers_about(&test_approvals, &invocation, &moment, found);
     memcpy(out, found, count * sizeof found[0]);
     return count;
 }

@@ -38,8 +38,10 @@ bool rt_step_authority(rt_case *one, rt_decision *decision) {
     return doubt == RT_NO_CLAUSE || rt_found(decision, RT_FORBID_UNKNOWN, rt_rule_number(invocation, (uint32_t)doubt));
 }
 
+static bool is_about(const rt_approval *answer, uint16_t rule) { return answer->rule == rule || answer->rule == RT_EVERY_RULE; }
+
 static bool in_time(const rt_approval *answer, uint16_t rule, int64_t role, int64_t end) {
-    return answer->rule == rule && answer->role == role && answer->monotonic_us <= end;
+    return is_about(answer, rule) && answer->role == role && answer->monotonic_us <= end;
 }
 
 /* When grants that came by `end` were enough, of one role or of two people: the earliest moment; false where none were. */
@@ -69,7 +71,7 @@ bool rt_step_confirmation(rt_case *one, rt_decision *decision) {
         int64_t end = context->released_us + rule->within_us;
         for (uint32_t i = 0; i < context->approval_count; i++) {
             const rt_approval *answer = &context->approvals[i];
-            if (answer->rule == number && !answer->granted && (answer->role == rule->approver || answer->role == rule->second))
+            if (is_about(answer, number) && !answer->granted && (answer->role == rule->approver || answer->role == rule->second))
                 return rt_found(decision, RT_APPROVAL_REFUSED, rt_rule_number(one->invocation, number));
         }
         if (granted(context, rule, number, end, &when)) one->released_us = rt_max(one->released_us, when);

@@ -63,8 +63,7 @@ static uint32_t answer_step(rt_boundary *boundary, rt_bytes request, uint8_t *ou
         asked->released_us, asked->phase, asked->remaining_us, boundary->approvals, 0,
     };
     const rt_in_force *in_force = &session->in_force;
-    context.approval_count = rt_answers_about(
-        &in_force->approvals, &in_force->bundle.policy, &step->invocation, &asked->now, boundary->approvals, RT_MAX_APPROVALS);
+    context.approval_count = rt_answers_about(&in_force->approvals, &step->invocation, &asked->now, boundary->approvals);
     rt_decide_step(session, asked->step, &asked->state, &context, &asked->now, &decision);
     chain_decided(boundary, request, &decision, context.consumed, decision.outcome == RT_ALLOW);
     const uint8_t *evidence = boundary->chain.digest;

@@ -16,9 +16,6 @@ typedef struct {
     uint8_t boundary[RT_KEY_BYTES]; /* the seed of its own signing key */
 } rt_keys;
 
-/* how many entries `decide` is told of approvals at most */
-#define RT_MAX_APPROVALS 4096
-
 /* What a boundary is given when it begins. */
 typedef struct {
     rt_keys *keys;
@@ -49,7 +46,7 @@ typedef struct {
     bool ahead_known;
     int64_t ahead_us;  /* UTC less monotonic time, as it was first told */
     rt_request asked;  /* the request that is being decided */
-    rt_approval approvals[RT_MAX_APPROVALS];
+    rt_approval approvals[RT_MAX_ANSWERS];
     uint8_t bundle[RT_MAX_BUNDLE];
     uint8_t documents[1 + RT_MAX_REPLACEMENTS][RT_MAX_DOCUMENT]; /* the replacements that are in force, and one that arrives */
     uint32_t document_count;

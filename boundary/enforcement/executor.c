@@ -156,7 +156,7 @@ static rt_refusal refuse(const rt_executor *executor, const rt_permit *permit, i
     rt_refusal refused = permit->kind == RT_STEP ? refuse_step(executor, permit) : refuse_link(executor, permit);
     if (refused != NULL)
         return refused;
-    if (executor->used_count == RT_MOST_DISPATCHED || !command_of(executor, permit, command))
+    if (executor->used_count == RT_MAX_DISPATCHED || !command_of(executor, permit, command))
         return "permit/not-covered";
     return NULL;
 }

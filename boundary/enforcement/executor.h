@@ -6,9 +6,6 @@
 #include "preparation.h"
 #include "wire/permit.h"
 
-/* how many permits may be dispatched in one session: more than any flight has, and what the table holds */
-#define RT_MOST_DISPATCHED 65536
-
 typedef struct {
     uint8_t key[RT_KEY_BYTES];
     const rt_policy *policy;
@@ -16,7 +13,7 @@ typedef struct {
     bool called_off;           /* no step may be sent any more */
     rt_gate gate;
     uint64_t first;            /* the least serial of this session: a boundary may load one bundle in the place of another */
-    uint64_t used[RT_MOST_DISPATCHED]; /* serials, ascending */
+    uint64_t used[RT_MAX_DISPATCHED]; /* serials, ascending */
     uint32_t used_count;
     uint8_t prepared[RT_MOST_PREPARATIONS / 8]; /* the serials of preparations that were begun */
     int64_t step; /* the last step that was sent, -1 before, */

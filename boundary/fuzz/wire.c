@@ -45,7 +45,7 @@ static void fly(rt_bytes data) {
         rt_flight flight = {&root, RT_TEXT("quad-07"), {flight_id, RT_FLIGHT_BYTES}, {0, utc_us, 0}, &bundle, (const uint8_t(*)[RT_DIGEST_BYTES])missions, mission_count, replaced, replaced_count};
         const rt_artefact *kind = NULL;
         rt_answered answered;
-        rt_approval told[8];
+        static rt_approval told[RT_MAX_ANSWERS];
         if (rt_kind_of(document, &kind) != NULL) continue;
         if (kind == &RT_APPROVAL && rt_open_approval(&flight, document, &answered) == NULL) rt_add_answer(&approvals, &answered, &flight.now);
         if (kind == &RT_RECALL) rt_open_recall(&flight, document, 0);
@@ -60,7 +60,7 @@ static void fly(rt_bytes data) {
         for (uint32_t step = 0; step < bundle.mission.invocation_count; step++) {
             rt_invocation invocation;
             rt_invocation_at(&bundle.mission, step, &invocation);
-            rt_answers_about(&approvals, &bundle.policy, &invocation, &flight.now, told, 8);
+            rt_answers_about(&approvals, &invocation, &flight.now, told);
         }
     }
 }

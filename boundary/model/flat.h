@@ -258,6 +258,8 @@ typedef struct {
     int64_t monotonic_us, utc_us, utc_error_us;
 } rt_now;
 
+/* An answer to one rule, or to each that asks its role (Python has an entry for each, and there may be 16,384 of them). */
+#define RT_EVERY_RULE (-1)
 typedef struct {
     int64_t rule, role, granted, monotonic_us, person;
 } rt_approval;

@@ -115,17 +115,14 @@ void rt_keep_answers(rt_approvals *approvals, const rt_mission *mission) {
     approvals->count = kept;
 }
 
-uint32_t rt_answers_about(const rt_approvals *approvals, const rt_policy *policy, const rt_invocation *invocation, const rt_now *now,
-                          rt_approval *out, uint32_t most) {
+uint32_t rt_answers_about(const rt_approvals *approvals, const rt_invocation *invocation, const rt_now *now, rt_approval *out) {
     uint8_t subjects[2][RT_DIGEST_BYTES];
     uint32_t count = 0;
     for (int64_t granted = 0; approvals->count > 0 && granted < 2; granted++) subject_of(invocation, granted, subjects[granted]);
     for (uint32_t at = 0; at < approvals->count; at++) {
         const rt_answered *held = &approvals->held[at];
         if (memcmp(held->subject, subjects[held->granted], RT_DIGEST_BYTES) != 0 || !counts(held, now)) continue;
-        for (uint32_t rule = 0; rule < policy->rule_count && count < most; rule++)
-            if (confirms(&policy->rules[rule], invocation, held->role))
-                out[count++] = (rt_approval){rule, held->role, held->granted, held->monotonic_us, held->person};
+        out[count++] = (rt_approval){RT_EVERY_RULE, held->role, held->granted, held->monotonic_us, held->person};
     }
     return count;
 }

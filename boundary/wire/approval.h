@@ -4,8 +4,6 @@
 
 #include "document.h"
 
-#define RT_MAX_ANSWERS 4096
-
 /* A verified answer. `subject` is what it is about: a grant is about one invocation, by its id; a refusal about whatever
    invocation asks for the same, by a digest of skill and arguments. `step` is the one in force that it counts for. */
 typedef struct {
@@ -28,8 +26,7 @@ rt_refusal rt_add_answer(rt_approvals *approvals, const rt_answered *answered, c
 /* These are the steps now. Grants of others are dropped; refusals stay. */
 void rt_keep_answers(rt_approvals *approvals, const rt_mission *mission);
 
-/* What `decide` is told: one entry for each answer that counts and each rule that it answers, at most `most`; how many. */
-uint32_t rt_answers_about(const rt_approvals *approvals, const rt_policy *policy, const rt_invocation *invocation, const rt_now *now,
-                          rt_approval *out, uint32_t most);
+/* What `decide` is told: of each answer that counts one entry, RT_EVERY_RULE, into `out` of RT_MAX_ANSWERS; how many. */
+uint32_t rt_answers_about(const rt_approvals *approvals, const rt_invocation *invocation, const rt_now *now, rt_approval *out);
 
 #endif

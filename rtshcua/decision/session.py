@@ -150,8 +150,7 @@ class InForce:
         step = answered.about.step
         if step < decided:
             raise DocumentError("already-decided", f"step {step} was decided before")
-        if not self._approvals.add(answered, now):
-            raise DocumentError("already-answered", f"step {step} has this answer already")
+        self._approvals.add(answered, now)
         what = "granted" if answered.granted else "refused"
         text = f"step {step} is {what} by `{policy.roles[answered.role]}`"
         return Receipt(APPROVAL, ACCEPTED, text, step, answered.role, answered.granted, answered.expires_us)

@@ -8,6 +8,7 @@ vehicle.
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
+from rtshcua.model.flat.limits import MAX_ANSWERS
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import Approval, Now
@@ -138,14 +139,17 @@ class Approvals:
         self._policy = policy
         self._answers: dict[_Subject, Answered] = {}
 
-    def add(self, answered: Answered, now: Now) -> bool:
-        """Take an answer in; False for one that is there already, which changes nothing."""
+    def add(self, answered: Answered, now: Now) -> None:
+        """Take an answer in. Raises `DocumentError`, and changes nothing, for one that is there already
+        (`already-answered`), and where as many are kept as fit (`too-many`).
+        """
         key = _subject(answered.about, answered)
         held = self._answers.get(key)
         if held is not None and _counts(held, now):
-            return False
+            raise DocumentError("already-answered", f"step {answered.about.step} has this answer already")
+        if held is None and len(self._answers) == MAX_ANSWERS:
+            raise DocumentError("too-many", f"one flight takes at most {MAX_ANSWERS} answers")
         self._answers[key] = answered
-        return True
 
     def keep(self, invocations: tuple[Invocation, ...]) -> None:
         """These are the steps now. Grants of others are dropped; refusals stay."""

@@ -40,3 +40,5 @@ MAX_GAP = 1_000_000  # us: when more time passes between two observations, what 
 MAX_PHASE_NAMES = 64
 MAX_KEYS = 512  # in a trust root
 MAX_REVOKED = 4_096  # keys that a trust root revokes
+MAX_ANSWERS = 4_096  # approvals and refusals of people that one flight keeps
+MAX_DISPATCHED = 65_536  # permits that one session dispatches

@@ -3,9 +3,9 @@
 What a permit's kind, step and link stand for is looked up in `Commands`, made from verified parts alone. The executor
 checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing permit's step is
 still the one that flies; that a step waits for its turn, and never follows a recall, or a return or a landing that a
-fallback began;
-and that chains go forward only. A standing permit is good for each of its links once, and for the contingency's last
-`AGAIN` times more. What it sends, and what it refuses, it chains (`wire.boundary_chain`).
+fallback began; that chains go forward only; and that fewer than `MAX_DISPATCHED` were sent. A standing permit is good
+for each of its links once, and for the contingency's last `AGAIN` times more. What it sends, and what it refuses, it
+chains (`wire.boundary_chain`).
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
+from rtshcua.model.flat.limits import MAX_DISPATCHED
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
@@ -238,7 +239,10 @@ class Executor:
             return USED
         if now_us > permit.not_after_us:
             return LATE
-        return self._refuse_step(permit) if permit.kind == STEP else self._refuse_link(permit)
+        refusal = self._refuse_step(permit) if permit.kind == STEP else self._refuse_link(permit)
+        if refusal is None and len(self._used) == MAX_DISPATCHED:
+            return NOT_COVERED
+        return refusal
 
     def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | Refusal:
         refusal = self._refuse(permit, now_us)

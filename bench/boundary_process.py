@@ -102,7 +102,7 @@ def requests(folder: Path) -> bool:
             for _ in range(ROUNDS):
                 steps[0][block].append(asked(renewed(software).boundary, step)[1])
                 # nothing of it was sent, so it may be loaded again
-                assert isinstance(caller.load(bundle, START), tuple)
+                assert isinstance(caller.load(bundle, START), bytes)
                 sleep(PAUSE_S)
                 steps[1][block].append(asked(apart.boundary, step)[1])
         for _ in range(BLOCKS):

@@ -56,7 +56,7 @@ typedef struct {
     uint8_t before[RT_DIGEST_BYTES];
     bool answered; /* the last answer about a step, as far as one that equals it is counted */
     int64_t last[5];
-    uint64_t flights; /* how many ids were drawn */
+    uint64_t flights; /* how many began */
     uint32_t bundle_size, document_size; /* how much was handed over, of either */
 } rt_boundary;
 

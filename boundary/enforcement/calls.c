@@ -93,11 +93,10 @@ static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_byte
     return NULL;
 }
 
-/* Nobody can tell the id of a flight ahead, nor give it one that was flown before. */
-static void draw_flight(rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BYTES]) {
+/* The id of the flight that begins next: nobody gives it one that was flown before. */
+static void next_flight(const rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BYTES]) {
     static const uint8_t domain[] = "rtshcua/flight";
     uint8_t digest[RT_DIGEST_BYTES], count[8];
-    boundary->flights++;
     for (uint32_t octet = 0; octet < 8; octet++) count[octet] = (uint8_t)(boundary->flights >> 8 * octet & 0xFF);
     const rt_bytes parts[] = {{domain, sizeof domain}, {count, sizeof count}};
     rt_hmac_sha256((rt_bytes){boundary->keys->session, RT_KEY_BYTES}, parts, 2, digest);
@@ -106,9 +105,10 @@ static void draw_flight(rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BYTES]) 
 
 static uint32_t load(rt_boundary *boundary, const rt_now *now, uint8_t *out) {
     rt_refusal refused;
-    draw_flight(boundary, out + 1);
+    next_flight(boundary, out + 1);
     refused = rt_load(boundary, out + 1, now);
     if (refused != NULL) return refuse(refused, out);
+    boundary->flights++;
     out[0] = 0;
     out[1 + RT_FLIGHT_BYTES] = boundary->opened ? 1 : 0;
     return 2 + RT_FLIGHT_BYTES;
@@ -251,6 +251,11 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
     case RT_CALL_STATEMENT:
         size = rt_attested(boundary, take(&left, 1) != 0, out + 1);
         refused = size > 0 ? NULL : "no-boundary-key";
+        break;
+    case RT_CALL_FLIGHT:
+        next_flight(boundary, out + 1);
+        size = RT_FLIGHT_BYTES;
+        refused = NULL;
         break;
     case RT_CALL_DIGEST:
         memcpy(out + 1, boundary->chain.digest, RT_DIGEST_BYTES);

@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.isolated import Caller
+from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.onboard.enforcement.isolated import Caller, IsolatedExecutor, IsolatedGate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed
 from rtshcua.wire import cose
@@ -21,39 +23,69 @@ from rtshcua.wire.trust import MAX_ROOT, TrustRoot
 _CODES = {"in-use": ExitCode.REFUSED, "damaged": ExitCode.INPUT, "untrusted": ExitCode.UNTRUSTED}
 
 
-class Isolated(NamedTuple):
-    """A bundle in force in a boundary that runs apart, and that process."""
+class Apart:
+    """The boundary of one run that runs apart, under one trust root, until `close`. Raises `Refused`, and OSError."""
 
-    loaded: Loaded
-    process: BoundaryProcess
+    def __init__(
+        self, vehicle: str, root: TrustRoot, signed_root: bytes, state: Path, *,
+        link_key: Path | None, own_key: SigningKey | None, user: tuple[int, int] | None, paced: bool,
+        settings: Mapping[str, int], owed: Mapping[str, Owed],
+    ) -> None:  # fmt: skip
+        self._vehicle, self._root, self._settings = vehicle, root, settings
+        pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
+        try:
+            seed = None if own_key is None else own_key.private.private_bytes_raw()
+            self.process = BoundaryProcess(
+                signed_root, pinned, vehicle, state, link_key=link_key, own_seed=seed, user=user, paced=paced,
+                settings=_listed({name: Owed(0, value) for name, value in settings.items()}), owed=_listed(owed),
+            )  # fmt: skip
+        except BoundaryError as error:
+            code = _CODES.get(error.slug, ExitCode.REFUSED)
+            raise Refused(code, f"boundary-{error.slug}", str(error), error.help) from None
+        self._caller = Caller(self.process.call, signs=link_key is not None)
 
+    @property
+    def root(self) -> TrustRoot:
+        """What it trusts."""
+        return self._root
 
-def isolate(
-    bundle: bytes, vehicle: str, root: TrustRoot, signed_root: bytes, state: Path, now: Now, *,
-    link_key: Path | None, own_key: SigningKey | None, user: tuple[int, int] | None, paced: bool,
-    settings: Mapping[str, int], owed: Mapping[str, Owed],
-) -> Isolated:  # fmt: skip
-    """Begin a boundary for a vehicle, and have it open the bundle. Raises `Refused`, and OSError."""
-    pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
-    try:
-        seed = None if own_key is None else own_key.private.private_bytes_raw()
-        process = BoundaryProcess(
-            signed_root, pinned, vehicle, state, link_key=link_key, own_seed=seed, user=user, paced=paced,
-            settings=_listed({name: Owed(0, value) for name, value in settings.items()}), owed=_listed(owed),
+    def flight(self) -> bytes:
+        """The id of the flight that begins next."""
+        answer = self._caller.flight()
+        self.expect()
+        assert isinstance(answer, bytes)
+        return answer
+
+    def waiting(self, base: Loaded) -> Loaded:
+        """What is waited with, in this process: what leaves meanwhile, leaves by the boundary."""
+        commands = Commands(base.bundle.policy, base.bundle.mission)
+        executor = IsolatedExecutor(self._caller, commands, IsolatedGate(self._caller, signs=self._caller.signs))
+        return replace(base, executor=executor, mode=Mode.PROCESS)
+
+    def load(self, bundle: bytes, now: Now) -> Loaded | Refusal:
+        """Have it open a bundle, in place of the one before."""
+        loaded = load(
+            bundle, root=self._root, vehicle=self._vehicle, now=now, mode=Mode.PROCESS,
+            session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=False,
+            settings=self._settings, caller=self._caller,
         )  # fmt: skip
-    except BoundaryError as error:
-        code = _CODES.get(error.slug, ExitCode.REFUSED)
-        raise Refused(code, f"boundary-{error.slug}", str(error), error.help) from None
-    loaded = load(
-        bundle, root=root, vehicle=vehicle, now=now, mode=Mode.PROCESS, session_key=bytes(SESSION_KEY_BYTES),
-        flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=False, settings=settings,
-        caller=Caller(process.call, signs=link_key is not None),
-    )  # fmt: skip
-    if isinstance(loaded, Refusal):
-        process.close()
-        text = f"the boundary's process refuses the bundle: {loaded.text} ({loaded.slug})"
-        raise Refused(ExitCode.REFUSED, f"boundary-{loaded.slug}", text, loaded.help)
-    return Isolated(loaded, process)
+        if isinstance(loaded, Refusal):
+            text = f"the boundary's process refuses the bundle: {loaded.text} ({loaded.slug})"
+            return Refusal(f"boundary-{loaded.slug}", text, loaded.help)
+        return loaded
+
+    def admit(self, bundle: bytes, now: Now) -> Loaded | Refusal:
+        """Have it open a bundle that nothing flies of yet, in place of the one before."""
+        loaded = self.load(bundle, now)
+        if not isinstance(loaded, Refusal) and self._caller.reopened:
+            text = f"the boundary's process opened this bundle before on `{self._vehicle}`: a bundle flies once"
+            return Refusal("boundary-replayed", text, "compile the mission again, which issues it anew")
+        return loaded
+
+    def expect(self) -> None:
+        """Raises `Refused` once it is gone: nothing more leaves then."""
+        if self._caller.lost:
+            raise Refused(ExitCode.REFUSED, "boundary-lost", "the boundary's process is gone: nothing more is sent")
 
 
 def _listed(parameters: Mapping[str, Owed]) -> bytes | None:

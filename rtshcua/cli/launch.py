@@ -7,9 +7,8 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import gettempdir
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from rtshcua.adapters.boundary_process import BoundaryProcess
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.keystore import KeyStore
@@ -33,7 +32,7 @@ from rtshcua.cli.configured import would_set
 from rtshcua.cli.faults import code_of, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
-from rtshcua.cli.isolating import isolate
+from rtshcua.cli.isolating import Apart
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
@@ -72,6 +71,8 @@ if TYPE_CHECKING:
 #: up to this many times as fast as life, a real vehicle's time limits leave the machine enough
 _UNHURRIED = 5
 
+#: the mode of what is decided in this process, of the mode that was asked for
+_HERE = {Mode.PROCESS: Mode.SOFTWARE}
 _LOOPBACK = "127.0.0.1"
 _TOO_SLOW = "a faster link, or longer deadlines and times to stale in the policy; docs/flying/link.md counts octets"
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
@@ -156,16 +157,9 @@ def launch(order: Launch) -> ExitCode:
             debts = OwedParameters(order.state, loaded.vehicle, sets=sets)
             stack.callback(debts.close)
             slack = max(1, round(order.speed / _UNHURRIED))
-            transport, agents = None, None
-            if order.wait_s is not None:
-                transport, agents = _stand_by(order, loaded, stack)
-                (bundle, loaded), trust = _wait(
-                    order, loaded, trust, log_kid, past, clock, interrupts, slack, transport, agents
-                )
+            begun = _begin(order, bundle, loaded, trust, log_kid, past, debts.left, clock, interrupts, slack, stack)
+            bundle, loaded, trust, (own_key, keyless), apart, transport, agents = begun
             root, signed_root = trust.root, trust.signed
-            own_key, keyless = _boundary_key(order, root, loaded, clock)
-            _expect_boundary_key(keyless, resumed=not order.dry_run)
-            loaded, apart = _apart(order, loaded, bundle, trust, own_key, debts.left, clock, stack)
             signing = _sign(order, loaded, clock, apart)
             stack.callback(signing.close)
             _hear(order, loaded, signing)
@@ -246,27 +240,72 @@ def launch(order: Launch) -> ExitCode:
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
 
 
+class _Begun(NamedTuple):
+    """What flies: its bundle, in force; under what it is trusted; the key that the boundary signs with, or why there is
+    none; the boundary, where it runs apart. A run that waited has its link and its sockets already.
+    """
+
+    bundle: bytes
+    loaded: Loaded
+    trust: Trusted
+    key: tuple[SigningKey | None, Refused | None]
+    apart: Apart | None
+    transport: Transport | None = None
+    agents: Agents | None = None
+
+
+def _begin(
+    order: Launch, bundle: bytes, loaded: Loaded, trust: Trusted, log_key: bytes, past: Past | None,
+    owed: Mapping[str, Owed], clock: LinkClock, interrupts: Interrupts, slack: int, stack: ExitStack,
+) -> _Begun:  # fmt: skip
+    """The boundary begins, until the stack is closed, and takes the bundle, or one that is waited for. Raises `Refused`
+    and OSError.
+    """
+    key = _boundary_key(order, trust.root, loaded, clock)
+    _expect_boundary_key(key[1], resumed=not order.dry_run)
+    apart = _apart(order, loaded, trust, key[0], owed, stack)
+    if order.wait_s is None:
+        begun = _Begun(bundle, _taken_over(apart, loaded, bundle, clock), trust, key, apart)
+    else:
+        if apart is not None:  # it draws the id of the flight that the sockets tell of
+            loaded = apart.waiting(_load(order, bundle, trust.root, clock.now(), apart.flight()))
+        transport, agents = _stand_by(order, loaded, stack)
+        (bundle, loaded), waited = _wait(
+            order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents, apart
+        )
+        key = key if waited is trust else _boundary_key(order, waited.root, loaded, clock)
+        begun = _Begun(bundle, loaded, waited, key, apart, transport, agents)
+    if isinstance(begun.loaded.preparation, PreparationIssuer):  # the one elsewhere was told when it began
+        begun.loaded.preparation.owes(owed)
+    return begun
+
+
 def _apart(
-    order: Launch, loaded: Loaded, bundle: bytes, trust: Trusted, own_key: SigningKey | None, owed: Mapping[str, Owed],
-    clock: LinkClock, stack: ExitStack,
-) -> tuple[Loaded, BoundaryProcess | None]:  # fmt: skip
-    """The bundle in force in a boundary that runs apart, where that is asked for, until the stack is closed. What may
-    have expired is brought down by the one in this process, which does not ask. Raises `Refused` and OSError.
+    order: Launch, loaded: Loaded, trust: Trusted, own_key: SigningKey | None, owed: Mapping[str, Owed],
+    stack: ExitStack,
+) -> Apart | None:  # fmt: skip
+    """A boundary that runs apart, where that is asked for, until the stack is closed. What may have expired is brought
+    down by the one in this process, which does not ask. Raises `Refused` and OSError.
     """
     if order.mode is not Mode.PROCESS or order.dry_run or trust.distrust is not None:
-        if isinstance(loaded.preparation, PreparationIssuer):
-            loaded.preparation.owes(owed)
-        return loaded, None
+        return None
     try:
-        apart = isolate(
-            bundle, loaded.vehicle, trust.root, trust.signed, order.state, clock.now(),
-            link_key=order.signing_key, own_key=own_key, user=order.boundary_user, paced=order.speed != 1,
-            settings=order.settings, owed=owed,
+        apart = Apart(
+            loaded.vehicle, trust.root, trust.signed, order.state, link_key=order.signing_key, own_key=own_key,
+            user=order.boundary_user, paced=order.speed != 1, settings=order.settings, owed=owed,
         )  # fmt: skip
     except LinkKeyError as error:
         raise _of_link_key(error) from None
     stack.callback(apart.process.close)
-    return apart.loaded, apart.process
+    return apart
+
+
+def _taken_over(apart: Apart | None, loaded: Loaded, bundle: bytes, clock: LinkClock) -> Loaded:
+    """The bundle in force where decisions are made. Raises `Refused`."""
+    taken = loaded if apart is None else apart.load(bundle, clock.now())
+    if isinstance(taken, Refusal):
+        raise Refused(ExitCode.REFUSED, taken.slug, taken.text, taken.help)
+    return taken
 
 
 def _boundary_key(
@@ -343,14 +382,14 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
 
 def _wait(
     order: Launch, base: Loaded, trusted: Trusted, log_key: bytes, past: Past | None, clock: LinkClock,
-    interrupts: Interrupts, slack: int, transport: Transport, agents: Agents,
+    interrupts: Interrupts, slack: int, transport: Transport, agents: Agents, apart: Apart | None,
 ) -> tuple[Admitted, Trusted]:  # fmt: skip
     """Wait, connected, for the bundle that flies, and under what it is trusted; the one of a flight that broke off in
     the air is not waited for. Raises `Refused`.
     """
     assert order.wait_s is not None
     with ExitStack() as stack:
-        signing = _sign(order, base, clock)
+        signing = _sign(order, base, clock, apart)
         stack.callback(signing.close)
         driver = _driver(replace(order, fence=False), base, slack, signing)
         vehicle = ConnectedVehicle(transport, driver, clock, lambda at_us, frame: None)
@@ -359,8 +398,11 @@ def _wait(
         events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
         broken_off = None if past is None else _broken_off(order, past, base, vehicle, clock, events)
         if broken_off is not None:
-            agents.fly(broken_off[0].loaded)
-            return broken_off
+            (data, loaded), under = broken_off
+            same = apart if under.root == trusted.root and under.distrust is None else None  # it has the one root
+            admitted = Admitted(data, _taken_over(same, loaded, data, clock))
+            agents.fly(admitted.loaded)
+            return admitted, under
         if trusted.distrust is not None:  # what it is not enough for is to fly anything new
             raise trusted.distrust
         notes = list(signing.notes)
@@ -373,10 +415,15 @@ def _wait(
 
         def admit(data: bytes) -> Loaded | Refusal:
             trusted.expect_latest()  # a key of it may be revoked: whoever waits for long enough flies under no old root
-            return _admit(order, data, base, trusted, log_key, signing, clock)
+            return _admit(order, data, base, trusted, log_key, signing, clock, apart)
+
+        def expect() -> None:
+            trusted.expect_latest()
+            if apart is not None:
+                apart.expect()
 
         waiting = Waiting(
-            base, admit, trusted.expect_latest, vehicle, clock, interrupts, agents,
+            base, admit, expect, vehicle, clock, interrupts, agents,
             most_s=order.wait_s, as_json=order.style == "json", notes=notes,
         )  # fmt: skip
         return waiting.follow(events), trusted
@@ -400,10 +447,11 @@ def _broken_off(
 
 
 def _admit(
-    order: Launch, data: bytes, base: Loaded, trusted: Trusted, log_key: bytes, signing: Signing, clock: LinkClock
-) -> Loaded | Refusal:
+    order: Launch, data: bytes, base: Loaded, trusted: Trusted, log_key: bytes, signing: Signing, clock: LinkClock,
+    apart: Apart | None = None,
+) -> Loaded | Refusal:  # fmt: skip
     """What `run` asks of a bundle before it connects, of one that was handed in; and that its policy is the one that is
-    waited under. It flies as the flight that the sockets tell of.
+    waited under; and that the boundary takes it. It flies as the flight that the sockets tell of.
     """
     try:
         loaded = _load(order, data, trusted.root, clock.now(), base.in_force.flight)
@@ -420,7 +468,8 @@ def _admit(
         _hear(order, loaded, signing)
     except Refused as refused:
         return Refusal(refused.slug, str(refused), refused.help or "")
-    return not_opened(order.state, loaded) or loaded
+    refusal = not_opened(order.state, loaded)
+    return refusal or (loaded if apart is None else apart.admit(data, clock.now()))
 
 
 def _hold(incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterable[bytes], feed: Feed) -> ExitCode:
@@ -568,7 +617,7 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now, flight: bytes
         except Untrusted as error:
             raise Refused(code_of(error.slug), *untrusted(error)) from None
     loaded = load(
-        bundle, root=root, vehicle=identity, now=now, mode=order.mode,
+        bundle, root=root, vehicle=identity, now=now, mode=_HERE.get(order.mode, order.mode),
         session_key=secrets.token_bytes(SESSION_KEY_BYTES), flight=flight or secrets.token_bytes(FLIGHT_BYTES),
         peer_is_own_simulator=order.link is None, settings=order.settings,
     )  # fmt: skip
@@ -579,19 +628,20 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now, flight: bytes
     return loaded
 
 
-def _sign(order: Launch, loaded: Loaded, clock: LinkClock, apart: BoundaryProcess | None = None) -> Signing:
+def _sign(order: Launch, loaded: Loaded, clock: LinkClock, apart: Apart | None = None) -> Signing:
+    """What signs the link; where the boundary that decides runs apart, that one, and its key is not read here."""
+    gate = loaded.executor.frames
+    elsewhere = apart.process if apart is not None and isinstance(gate, IsolatedGate) else None
     try:
         signing = Signing(
-            None if apart is not None else order.signing_key, loaded.bundle.policy, loaded.executor.frames,
-            order.state, clock, unsigned_radio=order.unsigned_radio, even_damaged=not order.dry_run,
+            order.signing_key if elsewhere is None else None, loaded.bundle.policy, gate, order.state, clock,
+            unsigned_radio=order.unsigned_radio, even_damaged=not order.dry_run,
         )  # fmt: skip
-        if apart is not None:
-            signing.notes += [f"the boundary runs without {text}" for text in apart.missing]
-            if apart.link_name is not None:
-                assert isinstance(loaded.executor.frames, IsolatedGate)
-                signing.elsewhere(
-                    apart.link_name, loaded.executor.frames, loaded.bundle.policy, unsigned_radio=order.unsigned_radio
-                )
+        if elsewhere is not None and isinstance(gate, IsolatedGate):
+            signing.notes += [f"the boundary runs without {text}" for text in elsewhere.missing]
+            if elsewhere.link_name is not None:
+                policy, radio = loaded.bundle.policy, order.unsigned_radio
+                signing.elsewhere(elsewhere.link_name, gate, policy, unsigned_radio=radio)
     except LinkKeyError as error:
         raise _of_link_key(error) from None
     if order.signing_key is None and order.link is not None and not order.link.is_loopback:

@@ -133,7 +133,7 @@ def run(
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
-    user = _boundary_user(boundary_user, mode, waits=wait)
+    user = _boundary_user(boundary_user, mode)
     group = _group(agent_socket, operator_socket, agent_group)
     if isinstance(user, str) or isinstance(group, str):
         return fail(ExitCode.USAGE, user if isinstance(user, str) else str(group))
@@ -229,12 +229,10 @@ def _misplaced(*, wait: bool, timed: bool, socket: bool, never: bool) -> str | N
     return None
 
 
-def _boundary_user(name: str | None, mode: Mode, *, waits: bool) -> tuple[int, int] | str | None:
+def _boundary_user(name: str | None, mode: Mode) -> tuple[int, int] | str | None:
     """The ids of the user and group that the boundary's process runs as; what is wrong, in words."""
     if mode is not Mode.PROCESS:
         return None if name is None else "`--boundary-user` goes with `--mode process`"
-    if waits:
-        return "`--mode process` does not go with `--wait` yet: that needs `--mode software`"
     if name is None:
         return None
     try:

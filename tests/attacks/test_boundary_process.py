@@ -185,6 +185,23 @@ def test_a_bundle_flies_once_whatever_the_runtime_says(tmp_path: Path) -> None:
     again.process.close()
 
 
+def test_what_leaves_while_nothing_is_in_force_is_the_same_process(tmp_path: Path) -> None:
+    """It lets out a greeting, and the id of its next flight is known; a bundle that it refuses changes neither."""
+    made = Held(tmp_path)
+    at = struct.pack(">q", now().monotonic_us)
+    assert made.caller.flight() == made.caller.flight()
+    ahead = made.caller.flight()
+    refused = made.caller.load(made.bundle[:-1], now())
+    assert isinstance(refused, Refusal)
+    greeting = Codec(1, 191).pack(m.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+    assert made.caller(SEAL, at, greeting) == greeting
+    answer = made.caller(SEAL, at, armed_frame())
+    assert isinstance(answer, Refusal)
+    assert made.load().in_force.flight == ahead
+    assert made.caller.flight() != ahead
+    made.process.close()
+
+
 def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) -> None:
     """By the next process, and by this one, which then has forgotten what it decided."""
     first = Held(tmp_path)

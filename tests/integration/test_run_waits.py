@@ -10,12 +10,15 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import hand_in
+from rtshcua.adapters.boundary_process import program
 from rtshcua.adapters.files.roots import opened
 from rtshcua.wire.keys import Duty
 from virtual import case
 
 #: so slow that a busy machine's hold-ups stay below what a permit lasts
 SPEED = 3
+#: one boundary over the waiting and the flight, which has the link's key, where there is a program of it
+APART = () if program() is None else ("--mode", "process")
 
 
 @pytest.fixture
@@ -26,10 +29,14 @@ def place() -> Iterator[Path]:
 
 
 def test_what_is_handed_in_flies_once(ground: Any, place: Path) -> None:
-    words = ("--wait", "--agent-socket", str(place))
+    words = ("--wait", "--agent-socket", str(place), *APART)
+    key = ground.folder / "link.key"
+    key.write_text("5a" * 32 + "\n")
+    key.chmod(0o600)
     base, other = ground.bundle(), ground.bundle(name="other", return_mm=case.LOW + 5 * case.M)
     handed = ground.bundle(name="handed")
-    run = ground.run(base, *words, "--wait-for", "4min")
+    signed = ("--signing-key", str(key), "--unsigned-radio")
+    run = ground.run(base, *words, *signed, "--wait-for", "4min")
     run.until("waiting")
     assert not (ground.folder / "runs").exists(), "nothing is recorded before something flies"
     assert hand_in(place, (ground.folder / other).read_bytes()).slug == "other-policy"
@@ -47,6 +54,15 @@ def test_what_is_handed_in_flies_once(ground: Any, place: Path) -> None:
     said = hand_in(place, (ground.folder / handed).read_bytes())
     assert said.slug == "replayed", said
     assert again.end().code == 5, again.stderr
+    if program() is None:
+        return
+    for marker in Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("replay/vehicle-quad-07/*"):
+        marker.unlink()
+    forgetful = ground.run(base, *words, "--wait-for", "8s")
+    forgetful.until("waiting")
+    said = hand_in(place, (ground.folder / handed).read_bytes())
+    assert said.slug == "boundary-replayed", "what the run forgot, the boundary did not"
+    assert forgetful.end().code == 5, forgetful.stderr
 
 
 def test_ctrl_c_ends_the_wait(ground: Any, place: Path) -> None:

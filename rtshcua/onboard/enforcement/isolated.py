@@ -35,8 +35,8 @@ Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
-    PERMIT, PREPARE, PREPARED, STANDS, AHEAD,
-) = range(1, 20)  # fmt: skip
+    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT,
+) = range(1, 21)  # fmt: skip
 #: octets of a bundle or a document that go in one call
 MAX_PART: Final = 60_000
 
@@ -70,6 +70,8 @@ class Caller:
         self.signs = signs
         #: whether the boundary is gone
         self.lost = False
+        #: whether the mission that was loaded last had been opened before: then no step of it may begin
+        self.reopened = False
 
     def __call__(self, kind: int, *parts: bytes) -> bytes | Refusal:
         """What a call gives back, or why it is refused."""
@@ -99,15 +101,21 @@ class Caller:
                 return answer
         return None
 
-    def load(self, bundle: bytes, now: Now) -> tuple[bytes, bool] | Refusal:
-        """Hand a bundle over: the id of its flight, which the boundary draws, and whether its mission was opened
-        before: then no step of it may begin.
-        """
+    def load(self, bundle: bytes, now: Now) -> bytes | Refusal:
+        """Hand a bundle over: the id of its flight, which the boundary draws."""
         refused = self.put(LOAD, bundle)
         answer = refused or self(LOAD, _SIZED.pack(*_times(now), len(bundle)))
         if isinstance(answer, Refusal):
             return answer
-        return (answer[:-1], bool(answer[-1])) if len(answer) == FLIGHT_BYTES + 1 else self.lose()
+        if len(answer) != FLIGHT_BYTES + 1:
+            return self.lose()
+        self.reopened = bool(answer[-1])
+        return answer[:-1]
+
+    def flight(self) -> bytes | Refusal:
+        """The id of the flight that the next bundle begins."""
+        answer = self(FLIGHT)
+        return answer if isinstance(answer, Refusal) or len(answer) == FLIGHT_BYTES else self.lose()
 
 
 def _times(now: Now) -> tuple[int, int, int]:

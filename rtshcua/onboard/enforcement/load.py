@@ -125,13 +125,12 @@ def load(
         issuer = PreparationIssuer(session_key, settings, owed)
         in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
         return session(in_force, policy, vehicle, mode, session_key, issuer, bundle=bundle)
-    answer = caller.load(bundle, now)
-    if isinstance(answer, Refusal):
-        return answer
-    drawn, reopened = answer
+    drawn = caller.load(bundle, now)
+    if isinstance(drawn, Refusal):
+        return drawn
     in_force = InForce(opened, policy, invocations, root, vehicle, drawn, now.monotonic_us)
     commands = Commands(policy.policy, opened.mission)
-    commands.called_off = reopened
+    commands.called_off = caller.reopened
     boundary = IsolatedBoundary(caller, in_force, commands)
     executor = IsolatedExecutor(caller, commands, IsolatedGate(caller, signs=caller.signs))
     settable = IsolatedIssuer(caller, settings)

@@ -7,20 +7,6 @@
 #define RT_NO_KIND 255
 #define RT_SECOND 1000000LL
 
-static inline int64_t rt_min(int64_t a, int64_t b) { return a < b ? a : b; }
-static inline int64_t rt_max(int64_t a, int64_t b) { return a > b ? a : b; }
-static inline int64_t rt_abs(int64_t a) { return a < 0 ? -a : a; }
-static inline bool rt_within(int64_t value, int64_t low, int64_t high) { return low <= value && value <= high; }
-/* Division that rounds down, and its remainder, which is not negative; `by` is above 0. */
-static inline int64_t rt_floor(int64_t a, int64_t by) { return a / by - (a % by < 0); }
-static inline int64_t rt_modulo(int64_t a, int64_t by) { return a % by < 0 ? a % by + by : a % by; }
-
-/* Whether two lists have the same items: each has one encoding. */
-static inline bool rt_same_list(rt_list one, rt_list other) {
-    return one.count == other.count &&
-           rt_same((rt_bytes){one.at, (uint32_t)(one.end - one.at)}, (rt_bytes){other.at, (uint32_t)(other.end - other.at)});
-}
-
 /* values.py: an abstract truth is a mask of RT_TRUE, RT_FALSE, RT_UNKNOWN, never empty */
 typedef unsigned rt_truth;
 #define RT_MIXED (RT_TRUE | RT_FALSE)

@@ -65,7 +65,7 @@ static bool is_named(const rt_frame *frame, const char *name) {
 bool rt_is_of_fence(const rt_frame *frame, bool types_known, uint32_t types) {
     const uint8_t *payload = frame->payload;
     uint16_t number;
-    int64_t before;
+    int64_t before = 0;
     switch (frame->message) {
     case RT_MSG_PARAM_SET:
         if (is_named(frame, "FENCE_ENABLE"))
@@ -115,7 +115,7 @@ bool rt_is_forced_arming(const rt_frame *frame) {
 }
 
 static bool is_about(uint32_t metres, int64_t millimetres, int64_t within) {
-    int64_t found;
+    int64_t found = 0;
     if (!rt_thousandfold(metres, &found))
         return false;
     return found - millimetres <= within && millimetres - found <= within;
@@ -129,7 +129,7 @@ static bool is_speed(uint32_t metres_per_second, const rt_command *command) {
 
 static bool is_point(rt_point there, const rt_command *command) {
     rt_point point;
-    for (int64_t at = 0; rt_point_at(command, at, &point.latitude, &point.longitude); at++)
+    for (int64_t at = 0; at < RT_MAX_PATH && rt_point_at(command, at, &point.latitude, &point.longitude); at++)
         if (point.latitude == there.latitude && point.longitude == there.longitude)
             return true;
     return false;
@@ -244,16 +244,11 @@ bool rt_point_of(const rt_frame *frame, rt_point *point) {
 }
 
 bool rt_is_near(rt_point here, rt_point point) {
-    /* latitudes are whatever 32 bits say: north has 33 bits, its square 66 but for the bound below */
     int64_t north = here.latitude - point.latitude;
-    int64_t thousandths = (point.latitude < 0 ? -point.latitude : point.latitude) / 10000;
-    int64_t square = thousandths * thousandths;
-    int64_t cosine = (180000LL * 180000 - 4 * square) * (1LL << RT_SHIFT);
-    int64_t by = 180000LL * 180000 + square;
-    cosine = cosine >= 0 ? cosine / by : -((by - 1 - cosine) / by); /* rounded down, as Python divides */
-    int64_t east = (rt_meridian(here.longitude, point.longitude) - point.longitude) * cosine;
-    east = east >= 0 ? east >> RT_SHIFT : -((-east + (1LL << RT_SHIFT) - 1) >> RT_SHIFT);
-    if (north < -NEAR || north > NEAR || east < -NEAR || east > NEAR)
-        return false;
-    return north * north + east * east <= NEAR * NEAR;
+    if (!rt_within(north, -NEAR, NEAR)) return false;
+    /* The latitude of `point`, which is near that of `here`, so within 32 bits, and this within 2**23. */
+    int64_t thousandths = rt_abs(here.latitude - north) / 10000, square = thousandths * thousandths;
+    int64_t cosine = rt_floor((180000LL * 180000 - 4 * square) * (1LL << RT_SHIFT), 180000LL * 180000 + square);
+    int64_t east = rt_floor(rt_east_of(here.longitude, point.longitude) * cosine, 1LL << RT_SHIFT);
+    return rt_within(east, -NEAR, NEAR) && north * north + east * east <= NEAR * NEAR;
 }

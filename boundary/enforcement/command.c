@@ -1,22 +1,16 @@
 #include "command.h"
 
-static int64_t floor_div(int64_t number, int64_t by) {
-    int64_t whole = number / by;
-    return number % by != 0 && (number < 0) != (by < 0) ? whole - 1 : whole;
-}
-
-int64_t rt_meridian(int64_t longitude, int64_t near_to) {
-    int64_t apart = longitude - near_to + RT_HALF_TURN;
-    return near_to + (apart - floor_div(apart, RT_TURN) * RT_TURN) - RT_HALF_TURN;
+int64_t rt_east_of(int64_t longitude, int64_t other) {
+    return rt_modulo(longitude - other + RT_HALF_TURN, RT_TURN) - RT_HALF_TURN;
 }
 
 void rt_unproject(const rt_projection *projection, int64_t x, int64_t y, int64_t *latitude, int64_t *longitude) {
     /* |x| <= 2**29, so that x << 20 has 50 bits; a projection's factors are checked to lie in 1 .. 32 << 20 */
     int64_t east = projection->east, north = projection->north;
-    *latitude = projection->latitude + floor_div(y * (1LL << RT_SHIFT) + north / 2, north);
-    *longitude = projection->longitude + floor_div(x * (1LL << RT_SHIFT) + east / 2, east);
+    *latitude = projection->latitude + rt_floor(y * (1LL << RT_SHIFT) + north / 2, north);
+    *longitude = projection->longitude + rt_floor(x * (1LL << RT_SHIFT) + east / 2, east);
     if (*longitude < -RT_HALF_TURN || *longitude > RT_HALF_TURN)
-        *longitude = rt_meridian(*longitude, 0);
+        *longitude = rt_east_of(*longitude, 0);
 }
 
 bool rt_point_at(const rt_command *command, int64_t number, int64_t *latitude, int64_t *longitude) {

@@ -17,8 +17,8 @@ typedef struct {
 /* A local place in 1e-7 degree: `unproject` of model/flat/zone.py. */
 void rt_unproject(const rt_projection *projection, int64_t x, int64_t y, int64_t *latitude, int64_t *longitude);
 
-/* The number within 180 degrees of the longitude `near` that names the same meridian as `longitude`. */
-int64_t rt_meridian(int64_t longitude, int64_t near_to);
+/* How far east a longitude is of another, at most 180 degrees: `meridian` of model/flat/zone.py, less the other. */
+int64_t rt_east_of(int64_t longitude, int64_t other);
 
 /* A point of the path, in 1e-7 degree; false where there is none of this number. */
 bool rt_point_at(const rt_command *command, int64_t number, int64_t *latitude, int64_t *longitude);

@@ -88,7 +88,7 @@ static bool is_prepared(const rt_gate *gate, const rt_setting *setting, int64_t 
 }
 
 static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t now_us) {
-    rt_point point, last, next;
+    rt_point point = {0, 0}, last = {0, 0}, next = {0, 0};
     if (!gate->open)
         return "frame/no-session";
     if (!rt_carries_out(frame, &gate->command, gate->autopilot, gate->home_known, gate->home_amsl))
@@ -154,14 +154,15 @@ static rt_refusal refuse(rt_gate *gate, rt_bytes octets, int64_t now_us, bool *c
 rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *out, uint32_t *size) {
     bool carries = false;
     rt_refusal refused = refuse(gate, frame, now_us, &carries);
+    const uint32_t whole = (uint32_t)rt_min(frame.size, RT_LARGEST_FRAME - RT_SIGNATURE); /* which no frame exceeds */
     *size = 0;
     if (refused != NULL) {
         rt_chain_stop(gate->chain, frame);
         return refused;
     }
     if (carries) rt_chain_leave(gate->chain, frame);
-    memcpy(out, frame.at, frame.size);
-    *size = gate->signs ? rt_sign_frame(&gate->signer, out, frame.size, now_us) : frame.size;
+    memcpy(out, frame.at, whole);
+    *size = gate->signs ? rt_sign_frame(&gate->signer, out, whole, now_us) : whole;
     return NULL;
 }
 

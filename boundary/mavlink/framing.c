@@ -17,10 +17,11 @@ bool rt_read_frame(rt_bytes octets, rt_frame *frame) {
     frame->component = at[6];
     frame->message = message;
     memcpy(frame->payload, at + RT_HEADER, length);
-    frame->has_target = rt_layouts[known].target >= 0;
-    if (frame->has_target) {
-        frame->target_system = frame->payload[rt_layouts[known].target];
-        frame->target_component = frame->payload[rt_layouts[known].target + 1];
+    const int16_t target = rt_layouts[known].target;
+    if (target >= 0) {
+        frame->has_target = true;
+        frame->target_system = frame->payload[target];
+        frame->target_component = frame->payload[target + 1];
     }
     return true;
 }

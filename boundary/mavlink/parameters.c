@@ -31,7 +31,7 @@ bool rt_cut(uint32_t bits, int64_t *value) {
 bool rt_is_whole(uint32_t bits, int64_t value) {
     int exponent;
     uint64_t mantissa = mantissa_of(bits, &exponent);
-    int64_t cut;
+    int64_t cut = 0;
     if (!rt_cut(bits, &cut) || cut != value)
         return false;
     if (exponent >= 0)
@@ -63,7 +63,7 @@ static uint32_t nearest(int64_t value) {
     uint32_t sign = value < 0 ? 0x80000000U : 0, shift = 0;
     if (size == 0)
         return 0;
-    while (size >> shift >= 1ULL << 24)
+    while (shift < 8 && size >> shift >= 1ULL << 24)
         shift++;
     uint64_t mantissa = size >> shift, rest = size & ((1ULL << shift) - 1);
     if (shift > 0 && (rest > 1ULL << (shift - 1) || (rest == 1ULL << (shift - 1) && (mantissa & 1) != 0)))

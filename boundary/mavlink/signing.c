@@ -11,9 +11,7 @@
 #define TAG 6
 
 static int64_t local_time(const rt_signed_link *link, int64_t now_us) {
-    int64_t since = now_us - link->since_us; /* rounded down, as Python divides */
-    int64_t clock = since >= 0 ? since / UNIT_US : -((UNIT_US - 1 - since) / UNIT_US);
-    return clock > link->ahead ? clock : link->ahead;
+    return rt_max(rt_floor(now_us - link->since_us, UNIT_US), link->ahead);
 }
 
 static void tag_of(const rt_signed_link *link, const uint8_t *octets, uint32_t size, uint8_t tag[TAG]) {
@@ -39,7 +37,7 @@ void rt_signed_link_begin(rt_signed_link *link, const uint8_t key[RT_KEY_BYTES],
     memset(link, 0, sizeof *link);
     memcpy(link->key, key, RT_KEY_BYTES);
     link->link = id;
-    link->ahead = implied > timestamp ? implied : timestamp;
+    link->ahead = rt_max(implied, timestamp);
     link->since_us = monotonic_us - link->ahead * UNIT_US;
     for (uint32_t at = 0; at < count && at < RT_MOST_STREAMS; at++) {
         link->streams[link->stream_count++] = streams[at];
@@ -89,9 +87,11 @@ int64_t rt_signed_up_to(const rt_signed_link *link) { return link->promised > li
 /* How many of so many streams are left without those whose last frame is over a minute old. */
 static uint32_t prune(rt_stream *streams, uint32_t count, int64_t local) {
     uint32_t left = 0;
-    for (uint32_t at = 0; at < count; at++)
-        if (streams[at].last >= local - MINUTE)
-            streams[left++] = streams[at];
+    for (uint32_t at = 0; at < count; at++) {
+        const rt_stream each = streams[at];
+        if (each.last >= local - MINUTE)
+            streams[left++] = each;
+    }
     return left;
 }
 

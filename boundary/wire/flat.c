@@ -228,8 +228,10 @@ bool rt_next_int(rt_list *list, int64_t *value) {
     uint64_t argument = initial & 0x1F;
     if (argument >= 24) {
         uint32_t width = 1u << (argument - 24);
-        if (width > (size_t)(list->end - at)) return false;
-        for (argument = 0; width > 0; width--) argument = argument << 8 | *at++;
+        for (argument = 0; width > 0; width--) {
+            if (at >= list->end) return false;
+            argument = argument << 8 | *at++;
+        }
     }
     *value = initial & 0x20 ? -1 - (int64_t)argument : (int64_t)argument;
     list->at = at;
@@ -259,7 +261,7 @@ int64_t rt_int_at(rt_list list, uint32_t index) {
 }
 
 bool rt_holds(rt_list list, int64_t value) {
-    int64_t each;
+    int64_t each = 0;
     while (rt_next_int(&list, &each))
         if (each == value) return true;
     return false;

@@ -23,16 +23,12 @@ rt_refusal rt_open_replacement(const rt_flight *flight, rt_bytes document, rt_re
     return found->mission.invocation_count == 0 ? "no-step" : NULL;
 }
 
-static bool same_list(rt_list a, rt_list b) {
-    return a.count == b.count && rt_same((rt_bytes){a.at, (uint32_t)(a.end - a.at)}, (rt_bytes){b.at, (uint32_t)(b.end - b.at)});
-}
-
 /* The same conditions, wherever in a source they stand. */
 static bool same_clauses(rt_list a, rt_list b) {
     rt_clause one, other;
     if (a.count != b.count) return false;
     while (rt_next_clause(&a, &one) && rt_next_clause(&b, &other))
-        if (!rt_same(one.text, other.text) || !same_list(one.code, other.code)) return false;
+        if (!rt_same(one.text, other.text) || !rt_same_list(one.code, other.code)) return false;
     return true;
 }
 
@@ -40,27 +36,27 @@ static bool same_links(rt_list a, rt_list b) {
     rt_link one, other;
     if (a.count != b.count) return false;
     while (rt_next_link(&a, &one) && rt_next_link(&b, &other))
-        if (one.skill != other.skill || !same_list(one.arguments, other.arguments) || one.limit_us != other.limit_us || !rt_same(one.text, other.text))
+        if (one.skill != other.skill || !rt_same_list(one.arguments, other.arguments) || one.limit_us != other.limit_us || !rt_same(one.text, other.text))
             return false;
     return true;
 }
 
 static bool same_contract(const rt_contract *a, const rt_contract *b) {
-    return rt_same(a->name, b->name) && same_list(a->parameters, b->parameters) && a->motion.kind == b->motion.kind &&
+    return rt_same(a->name, b->name) && rt_same_list(a->parameters, b->parameters) && a->motion.kind == b->motion.kind &&
            a->motion.altitude == b->motion.altitude && a->motion.speed == b->motion.speed && a->motion.time == b->motion.time &&
            a->timing_class == b->timing_class && a->deadline_us == b->deadline_us && a->validity_us == b->validity_us &&
-           same_list(a->phases, b->phases) && a->duration_us == b->duration_us && a->grace_us == b->grace_us &&
+           rt_same_list(a->phases, b->phases) && a->duration_us == b->duration_us && a->grace_us == b->grace_us &&
            same_clauses(a->require, b->require) && same_clauses(a->assume, b->assume) && same_clauses(a->maintain, b->maintain) &&
-           same_links(a->fallback, b->fallback) && a->energy == b->energy && same_list(a->record, b->record) && same_list(a->reads, b->reads);
+           same_links(a->fallback, b->fallback) && a->energy == b->energy && rt_same_list(a->record, b->record) && rt_same_list(a->reads, b->reads);
 }
 
 /* All that an invocation says, without what names it, when it was issued, and where in its source it stood; `phases` masks those
    in which it means something. */
 static bool same_step(const rt_invocation *a, const rt_invocation *b, uint64_t phases) {
     return a->step == b->step && a->phase == b->phase && a->skill == b->skill && a->source == b->source && a->role == b->role &&
-           same_list(a->arguments, b->arguments) && ((uint64_t)a->phases & phases) == ((uint64_t)b->phases & phases) &&
+           rt_same_list(a->arguments, b->arguments) && ((uint64_t)a->phases & phases) == ((uint64_t)b->phases & phases) &&
            a->on_inadmissible == b->on_inadmissible && same_contract(&a->contract, &b->contract) && a->plan.kind == b->plan.kind &&
-           same_list(a->plan.path, b->plan.path) && a->plan.altitude == b->plan.altitude && a->plan.speed == b->plan.speed &&
+           rt_same_list(a->plan.path, b->plan.path) && a->plan.altitude == b->plan.altitude && a->plan.speed == b->plan.speed &&
            rt_same(a->text, b->text);
 }
 

@@ -169,7 +169,7 @@ rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *
 /* Why a frame is not signed ahead for a command: as at the gate, if that were open for it. */
 static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, rt_bytes octets) {
     rt_frame frame;
-    rt_point point, first;
+    rt_point point = {0, 0}, first = {0, 0};
     if (!rt_read_frame(octets, &frame))
         return "frame/not-one-frame";
     if (gate->system == 0)
@@ -187,15 +187,16 @@ static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, r
 }
 
 rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes frame, int64_t now_us, uint8_t *out) {
-    uint8_t octets[RT_LARGEST_FRAME];
+    uint8_t octets[RT_LARGEST_FRAME] = {0};
     rt_refusal refused = refuse_ahead(gate, command, frame);
     if (refused != NULL) {
         rt_chain_stop(gate->chain, frame);
         return refused;
     }
+    const uint32_t whole = (uint32_t)rt_min(frame.size, RT_LARGEST_FRAME - RT_SIGNATURE); /* which no frame exceeds */
     if (gate->signs) {
-        memcpy(octets, frame.at, frame.size);
-        uint32_t size = rt_sign_ahead(&gate->signer, octets, frame.size, now_us);
+        memcpy(octets, frame.at, whole);
+        uint32_t size = rt_sign_ahead(&gate->signer, octets, whole, now_us);
         memcpy(out, octets + size - RT_STAMPED, RT_STAMPED);
     }
     return NULL;

@@ -1,0 +1,14 @@
+/* What the programs of proof/ begin with: values of which nothing is known but their range. */
+#ifndef RT_PROOF_ANY_H
+#define RT_PROOF_ANY_H
+
+#include "__fc_builtin.h"
+#include "base.h"
+#include "model/limits.h"
+
+#define ANY(thing) Frama_C_make_unknown((char *)&(thing), sizeof(thing))
+#define WITHIN(low, high) Frama_C_long_interval(low, high)
+#define SIZE(most) ((uint32_t)Frama_C_unsigned_int_interval(0, most))
+#define EITHER() (Frama_C_interval(0, 1) != 0)
+
+#endif

@@ -1,0 +1,90 @@
+/* What Frama-C's Eva runs: the gate on any frame from either side, in any state, whatever command is permitted; and the signed link. */
+#include "any.h"
+#include "enforcement/frames.h"
+
+static uint8_t octets[RT_LARGEST_FRAME + 1], out[RT_LARGEST_FRAME], path[16];
+static rt_gate gate;
+static rt_chain chain;
+static rt_preparation preparation;
+
+/* Every coordinate of a path was found within these bounds (decision/checks). */
+bool rt_next_int(rt_list *list, int64_t *value) {
+    if (list->count == 0) return false;
+    list->count--;
+    *value = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
+    return true;
+}
+
+/* The hash, and the chain of what left: they read what they are given. */
+static void read_all(rt_bytes data) {
+    for (uint32_t at = 0; at < data.size; at++) chain.marks[0] ^= data.at[at];
+}
+void rt_sha256_begin(rt_sha256 *hash) { ANY(*hash); }
+void rt_sha256_add(rt_sha256 *hash, rt_bytes data) { read_all(data); }
+void rt_sha256_end(rt_sha256 *hash, uint8_t digest[RT_DIGEST_BYTES]) { Frama_C_make_unknown((char *)digest, RT_DIGEST_BYTES); }
+bool rt_equal(const uint8_t *one, const uint8_t *other, size_t size) { return EITHER(); }
+void rt_chain_stop(rt_chain *of, rt_bytes frame) { read_all(frame); }
+void rt_chain_leave(rt_chain *of, rt_bytes frame) { read_all(frame); }
+
+static void begin(rt_command *command) {
+    const int64_t factor = 32LL << RT_SHIFT;
+    ANY(*command);
+    command->kind = WITHIN(RT_HOLD, RT_LAND);
+    command->altitude = WITHIN(RT_LOWEST, RT_HIGHEST);
+    command->speed = WITHIN(0, RT_MAX_SPEED);
+    command->path = (rt_list){path, path + sizeof path, SIZE(2 * RT_MAX_PATH)};
+    command->has_place = EITHER();
+    command->place[0] = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
+    command->place[1] = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
+    command->projection = (rt_projection){WITHIN(-900000000, 900000000), WITHIN(-RT_HALF_TURN, RT_HALF_TURN), WITHIN(1, factor), WITHIN(1, factor)};
+    ANY(gate);
+    gate.chain = &chain;
+    gate.command = *command;
+    gate.signs = EITHER(), gate.open = EITHER(), gate.begun = EITHER(), gate.here_known = EITHER(), gate.started = EITHER();
+    gate.armed = EITHER(), gate.types_known = EITHER(), gate.home_known = EITHER(), gate.settled_known = EITHER();
+    gate.leg = WITHIN(-1, RT_MAX_PATH);
+    gate.here = (rt_point){WITHIN(INT32_MIN, INT32_MAX), WITHIN(INT32_MIN, INT32_MAX)};
+    gate.home_amsl = WITHIN(-(1LL << 32), 1LL << 32);
+    gate.settled_amsl = WITHIN(-(1LL << 32), 1LL << 32);
+    gate.prepared_count = SIZE(RT_MAX_WRITES);
+    for (uint32_t at = 0; at < RT_MAX_WRITES; at++) gate.prepared[at].is_number = EITHER();
+}
+
+static void begin_link(rt_signed_link *link, int64_t now_us) {
+    const int64_t latest = (1LL << 48) + RT_MAX_VALUE;
+    rt_stream streams[RT_MOST_STREAMS];
+    uint8_t key[RT_KEY_BYTES];
+    ANY(streams);
+    ANY(key);
+    for (uint32_t at = 0; at < RT_MOST_STREAMS; at++) streams[at].last = WITHIN(-1, latest);
+    rt_signed_link_begin(link, key, WITHIN(0, latest), streams, SIZE(RT_MOST_STREAMS), WITHIN(0, RT_MAX_VALUE), now_us, 0);
+    link->has_own = EITHER();
+    link->ahead = WITHIN(0, latest);
+    link->promised = WITHIN(0, latest);
+    link->promised_us = WITHIN(0, RT_MAX_VALUE);
+}
+
+int main(void) {
+    rt_command command;
+    uint32_t size;
+    int64_t now_us = WITHIN(0, RT_MAX_VALUE), later_us = WITHIN(0, RT_MAX_VALUE);
+    ANY(octets);
+    rt_bytes frame = {octets, SIZE(RT_LARGEST_FRAME)};
+    begin(&command);
+    begin_link(&gate.signer, now_us);
+    switch (Frama_C_interval(0, 5)) {
+    case 0: rt_gate_observe(&gate, frame, now_us); break;
+    case 1: rt_gate_seal(&gate, frame, now_us, out, &size); break;
+    case 2: return rt_accept_frame(&gate.signer, frame, later_us);
+    case 3: rt_gate_sign_ahead(&gate, &command, frame, now_us, out); break;
+    case 4:
+        ANY(preparation);
+        preparation.count = SIZE(RT_MAX_WRITES);
+        rt_gate_prepare(&gate, &preparation);
+        rt_gate_prepared(&gate);
+        rt_gate_close(&gate);
+        break;
+    default: rt_gate_open(&gate, &command, now_us); return rt_gate_stands(&gate, now_us);
+    }
+    return 0;
+}

@@ -24,7 +24,6 @@ from rtshcua.mavlink.framing import (
     MARKER,
     MIRROR,
     SIGNATURE,
-    message_id,
     octets_of_checksum,
 )
 from rtshcua.mavlink.signing import Verifier
@@ -45,7 +44,8 @@ class Kind(NamedTuple):
     extra: bytes
     """The octet that the checksum takes in behind the payload: a digest of the message's layout."""
     fields: Struct
-    build: Callable[[tuple[Any, ...]], Message]
+    build: Callable[..., Message]
+    """Makes a message of the numbers on the wire, in their order."""
     number: bytes
     """As it stands in a frame's header."""
     payload: Callable[[Message], bytes] | None
@@ -72,8 +72,8 @@ def decode(frame: bytes, kind: Kind) -> Message | None:
     if crc_hqx((frame[1:end] + extra + frame[end : end + CHECKSUM]).translate(MIRROR), 0xFFFF):
         return None  # the CRC of octets that end in their own checksum is 0
     if length >= size:  # what is longer than we know comes of a newer dialect
-        return build(fields.unpack_from(frame, HEADER))
-    return build(fields.unpack(frame[HEADER:end].ljust(size, b"\0")))  # zeros at the end are not sent
+        return build(*fields.unpack_from(frame, HEADER))
+    return build(*fields.unpack(frame[HEADER:end].ljust(size, b"\0")))  # zeros at the end are not sent
 
 
 def _function(text: str, **known: Any) -> Callable[..., Any]:
@@ -107,13 +107,14 @@ def _making(of: Any, takes: str, fields: Mapping[str, str], **known: Any) -> Cal
     return _function(text, new=of.__new__, of=of, **bare, **known)
 
 
-def _numbers(of: Any) -> Callable[[tuple[Any, ...]], Message]:
+def _numbers(of: Any) -> Callable[..., Message]:
     """A message of numbers, from those of the wire."""
+    takes = [f"value{place}" for place in range(sum(of.lengths))]
     fields = {
-        name: f"values[{start}]" if length == 1 else f"list(values[{start}:{start + length}])"
+        name: takes[start] if length == 1 else f"[{', '.join(takes[start : start + length])}]"
         for name, start, length in _layout(of)
     }
-    return _making(of, "values", fields)
+    return _making(of, ", ".join(takes), fields)
 
 
 def maker(of: Any) -> Callable[..., Message]:
@@ -131,12 +132,12 @@ def _payload(of: Any) -> Callable[[Message], bytes]:
     return _function(f"def made(message): return pack({', '.join(values)})", pack=of.unpacker.pack)
 
 
-def _any(of: Any) -> Callable[[tuple[Any, ...]], Message]:
+def _any(of: Any) -> Callable[..., Message]:
     """A message with texts, by the generated constructor."""
     starts = [sum(of.lengths[:place]) for place in range(len(of.lengths))]
     pick = [(starts[place], of.lengths[place]) for place in of.orders]
 
-    def build(values: tuple[Any, ...]) -> Message:
+    def build(*values: Any) -> Message:
         fields: list[Any] = []
         for start, length in pick:
             value = values[start]
@@ -214,16 +215,20 @@ class Codec:
         in_garbage = False
         while start < octets:
             end = _frame_end(datagram, start)
-            received = _decode(datagram[start:end]) if end else None
-            if received is not None:
-                if self._only is not None and received.system not in self._only:
+            frame = datagram[start:end] if end else b""
+            kind = kind_of(frame[7] | frame[8] << 8 | frame[9] << 16) if end else None
+            message = None if kind is None else decode(frame, kind)
+            if kind is not None and message is not None:
+                system = frame[5]
+                if self._only is not None and system not in self._only:
                     self.foreign += 1
-                elif self._verifier is not None and not self._verifier.accept(received.frame, now_us):
+                elif self._verifier is not None and not self._verifier.accept(frame, now_us):
                     self.refused += 1
                 else:
-                    good.append(received)
+                    signed = frame[FLAGS] == FLAG_SIGNED
+                    good.append(_received(Received, (message, kind.name, system, frame[6], frame[4], signed, frame)))
                 start, in_garbage = end, False
-            elif end and kind_of(message_id(datagram, start)) is None and _at_boundary(datagram, end):
+            elif end and kind is None and _at_boundary(datagram, end):
                 # Its checksum cannot be verified, but it is framed like the rest: skip it whole, lest something
                 # that its payload holds be taken for a frame of its own.
                 self.unknown += 1
@@ -233,15 +238,6 @@ class Codec:
                 next_marker = datagram.find(MARKER, start + 1)
                 start, in_garbage = (next_marker if next_marker >= 0 else octets), True
         return good
-
-
-def _decode(frame: bytes) -> Received | None:
-    kind = kind_of(frame[7] | frame[8] << 8 | frame[9] << 16)
-    message = None if kind is None else decode(frame, kind)
-    if kind is None or message is None:
-        return None
-    signed = frame[FLAGS] == FLAG_SIGNED
-    return _received(Received, (message, kind.name, frame[5], frame[6], frame[4], signed, frame))
 
 
 def _frame_end(datagram: bytes, start: int) -> int:

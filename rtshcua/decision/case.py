@@ -3,7 +3,9 @@ possible. A single situation is a set of one, and has exactly one verdict.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from itertools import repeat
+from operator import le
+from typing import NamedTuple, TypeAlias, TypeGuard, cast
 
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, Seen
@@ -66,23 +68,34 @@ def remembered(state: State, policy: PreparedPolicy, now: Now) -> Seen:
 
 
 def _situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
-    limits = policy.limits
+    limits, told, ages = policy.limits, state.values, state.ages
     values: list[Value]
-    if len(state.values) == len(state.ages) == len(limits):
+    if not len(told) == len(ages) == len(limits):
+        values = [MISSING] * len(limits)
+    elif _all_known(told, ages, policy):  # most often it is so, and the same is found sooner
+        values = [*zip(told, told, repeat(PRESENT), repeat(None))]
+    else:
         values = [
             (value, value, PRESENT, None)
             if value is not None and 0 <= age <= stale and -most <= value <= most
             else MISSING
-            for value, age, (stale, most) in zip(state.values, state.ages, limits, strict=True)
+            for value, age, (stale, most) in zip(told, ages, limits, strict=True)
         ]
-    else:
-        values = [MISSING] * len(limits)
     monitors: Sequence[Truth] = state.monitors
     count = len(policy.monitors)
     if len(monitors) != count or (count and not SINGLE.issuperset(monitors)):
         monitors = (UNKNOWN,) * count
     utc, error = now.utc_us, max(now.utc_error_us, 0)
     return _tuple(Sets, (values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error), monitors))
+
+
+def _all_known(told: Sequence[int | None], ages: Sequence[int], policy: PreparedPolicy) -> TypeGuard[Sequence[int]]:
+    """Whether no slot is missing, stale or beyond all sense."""
+    if None in told or min(ages, default=0) < 0:
+        return False
+    stale, least, most = policy.bounds
+    values = cast("Sequence[int]", told)
+    return all(map(le, ages, stale)) and all(map(le, least, values)) and all(map(le, values, most))
 
 
 def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:

@@ -253,7 +253,8 @@ class Seen(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class PreparedPolicy:
-    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `monitors` are in order.
+    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `bounds` is the same by column: the
+    ages at which slots are stale, the least and the most values. `monitors` are in order.
 
     `seen` is the last single situation that was asked about, remembered to be quick: no answer depends on it, and
     nothing else is ever changed.
@@ -263,6 +264,7 @@ class PreparedPolicy:
     compiler: Compiler
     tables: Tables
     limits: tuple[Limit, ...]
+    bounds: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
     rules: RuleIndex
     airspace: PreparedAirspace | None
     contingency: tuple[PreparedLink, ...]
@@ -303,12 +305,14 @@ def prepare(policy: Policy) -> PreparedPolicy | Refusal:
     problem = next(problems(policy), None)
     if problem is not None:
         return Refusal("malformed", problem)
-    compiler = Compiler(policy)
+    compiler, limits = Compiler(policy), _limits(policy)
+    stale, most = tuple(limit.stale_us for limit in limits), tuple(limit.most for limit in limits)
     return PreparedPolicy(
         policy=policy,
         compiler=compiler,
         tables=compiler.tables,
-        limits=_limits(policy),
+        limits=limits,
+        bounds=(stale, tuple(-each for each in most), most),
         rules=RuleIndex(policy.rules, compiler),
         airspace=None if policy.airspace is None else _airspace(policy.airspace, compiler),
         contingency=tuple(map(compiler.link, policy.contingency)),

@@ -80,7 +80,7 @@ class BoundaryChain:
 
     def add(self, tag: Tag, payload: bytes) -> bytes:
         """The digest after one entry more."""
-        digest = self.digest = following(self.digest, tag, payload)
+        digest = self.digest = _next(_LABEL, self.digest, tag, payload)
         self.count += 1
         if len(self._marks) < MOST_MARKS:
             self._marks.append(digest[:MARK_BYTES])
@@ -101,7 +101,7 @@ class BoundaryChain:
     def leave(self, frame: bytes) -> None:
         """A frame that carries out a command passed, as these octets."""
         self.frames += 1
-        self.left = after_frame(self.left, frame)
+        self.left = _next(_FRAMES, self.left, Tag.FRAME, frame)
 
     def stop(self, frame: bytes) -> None:
         """A frame was refused."""

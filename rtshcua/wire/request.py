@@ -78,7 +78,8 @@ class Request(msgspec.Struct, frozen=True):
 def encode(request: Request) -> bytes:
     """The request's octets. Raises `struct.error` for what no monitor and no clock makes."""
     state, now = request.state, request.now
-    prefix, layout = _form(len(state.values), len(state.monitors))
+    values = state.values
+    prefix, layout = _form(len(values), len(state.monitors))
     return prefix + layout.pack(
         request.kind,
         request.step,
@@ -90,7 +91,7 @@ def encode(request: Request) -> bytes:
         request.released_us,
         request.remaining_us,
         request.phase,
-        *[UNKNOWN if value is None else value for value in state.values],
+        *([UNKNOWN if value is None else value for value in values] if None in values else values),
         *state.ages,
         *state.monitors,
     )
@@ -111,14 +112,16 @@ def decode(data: bytes, slots: int, monitors: int) -> Request | Refusal:
         return Refusal("malformed", "a kind, step or link out of range")
     if max(at_us, utc_us, utc_error_us, released_us, remaining_us) > MAX_VALUE:
         return Refusal("malformed", "a time out of range")
-    values: tuple[int | None, ...] = fields[_HEAD_FIELDS : _HEAD_FIELDS + slots]
-    known = fields[_HEAD_FIELDS : _HEAD_FIELDS + slots]
+    ages_at = _HEAD_FIELDS + slots
+    said_at = ages_at + slots
+    known = fields[_HEAD_FIELDS:ages_at]
+    values: tuple[int | None, ...] = known
     if UNKNOWN in known:
         values = tuple([None if value == UNKNOWN else value for value in known])
         known = tuple([value for value in known if value != UNKNOWN])
     if known and not -MAX_VALUE <= min(known) <= max(known) <= MAX_VALUE:
         return Refusal("malformed", "a state value out of range")
-    ages, said = fields[_HEAD_FIELDS + slots : _HEAD_FIELDS + 2 * slots], fields[_HEAD_FIELDS + 2 * slots :]
+    ages, said = fields[ages_at:said_at], fields[said_at:]
     if not _TRUTHS.issuperset(said):
         return Refusal("malformed", "what a monitor says is no truth")
     now = Now(at_us, utc_us, utc_error_us)

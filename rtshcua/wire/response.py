@@ -95,21 +95,19 @@ def encode_refusal(status: Status, evidence: bytes = bytes(DIGEST_BYTES)) -> byt
 
 def decode(data: bytes) -> Answer | Status | Refusal:
     """Read a response; a refusal to decide is its status. Raises nothing."""
-    prefix = _WITHOUT_PERMIT if len(data) == len(_WITHOUT_PERMIT) + _HEAD.size + DIGEST_BYTES else _WITH_PERMIT
-    start, end = len(prefix) + _HEAD.size, len(data) - DIGEST_BYTES
-    if not data.startswith(prefix) or end - start != (SIZE if prefix is _WITH_PERMIT else 0):
+    prefix, head, start, end = _PERMITTED if len(data) == _PERMITTED_BYTES else _BARE
+    if not data.startswith(prefix) or len(data) != end + DIGEST_BYTES:
         return Refusal("malformed", f"not a response of version {names.RESPONSE.version}")
-    status, outcome, reason, rule_step, *numbers = _HEAD.unpack_from(data, len(prefix))
-    if status != Status.DECIDED:
+    status, outcome, reason, rule_step, clause, target, valid_until_us, consumed = _HEAD.unpack_from(data, head)
+    if status != _DECIDED:
         refused = Status(status) if status < len(Status) else None
         if refused is None or data != encode_refusal(refused, data[end:]):
             return Refusal("malformed", "a refusal with more than its status")
         return refused
     if outcome >= len(_OUTCOMES) or reason >= len(WIRE_REASONS):
         return Refusal("malformed", "an outcome or a reason that there is not")
-    clause, target, valid_until_us, consumed = numbers
-    said = _OUTCOMES[outcome], WIRE_REASONS[reason]
-    return Answer(*said, rule_step, clause, target, valid_until_us, consumed, data[start:end], data[end:])
+    said, why = _OUTCOMES[outcome], WIRE_REASONS[reason]
+    return Answer(said, why, rule_step, clause, target, valid_until_us, consumed, data[start:end], data[end:])
 
 
 def _prefix(size: int) -> bytes:
@@ -118,3 +116,14 @@ def _prefix(size: int) -> bytes:
 
 _WITHOUT_PERMIT: Final = _prefix(_HEAD.size + DIGEST_BYTES)
 _WITH_PERMIT: Final = _prefix(_HEAD.size + SIZE + DIGEST_BYTES)
+
+
+def _places(prefix: bytes, size: int) -> tuple[bytes, int, int, int]:
+    """What a response with a permit of this size begins with; where its head, its permit and its digest begin."""
+    start = len(prefix) + _HEAD.size
+    return prefix, len(prefix), start, start + size
+
+
+_BARE: Final = _places(_WITHOUT_PERMIT, 0)
+_PERMITTED: Final = _places(_WITH_PERMIT, SIZE)
+_PERMITTED_BYTES: Final = _PERMITTED[-1] + DIGEST_BYTES

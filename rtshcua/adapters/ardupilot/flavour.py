@@ -3,6 +3,8 @@
 It obeys position targets in GUIDED only, and ignores them silently elsewhere; takeoff takes a height above home.
 """
 
+from functools import cache
+
 from rtshcua.adapters.vehicle import effects, flavour, messages, returns
 from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.effects import Effect
@@ -24,6 +26,8 @@ _POLYGONS = 4  # of FENCE_TYPE: inclusions and exclusions, polygons and circles
 def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
     """The stages of a manoeuvre."""
     match command.kind:
+        case MotionKind.HOME | MotionKind.LAND:
+            return list(_coming_down(system, command.kind))
         case MotionKind.CLIMB:
             height = command.altitude
             takeoff = messages.command(system, messages.TAKEOFF, 0, 0, 0, 0, 0, 0, height / 1_000)
@@ -36,10 +40,6 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
             ]
         case MotionKind.FLY | MotionKind.COVER:
             return [flavour.entering(system, CopterMode.GUIDED), *_legs(command, seen, system)]
-        case MotionKind.HOME:
-            return flavour.returning(system, CopterMode.RTL)
-        case MotionKind.LAND:
-            return flavour.landing(system, CopterMode.LAND)
         case _:
             # not LOITER, which obeys the throttle stick: an onboard computer has none
             mode, brakes = messages.set_mode(system, CopterMode.BRAKE), effects.in_mode(CopterMode.BRAKE)
@@ -47,6 +47,13 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
                 Stage(mode, messages.DO_SET_MODE, brakes, _BRAKE, flavour.MODE_US, powered=True, stops=True),
                 Stage(None, None, effects.still, _BRAKE, powered=True, stops=True),
             ]
+
+
+@cache
+def _coming_down(system: int, kind: int) -> tuple[Stage, ...]:
+    """Home or down where it is: always the same stages, so they are made once (`Driver` has them made ahead)."""
+    home = kind == MotionKind.HOME
+    return tuple(flavour.returning(system, CopterMode.RTL) if home else flavour.landing(system, CopterMode.LAND))
 
 
 def _above(seen: ObservedVehicle, height: int) -> ExpectedTarget:

@@ -4,6 +4,8 @@ Altitudes in commands are above mean sea level here, whatever the frame says. An
 DO_SET_MODE says nothing: only the heartbeat tells, and of a stop only the speed.
 """
 
+from functools import cache
+
 from rtshcua.adapters.vehicle import effects, flavour, messages, returns
 from rtshcua.adapters.vehicle.bounds import OwnFence
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
@@ -21,6 +23,8 @@ _HOLD = frozenset({Px4Mode.HOLD})
 def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
     """The stages of a manoeuvre. Raises NoDatum where they need an altitude and `seen.home_amsl` is not known."""
     match command.kind:
+        case MotionKind.HOME | MotionKind.LAND:
+            return list(_coming_down(system, command.kind))
         case MotionKind.CLIMB:
             return _climb(command, seen, system)
         case MotionKind.FLY | MotionKind.COVER:
@@ -30,12 +34,15 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
                 message = messages.reposition_amsl(system, *place, amsl / 1_000, command.speed)
                 legs.append(flavour.leg(message, messages.REPOSITION, _HOLD, place, height, amsl))
             return legs
-        case MotionKind.HOME:
-            return flavour.returning(system, Px4Mode.RETURN)
-        case MotionKind.LAND:
-            return flavour.landing(system, Px4Mode.LAND)
         case _:
             return [_stop(seen, system), Stage(None, None, effects.still, _HOLD, powered=True, stops=True)]
+
+
+@cache
+def _coming_down(system: int, kind: int) -> tuple[Stage, ...]:
+    """Home or down where it is: always the same stages, so they are made once (`Driver` has them made ahead)."""
+    home = kind == MotionKind.HOME
+    return tuple(flavour.returning(system, Px4Mode.RETURN) if home else flavour.landing(system, Px4Mode.LAND))
 
 
 def _climb(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:

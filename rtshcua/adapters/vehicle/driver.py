@@ -33,6 +33,7 @@ from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MULTIROTORS
 from rtshcua.mavlink.parameters import value_of
 from rtshcua.mavlink.signing import Verifier
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard import ports
@@ -244,8 +245,9 @@ class Driver:
             return [ports.Failed(now_us, command.token, "taken-over", self._others)], []
         self.link.begin()
         before = modes_of(self.left, flavour) if self._manoeuvre is None else self._manoeuvre.modes
-        own = self._manoeuvres.get(f"{flavour.name}.{command.skill}")  # else it is flown as any skill of its kind
-        way = own or self._manoeuvres.get(flavour.name, flavour.stages)
+        way, packs = flavour.stages, self._manoeuvres
+        if packs:  # a skill of its own, else it is flown as any skill of its kind
+            way = packs.get(f"{flavour.name}.{command.skill}") or packs.get(flavour.name, way)
         try:
             stages = way(command, self.seen, self.system)
         except Exception as error:  # noqa: BLE001  a pack's code: whatever it raises, its skill has failed
@@ -292,6 +294,8 @@ class Driver:
                 meant=self.meant,
             )
             self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
+            for kind in (MotionKind.HOME, MotionKind.LAND):  # made ahead: when a fallback must fly there is no time
+                flavour.stages(Command(-1, "", kind, (), (), 0, 0), self.seen, frame.system)
 
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; whether a manoeuvre may see something new in it."""

@@ -40,7 +40,7 @@ def heartbeat() -> Message:
 def command(system: int, number: int, *parameters: float) -> Message:
     """COMMAND_LONG with up to seven parameters, the rest 0."""
     filled = (*parameters, *_ZEROS[len(parameters) :])
-    return _COMMAND.build((*filled, number, system, _AUTOPILOT, 0))  # in the order of the wire
+    return _COMMAND.build(*filled, number, system, _AUTOPILOT, 0)  # in the order of the wire
 
 
 def set_mode(system: int, mode: Px4Mode | CopterMode) -> Message:

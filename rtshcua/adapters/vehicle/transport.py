@@ -136,11 +136,13 @@ class UdpTransport:
         return True
 
     def send(self, frame: bytes, to: Hashable) -> None:
-        with suppress(OSError):  # lost, as any datagram may be: what matters is sent again, and only effects count
+        try:
             if self.begins:
                 self._socket.send(frame)
             else:
                 self._socket.sendto(frame, to)  # type: ignore[call-overload]
+        except OSError:
+            return  # lost, as any datagram may be: what matters is sent again, and only effects count
 
     def tend(self, now_us: int) -> list[str]:
         return []

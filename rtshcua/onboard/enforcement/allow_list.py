@@ -212,6 +212,8 @@ _MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = {
     },
 }
 _TRAVELS: Final = (MotionKind.FLY, MotionKind.COVER)
+#: what may carry out a command (`carries_out`): no parameter is set by it, and no fence handed over
+COMMANDS: Final = frozenset({COMMAND_LONG, COMMAND_INT, SET_POSITION_TARGET_GLOBAL_INT})
 
 
 def is_forced_arming(frame: Frame) -> bool:

@@ -33,6 +33,7 @@ from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, encode, 
 CLOCKS_PART_US: Final = 3_000_000
 _Numbers = dict[Clause | Rule | Airspace, int]
 _ALLOW: Final = Outcome.ALLOW  # an enumeration's attributes are slow to find
+_tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
 _REASONS: Final = {reason.value: number for reason, number in REASON_NUMBERS.items()}  # by slug: its own hash is slow
 
 
@@ -95,7 +96,7 @@ class SoftwareBoundary:
         if not self._now_us <= now_us >= asked.released_us or not self._keeps_time(asked.now):
             return self._refuse(Status.MALFORMED, request)
         self._now_us = now_us
-        ref = asked.ref
+        ref = _tuple(Ref, (asked.kind, asked.step, asked.link))
         refused = self._session.refusal(ref)
         if refused is not None:
             return self._refuse(refused, request)

@@ -197,7 +197,7 @@ class Executor:
         command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial)
         stamps: list[bytes] = []
         for frame in frames:
-            stamp = self.frames.sign_ahead(frame, command, now_us)
+            stamp = self._frames.sign_ahead(frame, command, now_us)
             if isinstance(stamp, Refusal):
                 return stamp
             stamps.append(stamp)
@@ -215,7 +215,7 @@ class Executor:
             return refused
         self._chain.add(Tag.PREPARED, boundary_chain.prepared(permit.writes, restoring=permit.restoring))
         self._prepared.add(permit.serial)
-        self.frames.prepare(permit.writes, permit.not_after_us)
+        self._frames.prepare(permit.writes, permit.not_after_us)
         return permit
 
     def _unprepared(self, permit: Preparation, now_us: int) -> Refusal | None:
@@ -225,11 +225,11 @@ class Executor:
             return USED
         if now_us > permit.not_after_us:
             return LATE
-        return None if self.frames.stands(now_us) else NOT_DOWN
+        return None if self._frames.stands(now_us) else NOT_DOWN
 
     def prepared(self) -> None:
         """What was to be set is set, or was given up."""
-        self.frames.prepared()
+        self._frames.prepared()
 
     def _refuse(self, permit: Permit, now_us: int) -> Refusal | None:
         """Why nothing is sent for a permit at a monotonic time."""
@@ -258,7 +258,7 @@ class Executor:
         self._last = permit.serial
         payload = boundary_chain.sent(permit.kind, permit.step, permit.link, permit.serial, now_us)
         self._chain.add(Tag.SENT, payload)
-        self.frames.open(command, permit.not_after_us)
+        self._frames.open(command, permit.not_after_us)
         return Dispatch(command, permit.not_after_us, needs_record=permit.kind == STEP)
 
     def ended(self, token: int | None = None) -> None:
@@ -268,17 +268,17 @@ class Executor:
         """
         if token in (None, self._last):
             self._running = False
-            self.frames.close()
+            self._frames.close()
 
     def landed(self) -> None:
         """The vehicle landed: standing permits lapse."""
         self._running = False
         self._flight = None
-        self.frames.close()
+        self._frames.close()
 
     def release(self) -> None:
         """Nothing more that moves the vehicle is to be sent, unless another permit is dispatched."""
-        self.frames.close()
+        self._frames.close()
 
     def _follow(self, permit: Permit, homeward: bool) -> None:
         self._running = False

@@ -219,13 +219,14 @@ class FrameSession:
             return False
         if self.chain.over:
             return SESSION_OVER
-        setting = allow_list.written(frame, bytewise=is_bytewise(self._autopilot))
-        if setting is not None and setting in self._prepared and now_us <= self._prepared_us:
-            return False if self.stands(now_us) else NOT_DOWN
-        if allow_list.is_of_fence(frame, self._types):
-            return AFTER_START if self._started or self._armed else False
-        if setting is not None:
-            return NOT_LISTED
+        if frame.message not in allow_list.COMMANDS:
+            setting = allow_list.written(frame, bytewise=is_bytewise(self._autopilot))
+            if setting is not None and setting in self._prepared and now_us <= self._prepared_us:
+                return False if self.stands(now_us) else NOT_DOWN
+            if allow_list.is_of_fence(frame, self._types):
+                return AFTER_START if self._started or self._armed else False
+            if setting is not None:
+                return NOT_LISTED
         # 4. what is permitted now
         return self._refuse_motion(frame, now_us) or True
 

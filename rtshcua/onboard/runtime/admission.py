@@ -10,7 +10,7 @@ from rtshcua.model.decision import Decision, Decisive
 from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.mission import Invocation, Mission
-from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
@@ -105,7 +105,8 @@ class Admission:
         phase, remaining_us = self._queue.phase, self._remaining.us
         invocation = None if kind == CONTINGENCY_LINK else self._in_force.invocations[step].invocation
         binding = self._in_force.bundle.policy_digest if invocation is None else invocation.binding
-        asked_for = encode(Request(kind, step, link, binding, now, state, released_us, phase, remaining_us))
+        request = Request(kind, step, link, binding, now, state, released_us, phase, remaining_us)
+        asked_for = encode(request)
         answer = decode(self._loaded.boundary.enforce(asked_for))
         if not isinstance(answer, Answer):
             digest = sha256(asked_for).hexdigest()
@@ -121,12 +122,7 @@ class Admission:
             self.flush(now)
             self._last = last
         approvals = () if asked is None else self._in_force.approvals(asked, now)
-        vehicle, version = self._loaded.vehicle, self._policy.version
-        context = Context(binding, vehicle, version, answer.consumed, released_us, phase, remaining_us, approvals)
-        durability = WRITTEN
-        if asked is not None:
-            durability = durability_of(asked.contract, answer.outcome, confirmed=confirmed(context), kind=kind)
-        self._journal.tell(partial(self._told, now, ref, invocation, state, context, answer, durability))
+        self._journal.tell(partial(self._told, request, ref, invocation, answer, approvals))
         return answer
 
     def flush(self, now: Now) -> None:
@@ -137,10 +133,10 @@ class Admission:
         self._repeated = 0
 
     def _told(
-        self, now: Now, ref: Ref, of: Invocation | None, state: State, context: Context, answer: Answer, durability: int
+        self, asked: Request, ref: Ref, of: Invocation | None, answer: Answer, approvals: tuple[Approval, ...]
     ) -> Iterable[Action]:
         """An answer as it is shown, announced and recorded; `of` is the step asked about, or whose link it is."""
-        contract, subject = None if of is None else of.contract, self._subject(ref, of)
+        now, contract, subject = asked.now, None if of is None else of.contract, self._subject(ref, of)
         clause = self._clause(contract, answer.clause)
         outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, "" if clause is None else clause.text))
@@ -150,7 +146,14 @@ class Admission:
         link, until_us = None if target is None else max(answer.target, DEGRADE), answer.valid_until_us
         decided = Decision(answer.outcome, answer.reason, answer.rule_step, clause, link, target, until_us)
         identity = b"" if of is None else of.invocation_id
-        line = partial(self._journal.recorder.decision, now, ref, identity, state, context, decided, durability)
+        context = Context(
+            asked.binding, self._loaded.vehicle, self._policy.version, answer.consumed, asked.released_us, asked.phase,
+            asked.remaining_us, approvals,
+        )  # fmt: skip
+        durability = WRITTEN
+        if contract is not None and ref.kind == STEP:
+            durability = durability_of(contract, answer.outcome, confirmed=confirmed(context), kind=STEP)
+        line = partial(self._journal.recorder.decision, now, ref, identity, asked.state, context, decided, durability)
         yield from self._journal.record(line, now, durability, awaited=True)
 
     def _subject(self, ref: Ref, of: Invocation | None) -> str:

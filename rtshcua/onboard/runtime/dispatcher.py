@@ -127,7 +127,7 @@ class Dispatcher:
         active = self.active
         if active is None:
             return
-        if active.homeward and active.ref.kind != STEP and event in _UNCONFIRMED:
+        if event in _UNCONFIRMED and active.ref.kind != STEP and active.homeward:
             detail = UNCONFIRMED
         self._journal.effect(now, event, active.ref, token=active.command.token, detail=detail)
         self._executor.ended(active.command.token)

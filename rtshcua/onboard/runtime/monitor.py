@@ -1,6 +1,7 @@
 """What is known of the vehicle: its signals (the paper's `S_t`), and whether it is ready, armed and in the air."""
 
 from dataclasses import dataclass
+from typing import cast
 
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.temporal import initial, observe
@@ -91,13 +92,16 @@ class StateMonitor:
         """
         if self._state is not None and self._state[0] == now_us:
             return self._state[1]
-        oldest_us = now_us - MAX_AGE_US
-        ages = tuple(
-            [
-                0 if stamp is None or stamp > now_us else MAX_AGE_US if stamp < oldest_us else now_us - stamp
-                for stamp in self._stamps
-            ]
-        )
+        stamps, oldest_us = cast("list[int]", self._stamps), now_us - MAX_AGE_US
+        if None not in stamps and oldest_us <= min(stamps, default=now_us) and max(stamps, default=now_us) <= now_us:
+            ages = tuple([now_us - stamp for stamp in stamps])  # most often it is so, and the same is found sooner
+        else:
+            ages = tuple(
+                [
+                    0 if stamp is None or stamp > now_us else MAX_AGE_US if stamp < oldest_us else now_us - stamp
+                    for stamp in self._stamps
+                ]
+            )
         if self._held is None:
             self._held = tuple(self._values)
         state = State(self._held, ages, self._truths)

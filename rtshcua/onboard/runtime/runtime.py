@@ -78,13 +78,14 @@ class Runtime:
         monitor.observe(now)
         while controller.turn(now):
             pass
-        if controller.stage is not _ENDED:
-            self._journal.tell_counted(now)
         return self._journal.reflex
 
     def actions(self, now: Now) -> list[Action]:
         """The second half of a step, at the same moment: all that is to be done, in its order."""
-        return self._journal.take(now, ended=self._controller.stage is _ENDED)
+        ended = self._controller.stage is _ENDED
+        if not ended:
+            self._journal.tell_counted(now)
+        return self._journal.take(now, ended=ended)
 
     def prepare(self, now: Now) -> None:
         """To be called after `step` when nothing else is to be done: what the running step's fallback would need where

@@ -41,3 +41,14 @@ def test_a_value_beyond_64_bits_is_unknown() -> None:
     assert monitor.state(0).values == (MAX_VALUE, *(None,) * (flat.SLOTS - 1))
     monitor.update(Readings(0, ((0, -MAX_VALUE - 1),)))
     assert monitor.state(0).values[0] is None
+
+
+def test_ages_are_the_same_where_every_slot_was_reported() -> None:
+    monitor = StateMonitor(POLICY)
+    monitor.update(Readings(500, tuple((slot, 1) for slot in range(flat.SLOTS))))
+    monitor.update(Readings(700, ((0, 1),)))
+    assert monitor.state(700).ages == (0, *(200,) * (flat.SLOTS - 1))
+    assert monitor.state(600).ages == (0, *(100,) * (flat.SLOTS - 1))
+    assert monitor.state(500 + MAX_AGE_US).ages == (MAX_AGE_US - 200, *(MAX_AGE_US,) * (flat.SLOTS - 1))
+    assert monitor.state(501 + MAX_AGE_US).ages == (MAX_AGE_US - 199, *(MAX_AGE_US,) * (flat.SLOTS - 1))
+    assert monitor.state(700 + 2 * MAX_AGE_US).ages == (MAX_AGE_US,) * flat.SLOTS

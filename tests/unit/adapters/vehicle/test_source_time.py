@@ -384,7 +384,7 @@ def test_hostile_frames_neither_raise_nor_make_anything_younger_than_it_came(dat
         size = kind.fields.size
         payload = data.draw(st.binary(min_size=size, max_size=size))
         try:
-            message = kind.build(kind.fields.unpack(payload))
+            message = kind.build(*kind.fields.unpack(payload))
         except (UnicodeDecodeError, ValueError):
             continue
         component = data.draw(st.sampled_from([1, 1, 1, 68, 158]))

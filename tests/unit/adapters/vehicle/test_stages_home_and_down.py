@@ -1,0 +1,59 @@
+"""The stages home and down are made once for a vehicle, ahead of being needed: none serves another vehicle or kind."""
+
+from collections.abc import Callable
+
+import pytest
+
+from rtshcua.adapters.ardupilot import flavour as ardupilot
+from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.px4 import flavour as px4
+from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.flavour import Stage
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.mavlink.modes import CopterMode, Px4Mode
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Command, Ready
+from virtual.flyer import Flyer
+from virtual.rows import rows
+
+MODES = {
+    (PX4.name, MotionKind.HOME): Px4Mode.RETURN,
+    (PX4.name, MotionKind.LAND): Px4Mode.LAND,
+    (ARDUPILOT.name, MotionKind.HOME): CopterMode.RTL,
+    (ARDUPILOT.name, MotionKind.LAND): CopterMode.LAND,
+}
+
+
+def stages(flavour: str, kind: MotionKind, system: int) -> list[Stage]:
+    made = {each.name: each for each in (PX4, ARDUPILOT)}[flavour]
+    return made.stages(Command(7, "any", kind, (), (), 0, 0), ObservedVehicle(), system)
+
+
+@rows("flavour, kind", MODES)
+def test_they_are_the_same_whenever_they_are_asked_for(flavour: str, kind: MotionKind) -> None:
+    for system in (1, 2, 1):
+        first, last = stages(flavour, kind, system)
+        expected = messages.set_mode(system, MODES[flavour, kind])
+        assert first.message.to_dict() == expected.to_dict()
+        assert first.modes == last.modes == {MODES[flavour, kind]}
+
+
+@rows("flavour, kind", MODES)
+def test_what_a_manoeuvre_has_flown_is_there_for_the_next_one(flavour: str, kind: MotionKind) -> None:
+    flown = stages(flavour, kind, 1)
+    flown.clear()
+    assert len(stages(flavour, kind, 1)) == 2
+
+
+def test_they_are_made_when_the_vehicle_is_known(
+    flyer: Callable[..., Flyer], flavour: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = {PX4.name: px4, ARDUPILOT.name: ardupilot}[flavour]
+    made._coming_down.cache_clear()
+    flown = flyer()
+    flown.until(Ready)
+    system = flown.vehicle.driver.system
+    monkeypatch.setattr(messages, "set_mode", None)
+    for kind in (MotionKind.HOME, MotionKind.LAND):
+        assert len(stages(flavour, kind, system)) == 2

@@ -1,0 +1,45 @@
+"""A single situation as sets of values: a slot that is missing, stale or beyond all sense is MISSING, no other is."""
+
+from reference import flat_case as flat
+from reference.asking import POLICY
+from rtshcua.decision.case import situation
+from rtshcua.decision.values import MISSING, PRESENT, Value
+from rtshcua.model.flat.situation import State
+from virtual.rows import rows
+
+FRESH = flat.state()
+SLOTS = range(flat.SLOTS)
+
+
+def values_of(state: State) -> list[Value]:
+    return list(situation(state, POLICY, flat.NOW).values)
+
+
+def known(value: int | None) -> Value:
+    assert value is not None
+    return value, value, PRESENT, None
+
+
+def test_where_all_is_known_every_slot_is_what_was_reported() -> None:
+    assert values_of(FRESH) == [known(value) for value in FRESH.values]
+
+
+@rows("slot", SLOTS)
+def test_a_slot_is_missing_from_its_limits_on_and_no_other_is(slot: int) -> None:
+    stale_us, most = POLICY.limits[slot]
+    usual = [known(value) for value in FRESH.values]
+    ages = ((-1, False), (0, True), (stale_us, True), (stale_us + 1, False))
+    for age, good in ages:
+        state = State(FRESH.values, (*FRESH.ages[:slot], age, *FRESH.ages[slot + 1 :]))
+        assert values_of(state) == [*usual[:slot], usual[slot] if good else MISSING, *usual[slot + 1 :]], age
+    given = ((None, False), (-most - 1, False), (-most, True), (most, True), (most + 1, False))
+    for value, good in given:
+        state = State((*FRESH.values[:slot], value, *FRESH.values[slot + 1 :]), FRESH.ages)
+        assert values_of(state) == [*usual[:slot], known(value) if good else MISSING, *usual[slot + 1 :]], value
+
+
+@rows(
+    "values, ages", [((), ()), (FRESH.values, FRESH.ages[1:]), (FRESH.values[1:], FRESH.ages), (FRESH.values * 2,) * 2]
+)
+def test_of_a_state_of_the_wrong_size_nothing_is_believed(values: tuple[int, ...], ages: tuple[int, ...]) -> None:
+    assert values_of(State(values, ages)) == [MISSING for _ in SLOTS]

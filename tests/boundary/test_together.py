@@ -1,0 +1,62 @@
+"""The boundary's process and the one in Python answer the same, whatever they are asked in turn: in the soak a million
+requests, among documents, dispatches, links by standing permits, frames, reports and statements.
+"""
+
+import json
+from collections import Counter
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from boundary.shadow import Differs
+from boundary.together import ask_both, decided
+from rtshcua.adapters.boundary_process import program
+
+pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
+CHECKOUT = Path(__file__).resolve().parents[2]
+CHUNKS, CHUNK = 100, 10_000
+
+
+def test_both_answer_the_same(tmp_path: Path) -> None:
+    counts = ask_both(0, 1_000, tmp_path)
+    assert decided(counts) >= 1_000
+    wanted = {
+        *("requests ALLOW", "requests DENY", "requests DEFER", "requests FALLBACK", "dispatches", "refused permits"),
+        *("documents accepted", "documents refused", "frames", "refused frames", "believed", "statements"),
+    }
+    assert wanted <= counts.keys(), counts
+
+
+def test_an_answer_that_differs_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import rtshcua.onboard.enforcement.executor as here
+
+    monkeypatch.setattr(here, "_HOMEWARD", ())
+    with pytest.raises(Differs):
+        ask_both(0, 1_000, tmp_path)
+
+
+@cache
+def answers_done() -> Path:
+    """Where it is noted what both were asked already: of this program, and of this Python."""
+    built = program()
+    assert built is not None
+    digest = sha256(built.read_bytes())
+    for each in sorted(path for top in ("rtshcua", "tests/boundary") for path in (CHECKOUT / top).rglob("*.py")):
+        digest.update(each.read_bytes())
+    folder = CHECKOUT / "build" / "soak-together" / digest.hexdigest()[:16]
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("chunk", range(1, CHUNKS + 1))
+def test_both_answer_a_million_requests_the_same(chunk: int, tmp_path: Path) -> None:
+    """What was done before goes unasked: it goes on where it stopped."""
+    done = answers_done() / f"{chunk}.json"
+    if not done.exists():
+        counts = ask_both(chunk * CHUNK, CHUNK, tmp_path)
+        done.with_suffix(".part").write_text(json.dumps(counts))
+        done.with_suffix(".part").replace(done)
+    assert decided(Counter(json.loads(done.read_text()))) >= CHUNK

@@ -158,7 +158,7 @@ def launch(order: Launch) -> ExitCode:
             stack.callback(debts.close)
             slack = max(1, round(order.speed / _UNHURRIED))
             begun = _begin(order, bundle, loaded, trust, log_kid, past, debts.left, clock, interrupts, slack, stack)
-            bundle, loaded, trust, (own_key, keyless), apart, transport, agents = begun
+            bundle, loaded, trust, (own_key, keyless), apart, absent, transport, agents = begun
             root, signed_root = trust.root, trust.signed
             signing = _sign(order, loaded, clock, apart)
             stack.callback(signing.close)
@@ -202,7 +202,7 @@ def launch(order: Launch) -> ExitCode:
             _expect_current(lapsed, resumed=resumed)
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
-            _expect_boundary_key(keyless, resumed=resumed)
+            _expect_all(absent, keyless, resumed=resumed)
             inside = BoundarySession(BoundaryStore(order.state, loaded.vehicle), own_key, aloft=resumed)
             told = trust.settle(resumed=resumed)
             run, elsewhere = _run_folder(order, loaded, bundle, clock, resumed=resumed)
@@ -222,7 +222,9 @@ def launch(order: Launch) -> ExitCode:
                 mark_opened(order.state, loaded, clock, flight)
             unsure = [UTC_NOTE] if utc.waits else []
             unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
-            for note in (*signing.notes, *filter(None, [told, elsewhere, past.note, unsigned, inside.note]), *unsure):
+            alone = f"{absent}; it is brought down without a boundary of its own" if absent is not None else ""
+            told_before = filter(None, [alone, told, elsewhere, past.note, unsigned, inside.note])
+            for note in (*signing.notes, *told_before, *unsure):
                 feed.post(Note(note))
             gc.collect()
             gc.freeze()  # what was loaded stays; the collector need not look at it while flying
@@ -242,7 +244,8 @@ def launch(order: Launch) -> ExitCode:
 
 class _Begun(NamedTuple):
     """What flies: its bundle, in force; under what it is trusted; the key that the boundary signs with, or why there is
-    none; the boundary, where it runs apart. A run that waited has its link and its sockets already.
+    none; the boundary, where it runs apart, or why it is `absent`. A run that waited has its link and its sockets
+    already.
     """
 
     bundle: bytes
@@ -250,6 +253,7 @@ class _Begun(NamedTuple):
     trust: Trusted
     key: tuple[SigningKey | None, Refused | None]
     apart: Apart | None
+    absent: Refused | None
     transport: Transport | None = None
     agents: Agents | None = None
 
@@ -262,19 +266,21 @@ def _begin(
     and OSError.
     """
     key = _boundary_key(order, trust.root, loaded, clock)
-    _expect_boundary_key(key[1], resumed=not order.dry_run)
-    apart = _apart(order, loaded, trust, key[0], owed, stack)
+    _expect_all(key[1], resumed=not order.dry_run)
+    apart, absent = _apart(order, loaded, trust, key[0], owed, past, stack), None
+    if isinstance(apart, Refused):
+        apart, absent = None, apart
     if order.wait_s is None:
-        begun = _Begun(bundle, _taken_over(apart, loaded, bundle, clock), trust, key, apart)
+        begun = _Begun(bundle, _taken_over(apart, loaded, bundle, clock), trust, key, apart, absent)
     else:
         if apart is not None:  # it draws the id of the flight that the sockets tell of
             loaded = apart.waiting(_load(order, bundle, trust.root, clock.now(), apart.flight()))
         transport, agents = _stand_by(order, loaded, stack)
         (bundle, loaded), waited = _wait(
-            order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents, apart
+            order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents, apart, absent
         )
         key = key if waited is trust else _boundary_key(order, waited.root, loaded, clock)
-        begun = _Begun(bundle, loaded, waited, key, apart, transport, agents)
+        begun = _Begun(bundle, loaded, waited, key, apart, absent, transport, agents)
     if isinstance(begun.loaded.preparation, PreparationIssuer):  # the one elsewhere was told when it began
         begun.loaded.preparation.owes(owed)
     return begun
@@ -282,10 +288,11 @@ def _begin(
 
 def _apart(
     order: Launch, loaded: Loaded, trust: Trusted, own_key: SigningKey | None, owed: Mapping[str, Owed],
-    stack: ExitStack,
-) -> Apart | None:  # fmt: skip
+    past: Past | None, stack: ExitStack,
+) -> Apart | Refused | None:  # fmt: skip
     """A boundary that runs apart, where that is asked for, until the stack is closed. What may have expired is brought
-    down by the one in this process, which does not ask. Raises `Refused` and OSError.
+    down by the one in this process, which does not ask; and so is what may be in the air, where it does not begin: the
+    answer says why. Raises `Refused` and OSError.
     """
     if order.mode is not Mode.PROCESS or order.dry_run or trust.distrust is not None:
         return None
@@ -296,6 +303,10 @@ def _apart(
         )  # fmt: skip
     except LinkKeyError as error:
         raise _of_link_key(error) from None
+    except Refused as refused:
+        if past is None or past.broken_off is None or refused.slug == "boundary-in-use":
+            raise
+        return refused
     stack.callback(apart.process.close)
     return apart
 
@@ -319,10 +330,11 @@ def _boundary_key(
         return None, refused
 
 
-def _expect_boundary_key(keyless: Refused | None, *, resumed: bool) -> None:
-    """What is in the air comes down without one."""
-    if keyless is not None and not resumed:
-        raise keyless
+def _expect_all(*missing: Refused | None, resumed: bool) -> None:
+    """What is in the air comes down without."""
+    for refused in missing:
+        if refused is not None and not resumed:
+            raise refused
 
 
 def _run_folder(
@@ -383,6 +395,7 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
 def _wait(
     order: Launch, base: Loaded, trusted: Trusted, log_key: bytes, past: Past | None, clock: LinkClock,
     interrupts: Interrupts, slack: int, transport: Transport, agents: Agents, apart: Apart | None,
+    absent: Refused | None,
 ) -> tuple[Admitted, Trusted]:  # fmt: skip
     """Wait, connected, for the bundle that flies, and under what it is trusted; the one of a flight that broke off in
     the air is not waited for. Raises `Refused`.
@@ -405,6 +418,7 @@ def _wait(
             return admitted, under
         if trusted.distrust is not None:  # what it is not enough for is to fly anything new
             raise trusted.distrust
+        _expect_all(absent, resumed=False)
         notes = list(signing.notes)
         if order.link is not None:
             note, meanwhile = unqualified(

@@ -1,16 +1,31 @@
 """`rtshcua run --mode process`, over UDP: by a boundary of its own process, under a user of its own, with the keys."""
 
 import os
+import signal
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.store.writing import lock
 
 SPEED = 3
 AS = ("--boundary-user", "nobody") if os.geteuid() == 0 else ()
 pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
+
+
+def let_go(kept: Path) -> None:
+    """Wait until the boundary of a run that is over has written what it keeps."""
+    until_s = time.monotonic() + 10
+    while True:
+        try:
+            os.close(lock(kept))
+            return
+        except BlockingIOError:
+            assert time.monotonic() < until_s
+            time.sleep(0.05)
 
 
 def test_a_flight_by_a_boundary_of_its_own(ground: Any) -> None:
@@ -40,3 +55,25 @@ def test_the_same_bundle_is_refused_by_the_boundary_where_the_run_has_forgotten_
         marker.unlink()
     again = ground.run(bundle, "--mode", "process", speed=SPEED).end()
     assert again.code == 5, again.stderr
+
+
+def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground: Any, port: int) -> None:
+    """What it kept was damaged while nobody flew: nothing new flies, and what does comes down without it."""
+    ground.vehicle(port, SPEED)
+    words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--mode", "process")
+    bundle = ground.bundle()
+    first = ground.run(bundle, *words, speed=SPEED)
+    first.until("dispatched", step=1)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    (kept,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("boundary/vehicle-quad-07.kept")
+    let_go(kept)
+    kept.write_bytes(bytes(kept.stat().st_size))
+
+    second = ground.run(bundle, *words, speed=SPEED).end()
+    assert second.code == 6, second.stderr
+    (told,) = [event["text"] for event in second.events if "is damaged" in event.get("text", "")]
+    assert told.startswith(f"`{kept}` is damaged")
+    third = ground.run(ground.bundle(name="another"), *words, speed=SPEED).end()
+    assert third.code == 3, third.stderr
+    assert third.events[-1]["slug"] == "boundary-damaged"

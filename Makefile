@@ -58,7 +58,7 @@ bench: setup ## run every benchmark; each prints a ratio against a peer or a lim
 size: setup ## count modules, code lines, shared names and functions that are too long, by package
 	@$(BIN)/python .make/size
 
-dist: setup ## build the wheel into dist, and its bill of materials (CycloneDX); the same bytes each time
+dist: setup ## build the wheels into dist, and their bill of materials (CycloneDX); the same bytes each time
 	@.make/dist $(BIN)/python
 
 clean: ## remove set-up, builds and caches; runs/ and keys stay

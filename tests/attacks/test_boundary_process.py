@@ -19,7 +19,7 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, Measure, kept_file, program
+from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, Measure, kept_file
 from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
@@ -35,7 +35,6 @@ from rtshcua.wire.statement import open_statement
 from virtual import case
 from virtual.shipped import shipped
 
-pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
 VEHICLE = "quad-07"
 ROOT_USER = pytest.mark.skipif(os.geteuid() != 0, reason="only root may start what runs as another user")
 

@@ -9,13 +9,16 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-PRODUCTS = {"rtshcua-0.1.0-py3-none-any.whl", "rtshcua.cdx.json"}
+TAGS = {each: f"manylinux_2_17_{each}.musllinux_1_1_{each}" for each in ("x86_64", "aarch64")}
+PRODUCTS = {f"rtshcua-0.1.0-py3-none-{tag}.whl" for tag in ("any", *TAGS.values())} | {"rtshcua.cdx.json"}
+FETCHED = "build/boundary/fetched"
 
 
 def copied(place: Path, *, stray: bool) -> Path:
@@ -29,6 +32,7 @@ def copied(place: Path, *, stray: bool) -> Path:
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(CHECKOUT / name, place / name)
             shutil.copymode(CHECKOUT / name, place / name)
+    shutil.copytree(CHECKOUT / FETCHED, place / FETCHED)  # as set-up left it: pinned by hash
     for folder in ("rtshcua/__pycache__", "build/lib/rtshcua", "dist"):
         if stray:
             (place / folder).mkdir(parents=True)
@@ -44,6 +48,13 @@ def made(place: Path, mask: int, more: dict[str, str]) -> dict[str, bytes]:
     return {each.name: each.read_bytes() for each in (place / "dist").iterdir() if each.suffix != ".pyc"}
 
 
+#: what is compiled into the program, and who has the rights to it
+HOLDERS = {
+    "monocypher": "Loup Vaillant", "libsodium": "Colin Percival", "musl": "Rich Felker", "zig-compiler-rt": "Zig",
+}  # fmt: skip
+COMPILED = HOLDERS.keys()
+
+
 @pytest.mark.clients
 def test_make_dist_gives_the_same_bytes_whoever_runs_it_where_and_when(tmp_path: Path) -> None:
     one = copied(tmp_path / "one", stray=False)
@@ -56,6 +67,25 @@ def test_make_dist_gives_the_same_bytes_whoever_runs_it_where_and_when(tmp_path:
     assert first.keys() == PRODUCTS
     assert made(other, 0o077, odd | {"PYTHONHASHSEED": "7", "USER": "somebody"}) == first
     assert made(one, 0o022, {}) == first  # over what is there
+    for machine, number in (("x86_64", 62), ("aarch64", 183)):
+        with ZipFile(one / f"dist/rtshcua-0.1.0-py3-none-{TAGS[machine]}.whl") as wheel:
+            expect_program(wheel, number)
+
+
+def expect_program(wheel: ZipFile, machine: int) -> None:
+    """It may be run on this machine (its number in ELF), needs no C library there, and has all licences with it."""
+    info = wheel.getinfo("rtshcua/boundary/rtshcua-boundary")
+    assert info.external_attr >> 16 & 0o777 == 0o755
+    program = wheel.read(info)
+    assert (program[:4], int.from_bytes(program[18:20], "little")) == (b"\x7fELF", machine)
+    start, size, count = (int.from_bytes(program[at:to], "little") for at, to in ((32, 40), (54, 56), (56, 58)))
+    kinds = {int.from_bytes(program[start + each * size :][:4], "little") for each in range(count)}
+    interpreter = 3
+    assert interpreter not in kinds
+    names = {Path(each).stem: each for each in wheel.namelist() if each.startswith("rtshcua/boundary/licences/")}
+    assert names.keys() == COMPILED
+    for name, holder in HOLDERS.items():
+        assert holder in wheel.read(names[name]).decode()
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +98,37 @@ def applies(each: Requirement, extras: tuple[str, ...] = ("",)) -> bool:
     return each.marker is None or any(each.marker.evaluate({"extra": extra}) for extra in extras)
 
 
+def packages(bill: Any) -> list[Any]:
+    """Its components that are installed with the wheel, not compiled into it."""
+    return [each for each in bill["components"] if each["name"] not in COMPILED]
+
+
+def test_the_bill_of_materials_has_what_the_program_is_compiled_from(bill: Any) -> None:
+    inside = {each["name"]: each for each in bill["components"] if each["name"] in COMPILED}
+    assert inside.keys() == COMPILED
+    pins = "".join((CHECKOUT / "requirements" / f"{each}.txt").read_text("utf-8") for each in ("boundary", "zig"))
+    for each in inside.values():
+        package, _, rest = each["purl"].removeprefix("pkg:pypi/").partition("@")
+        pin = pins[pins.index(f"{package}=={rest.partition('#')[0]} ") :].split("==")[1]
+        assert each["version"]
+        assert each["hashes"]
+        for value in each["hashes"]:
+            assert f"sha256:{value['content']}" in pin
+        assert "licenses" in each
+    (own,) = [each for each in bill["dependencies"] if each["ref"].startswith("pkg:pypi/rtshcua@")]
+    assert {each["bom-ref"] for each in inside.values()} <= {*own["dependsOn"]}
+    head = (CHECKOUT / FETCHED / "monocypher.c").read_text("utf-8").splitlines()[0]
+    assert head == f"// Monocypher version {inside['monocypher']['version']}"
+
+
 def test_the_bill_of_materials_has_the_versions_that_are_pinned_and_installed(bill: Any) -> None:
     text = (CHECKOUT / "requirements/dev.txt").read_text(encoding="utf-8").replace("\\\n", "")
     pins = [Requirement(line.split("--hash")[0]) for line in text.splitlines() if "==" in line]
     pinned = {canonicalize_name(each.name): str(each.specifier)[2:] for each in pins if applies(each)}
-    listed = {each["name"]: each["version"] for each in bill["components"]}
-    assert len(listed) == len(bill["components"])
+    listed = {each["name"]: each["version"] for each in packages(bill)}
+    assert len(listed) == len(packages(bill))
     assert listed == {name: pinned[name] for name in listed} == {name: metadata.version(name) for name in listed}
-    assert {each["purl"] for each in bill["components"]} == {f"pkg:pypi/{name}@{it}" for name, it in listed.items()}
+    assert {each["purl"] for each in packages(bill)} == {f"pkg:pypi/{name}@{it}" for name, it in listed.items()}
 
 
 def test_the_bill_of_materials_lists_what_is_needed_and_nothing_else(bill: Any) -> None:
@@ -87,9 +140,9 @@ def test_the_bill_of_materials_lists_what_is_needed_and_nothing_else(bill: Any) 
     extras = {
         canonicalize_name(Requirement(e).name) for line in project["optional-dependencies"].values() for e in line
     }
-    assert edges["rtshcua"] == (always | extras) - {"rtshcua"}
+    assert edges["rtshcua"] == ((always | extras) - {"rtshcua"}) | COMPILED
     for name, below in edges.items():
-        if name != "rtshcua":
+        if name not in {"rtshcua", *COMPILED}:
             lines = [Requirement(each) for each in metadata.requires(name) or ()]
             assert {canonicalize_name(each.name) for each in lines if applies(each)} <= below
 
@@ -102,4 +155,4 @@ def test_the_bill_of_materials_lists_what_is_needed_and_nothing_else(bill: Any) 
 
     scopes = {each["name"]: each["scope"] for each in bill["components"]}
     assert scopes.keys() == reached(set(edges["rtshcua"]))
-    assert {name for name, scope in scopes.items() if scope == "required"} == reached(always)
+    assert {name for name, scope in scopes.items() if scope == "required"} == reached(always) | COMPILED

@@ -6,14 +6,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from rtshcua.adapters.boundary_process import program
 from rtshcua.adapters.store.writing import lock
 
 SPEED = 3
 AS = ("--boundary-user", "nobody") if os.geteuid() == 0 else ()
-pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
 
 
 def let_go(kept: Path) -> None:

@@ -5,12 +5,14 @@ editable install: a path named in a .pth file is searched, its own .pth files ar
 """
 
 import os
+import platform
 import subprocess
 import sys
 import sysconfig
 import venv
 from collections.abc import Callable
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -26,19 +28,32 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def python(place: Path) -> Path:
-    """The Python of an environment with the wheel in it, built by way of the sdist."""
+    """The Python of an environment with the wheel in it: the one for this machine, of two.
+
+    The wheel for any machine is built by way of the sdist; it has the same, but for the boundary's program.
+    """
     checkout = Path(__file__).resolve().parents[2]
-    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(place), str(checkout)]
-    made = subprocess.run(build, cwd=place, capture_output=True, text=True, check=False)
-    assert made.returncode == 0, made.stdout + made.stderr
-    (wheel,) = place.glob("*.whl")
+    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(place)]
+    target = f"{platform.machine()}-linux-musl"
+    for command, more in (
+        ([*build, str(checkout)], {}),
+        ([str(checkout / ".make/boundary"), sys.executable], {"TARGET": target}),
+        ([*build, "--wheel", str(checkout)], {"RTSHCUA_TARGET": target}),
+    ):
+        environment = os.environ | more
+        made = subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True, check=False)
+        assert made.returncode == 0, made.stdout + made.stderr
+    without, including = sorted(place.glob("*.whl"), key=lambda path: "-any" not in path.name)
+    apart = {*ZipFile(including).namelist()} ^ {*ZipFile(without).namelist()}
+    assert "rtshcua/boundary/rtshcua-boundary" in apart
+    assert all(name.startswith("rtshcua/boundary/") for name in apart)
 
     venv.create(place / "venv", with_pip=False, symlinks=True)
     python = place / "venv/bin/python"
     (site,) = (place / "venv/lib").glob("python*/site-packages")
     pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
     made = subprocess.run(
-        [*pip, "install", "--quiet", "--no-compile", "--no-deps", "--no-index", str(wheel)],
+        [*pip, "install", "--quiet", "--no-compile", "--no-deps", "--no-index", "--find-links", str(place), "rtshcua"],
         capture_output=True,
         text=True,
         check=False,
@@ -104,3 +119,16 @@ def test_compile_and_show_a_shipped_mission(run: Run, library: Path, tmp_path: P
 def test_a_project_of_ones_own_is_sound(run: Run, tmp_path: Path) -> None:
     run("rtshcua", "init", tmp_path / "riverside")
     run("rtshcua", "lint", tmp_path / "riverside")
+
+
+def test_a_flight_by_the_boundary_that_the_wheel_brings(run: Run, library: Path, place: Path, tmp_path: Path) -> None:
+    asked = "from rtshcua.adapters.boundary_process import program; print(program())"
+    program = Path(run("python", "-c", asked).stdout.strip())
+    assert program.is_relative_to(place / "venv")
+    assert os.access(program, os.X_OK)
+    bundle, runs = tmp_path / "short.bundle", tmp_path / "runs"
+    run("rtshcua", "keys", "init")
+    run("rtshcua", "compile", library / "missions/short.rts", "-o", bundle)
+    run("rtshcua", "run", bundle, "--mode", "process", "--speed", "10", "--runs", runs)
+    (folder,) = runs.iterdir()
+    run("rtshcua", "verify-log", "--audit", folder)

@@ -1,0 +1,90 @@
+"""Threat: a source distribution that the boundary is built with brings a set-up of its own, or is not the one pinned.
+
+Outcomes: nothing of it runs and nothing else is fetched; what is not pinned is not unpacked.
+"""
+
+import hashlib
+import io
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+SCRIPT = CHECKOUT / ".make" / "monocypher"
+PINNED = {"pymonocypher": "9.8.7", "pynacl": "6.5.4"}
+BACK_ENDS = {"pymonocypher": "", "pynacl": 'build-backend = "setuptools.build_meta"'}
+
+
+def distribution(folder: Path, name: str, mark: Path, files: Any) -> str:
+    """A source distribution whose set-up leaves a mark, and which needs what does not exist to be built; its hash."""
+    top = f"{name}-{PINNED[name]}"
+    texts = {each: f"/* {each} */" for each in files}
+    texts["PKG-INFO"] = f"Metadata-Version: 2.1\nName: {name}\nVersion: {PINNED[name]}\n"
+    texts["setup.py"] = f"open({str(mark)!r}, 'w').close()\n"
+    texts["pyproject.toml"] = f'[build-system]\nrequires = ["rtshcua-never-there"]\n{BACK_ENDS[name]}\n'
+    path = folder / f"{top}.tar.gz"
+    with tarfile.open(path, "w:gz") as tar:
+        for each, text in texts.items():
+            info = tarfile.TarInfo(f"{top}/{each}")
+            info.size = len(text.encode())
+            tar.addfile(info, io.BytesIO(text.encode()))
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.fixture
+def files() -> Any:
+    """What is unpacked, by distribution: two constants of the script, which runs as soon as it is imported."""
+    source = SCRIPT.read_text(encoding="utf-8")
+    found: dict[str, Any] = {}
+    exec(source[source.index("SODIUM =") : source.index("def unpacked")], found)
+    return found["FILES"]
+
+
+def fetch(place: Path, links: Path, pins: dict[str, str]) -> "subprocess.CompletedProcess[str]":
+    """Unpack what is pinned by these hashes, from a folder alone."""
+    for folder in (".make", "requirements"):
+        (place / folder).mkdir(parents=True, exist_ok=True)
+    shutil.copy(SCRIPT, place / ".make")
+    lines = [f"{name}=={PINNED[name]} \\\n    --hash=sha256:{value}\n" for name, value in pins.items()]
+    (place / "requirements" / "boundary.txt").write_text("".join(lines))
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
+    environment |= {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(links), "PIP_CONFIG_FILE": os.devnull}
+    command = [sys.executable, str(place / ".make" / "monocypher")]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_no_set_up_of_what_is_fetched_runs(tmp_path: Path, files: Any) -> None:
+    links, mark = tmp_path / "links", tmp_path / "ran"
+    links.mkdir()
+    pins = {name: distribution(links, name, mark, files[name]) for name in PINNED}
+    done = fetch(tmp_path / "one", links, pins)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not mark.exists()
+    unpacked = tmp_path / "one" / "build" / "boundary" / "fetched"
+    assert (unpacked / "monocypher.c").read_text() == "/* monocypher.c */"
+    assert (unpacked / "private" / "common.h").exists()
+    for name in PINNED:
+        refused = fetch(tmp_path / f"other-{name}", links, pins | {name: "0" * 64})
+        assert refused.returncode != 0
+        assert "hash" in refused.stdout + refused.stderr.lower()
+        assert not (tmp_path / f"other-{name}" / "build" / "boundary" / "fetched").exists()
+    assert not mark.exists()
+
+
+def test_what_is_missing_is_fetched_again(tmp_path: Path, files: Any) -> None:
+    links = tmp_path / "links"
+    links.mkdir()
+    pins = {name: distribution(links, name, tmp_path / "ran", files[name]) for name in PINNED}
+    fetch(tmp_path, links, pins)
+    unpacked = tmp_path / "build" / "boundary" / "fetched"
+    (unpacked / "configure.ac").unlink()
+    assert fetch(tmp_path, links, pins).returncode == 0
+    assert (unpacked / "configure.ac").exists()
+    shutil.rmtree(links)
+    assert fetch(tmp_path, links, pins).returncode == 0, "it is all there"

@@ -6,6 +6,7 @@ anybody. Before anything moves the vehicle its flight mode is known.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Final
 
 from rtshcua.adapters.vehicle import messages
@@ -98,14 +99,16 @@ class Commander:
         stage = self._stage
         if stage is None or stage.message is None or now_us < self.due_us:
             return []
+        message = stage.message
         if stage.command is not None:
-            if hasattr(stage.message, "confirmation"):
-                stage.message.confirmation = self._tries + 1
+            if hasattr(message, "confirmation"):
+                message = copy(message)  # a stage may be flown again
+                message.confirmation = self._tries + 1
             self._doubtful = True
             self._last_us[stage.command] = now_us
         self._tries += 1
         self._sent_us = now_us
-        return [stage.message]
+        return [message]
 
 
 # ---------------------------------------------------------------- who flies it, asked for

@@ -32,6 +32,14 @@ def test_an_unanswered_command_is_sent_again_with_its_confirmation_raised() -> N
     assert not commander.accepted
 
 
+def test_a_stage_that_is_flown_again_begins_without_the_repetitions_before() -> None:
+    commander, same = Commander(), stage()
+    for begins in (0, 60 * S):
+        assert [message.confirmation for message in commander.start(same, begins)] == [0]
+        assert [message.confirmation for message in commander.due(begins + RETRY_US)] == [1]
+    assert same.message.confirmation == 0
+
+
 def test_px4_answers_a_bogus_mode_twice_and_the_second_answer_counts() -> None:
     commander = begun()
     commander.acknowledge(messages.DO_SET_MODE, ACCEPTED, 1)

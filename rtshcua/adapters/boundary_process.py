@@ -28,6 +28,13 @@ _CALL, _ANSWER = MAX_PART + 64, 2_112
 _GREETING: Final = 12
 
 
+#: what is told where there is no program, and nobody asked for one
+UNBUILT: Final = (
+    "a run decides in its own process, in reach of whoever takes it over: the boundary's program was not built"
+)
+UNBUILT_HELP: Final = "`make setup` builds it in a checkout; the wheels for Linux on x86-64 and aarch64 have it"
+
+
 class Measure(IntFlag):
     """What keeps others out of the process, and it away from everything else (boundary/home/isolation.h)."""
 
@@ -97,7 +104,7 @@ class BoundaryProcess:
         path = program()
         if path is None:
             text = "the boundary's program was not built"
-            raise BoundaryError("missing", text, "`make setup` builds it where there is a C compiler")
+            raise BoundaryError("missing", text, UNBUILT_HELP)
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         files: list[int] = [theirs.fileno()]
         try:

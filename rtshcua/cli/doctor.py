@@ -14,6 +14,7 @@ import msgspec
 import typer
 
 from rtshcua import library
+from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP, program
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
@@ -114,7 +115,8 @@ def doctor(
             return refuse(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
-        findings = agents + list(
+        findings = [_boundary(), *agents]
+        findings += list(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
                 unheard=signing.unheard, named=system is not None,
@@ -131,6 +133,14 @@ def doctor(
     else:
         _print(findings)
     return code
+
+
+def _boundary() -> VehicleFinding:
+    """Where a run on this machine decides."""
+    slug = "boundary/process"
+    if program() is not None:
+        return VehicleFinding(slug, MissionVerdict.OK, "a run decides in a process of its own (`run --mode process`)")
+    return VehicleFinding(slug, MissionVerdict.WARN, UNBUILT, "a process of its own", UNBUILT_HELP)
 
 
 def _owed(debts: OwedParameters) -> list[VehicleFinding]:

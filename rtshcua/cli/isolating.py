@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -19,6 +20,9 @@ from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot
+
+#: why nothing begins where another run has the boundary of the vehicle
+IN_USE: Final = "boundary-in-use"
 
 _CODES = {"in-use": ExitCode.REFUSED, "damaged": ExitCode.INPUT, "untrusted": ExitCode.UNTRUSTED}
 

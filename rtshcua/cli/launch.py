@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.keystore import KeyStore
@@ -29,10 +30,10 @@ from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.attesting import UNNAMED, BoundarySession, boundary_key
 from rtshcua.cli.configured import would_set
-from rtshcua.cli.faults import code_of, untrusted, words_of
+from rtshcua.cli.faults import code_of, say, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
-from rtshcua.cli.isolating import Apart
+from rtshcua.cli.isolating import IN_USE, Apart
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
@@ -107,7 +108,7 @@ class Launch:
     `utc_error_us`: what the operator says that UTC is off by at most. `sortie`: it is one of a qualification.
     `settings`: parameters that are set before the flight, by name, and put back after it. `wait_s`: the bundle says the
     policy alone, and for so many seconds at most it waits for the one that flies. `boundary_user`: the user and group
-    that a boundary of its own process runs as.
+    that a boundary of its own process runs as; `unbuilt`, that there is none only because its program is missing.
     """
 
     bundle: Path
@@ -138,6 +139,7 @@ class Launch:
     settings: Mapping[str, int] = field(default_factory=dict)
     wait_s: float | None = None
     boundary_user: tuple[int, int] | None = None
+    unbuilt: bool = False
     boundary_key: Path | None = None
 
 
@@ -222,7 +224,7 @@ def launch(order: Launch) -> ExitCode:
                 mark_opened(order.state, loaded, clock, flight)
             unsure = [UTC_NOTE] if utc.waits else []
             unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
-            alone = f"{absent}; it is brought down without a boundary of its own" if absent is not None else ""
+            alone = "" if absent is None else f"{_why(absent)}; it is brought down without a boundary of its own"
             told_before = filter(None, [alone, told, elsewhere, past.note, unsigned, inside.note])
             for note in (*signing.notes, *told_before, *unsure):
                 feed.post(Note(note))
@@ -253,7 +255,7 @@ class _Begun(NamedTuple):
     trust: Trusted
     key: tuple[SigningKey | None, Refused | None]
     apart: Apart | None
-    absent: Refused | None
+    absent: Refused | OSError | None
     transport: Transport | None = None
     agents: Agents | None = None
 
@@ -262,19 +264,26 @@ def _begin(
     order: Launch, bundle: bytes, loaded: Loaded, trust: Trusted, log_key: bytes, past: Past | None,
     owed: Mapping[str, Owed], clock: LinkClock, interrupts: Interrupts, slack: int, stack: ExitStack,
 ) -> _Begun:  # fmt: skip
-    """The boundary begins, until the stack is closed, and takes the bundle, or one that is waited for. Raises `Refused`
-    and OSError.
+    """The boundary begins, until the stack is closed, and takes the bundle, or one that is waited for. Where it does
+    not, and a vehicle may hang in the air, it is the one in this process. Raises `Refused` and OSError.
     """
+    apart: Apart | None = None
+    absent: Refused | OSError | None = None
     key = _boundary_key(order, trust.root, loaded, clock)
     _expect_all(key[1], resumed=not order.dry_run)
-    apart, absent = _apart(order, loaded, trust, key[0], owed, past, stack), None
-    if isinstance(apart, Refused):
-        apart, absent = None, apart
-    if order.wait_s is None:
-        begun = _Begun(bundle, _taken_over(apart, loaded, bundle, clock), trust, key, apart, absent)
-    else:
-        if apart is not None:  # it draws the id of the flight that the sockets tell of
+    try:
+        apart = _apart(order, loaded, trust, key[0], owed, stack)
+        if order.wait_s is None:
+            loaded = _taken_over(apart, loaded, bundle, clock)
+        elif apart is not None:  # it draws the id of the flight that the sockets tell of
             loaded = apart.waiting(_load(order, bundle, trust.root, clock.now(), apart.flight()))
+    except (Refused, OSError) as error:
+        if (isinstance(error, Refused) and error.slug == IN_USE) or not _may_hang(order, loaded, past):
+            raise
+        apart, absent = None, error
+    if order.wait_s is None:
+        begun = _Begun(bundle, loaded, trust, key, apart, absent)
+    else:
         transport, agents = _stand_by(order, loaded, stack)
         (bundle, loaded), waited = _wait(
             order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents, apart, absent
@@ -286,13 +295,19 @@ def _begin(
     return begun
 
 
+def _may_hang(order: Launch, loaded: Loaded, past: Past | None) -> bool:
+    """Whether a flight of this vehicle may have broken off in the air, which a restart brings down."""
+    if order.wait_s is not None:
+        return past is not None and past.broken_off is not None
+    return _may_have_flown(order, loaded)
+
+
 def _apart(
     order: Launch, loaded: Loaded, trust: Trusted, own_key: SigningKey | None, owed: Mapping[str, Owed],
-    past: Past | None, stack: ExitStack,
-) -> Apart | Refused | None:  # fmt: skip
+    stack: ExitStack,
+) -> Apart | None:  # fmt: skip
     """A boundary that runs apart, where that is asked for, until the stack is closed. What may have expired is brought
-    down by the one in this process, which does not ask; and so is what may be in the air, where it does not begin: the
-    answer says why. Raises `Refused` and OSError.
+    down by the one in this process, which does not ask. Raises `Refused` and OSError.
     """
     if order.mode is not Mode.PROCESS or order.dry_run or trust.distrust is not None:
         return None
@@ -303,10 +318,6 @@ def _apart(
         )  # fmt: skip
     except LinkKeyError as error:
         raise _of_link_key(error) from None
-    except Refused as refused:
-        if past is None or past.broken_off is None or refused.slug == "boundary-in-use":
-            raise
-        return refused
     stack.callback(apart.process.close)
     return apart
 
@@ -330,7 +341,11 @@ def _boundary_key(
         return None, refused
 
 
-def _expect_all(*missing: Refused | None, resumed: bool) -> None:
+def _why(absent: Refused | OSError) -> str:
+    return words_of(absent) if isinstance(absent, OSError) else str(absent)
+
+
+def _expect_all(*missing: Refused | OSError | None, resumed: bool) -> None:
     """What is in the air comes down without."""
     for refused in missing:
         if refused is not None and not resumed:
@@ -395,7 +410,7 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
 def _wait(
     order: Launch, base: Loaded, trusted: Trusted, log_key: bytes, past: Past | None, clock: LinkClock,
     interrupts: Interrupts, slack: int, transport: Transport, agents: Agents, apart: Apart | None,
-    absent: Refused | None,
+    absent: Refused | OSError | None,
 ) -> tuple[Admitted, Trusted]:  # fmt: skip
     """Wait, connected, for the bundle that flies, and under what it is trusted; the one of a flight that broke off in
     the air is not waited for. Raises `Refused`.
@@ -413,7 +428,11 @@ def _wait(
         if broken_off is not None:
             (data, loaded), under = broken_off
             same = apart if under.root == trusted.root and under.distrust is None else None  # it has the one root
-            admitted = Admitted(data, _taken_over(same, loaded, data, clock))
+            try:
+                admitted = Admitted(data, _taken_over(same, loaded, data, clock))
+            except Refused as refused:
+                say(f"note: {refused}; it is brought down all the same")
+                admitted = Admitted(data, loaded)
             agents.fly(admitted.loaded)
             return admitted, under
         if trusted.distrust is not None:  # what it is not enough for is to fly anything new
@@ -652,12 +671,15 @@ def _sign(order: Launch, loaded: Loaded, clock: LinkClock, apart: Apart | None =
             unsigned_radio=order.unsigned_radio, even_damaged=not order.dry_run,
         )  # fmt: skip
         if elsewhere is not None and isinstance(gate, IsolatedGate):
-            signing.notes += [f"the boundary runs without {text}" for text in elsewhere.missing]
+            if elsewhere.missing:
+                signing.notes.append(f"the boundary runs without {'; without '.join(elsewhere.missing)}")
             if elsewhere.link_name is not None:
                 policy, radio = loaded.bundle.policy, order.unsigned_radio
                 signing.elsewhere(elsewhere.link_name, gate, policy, unsigned_radio=radio)
     except LinkKeyError as error:
         raise _of_link_key(error) from None
+    if order.unbuilt:
+        signing.notes.append(f"{UNBUILT}: {UNBUILT_HELP}")
     if order.signing_key is None and order.link is not None and not order.link.is_loopback:
         signing.notes.append(
             f"`{order.link}` has no key: whoever reaches it can speak as the vehicle (`--signing-key`)"

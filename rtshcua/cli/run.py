@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
+from rtshcua.adapters.boundary_process import program
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address, AddressError
@@ -42,10 +43,15 @@ def run(
             help="another vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
         ),
     ] = None,
-    mode: Annotated[Mode, typer.Option(help="where decisions are made; `none` enforces nothing, in simulation")]
-    = Mode.SOFTWARE,
+    mode: Annotated[
+        Mode | None,
+        typer.Option(
+            help="where decisions are made: in a process of their own (default with --connect, where its program was "
+            "built) or in this one; `none` enforces nothing, in simulation",
+        ),
+    ] = None,
     boundary_user: Annotated[
-        str | None, typer.Option(metavar="USER", help="with `--mode process`: the user that it runs as; as root")
+        str | None, typer.Option(metavar="USER", help="with `--mode process`: the user that it runs as; needs root")
     ] = None,
     speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
     flavour: simulated.Flavour = None,
@@ -133,6 +139,7 @@ def run(
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
+    mode, unbuilt = _mode(mode, own=own, named=boundary_user is not None)
     user = _boundary_user(boundary_user, mode)
     group = _group(agent_socket, operator_socket, agent_group)
     if isinstance(user, str) or isinstance(group, str):
@@ -157,6 +164,7 @@ def run(
             link=link,
             simulator=words if incidents is None else incidents.words,
             mode=mode,
+            unbuilt=unbuilt,
             boundary_user=user,
             speed=speed,
             vehicle=vehicle,
@@ -227,6 +235,16 @@ def _misplaced(*, wait: bool, timed: bool, socket: bool, never: bool) -> str | N
     if wait and never:
         return "`--wait` does not go with `--dry-run` and `--scenario`, which know the mission before"
     return None
+
+
+def _mode(mode: Mode | None, *, own: bool, named: bool) -> tuple[Mode, bool]:
+    """Where decisions are made, and whether that is in this process only because there is no program of the boundary.
+    `own`: the vehicle is our simulated one; `named`: a user of the boundary's own was given.
+    """
+    if mode is not None or (own and not named):
+        return mode or Mode.SOFTWARE, False
+    unbuilt = program() is None and not named
+    return (Mode.SOFTWARE if unbuilt else Mode.PROCESS), unbuilt
 
 
 def _boundary_user(name: str | None, mode: Mode) -> tuple[int, int] | str | None:

@@ -87,6 +87,7 @@ def signed(grounds: Any, free_port: Any, tmp_path_factory: pytest.TempPathFactor
         ready = vehicle.until("ready")
         assert (ready["flavour"], ready["peer"]) == ("ardupilot", port)
         link = ["--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", *key, "--unsigned-radio"]
+        link += ["--mode", "software"]  # by a process of its own: test_run_process.py
         bundle = ground.bundle(return_mm=0)
         run = ground.run(bundle, *link, "--witness", f"udpout:127.0.0.1:{free_port()}").end()
         assert run.code == ExitCode.OK, run.stderr

@@ -1,5 +1,6 @@
 """`rtshcua run --mode process`, over UDP: by a boundary of its own process, under a user of its own, with the keys."""
 
+import json
 import os
 import signal
 import time
@@ -62,6 +63,7 @@ def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground:
     first.until("dispatched", step=1)
     first.signal(signal.SIGKILL)
     assert first.process.wait() == -signal.SIGKILL
+    (killed,) = (ground.folder / "runs").iterdir()
     (kept,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("boundary/vehicle-quad-07.kept")
     let_go(kept)
     kept.write_bytes(bytes(kept.stat().st_size))
@@ -70,6 +72,9 @@ def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground:
     assert second.code == 6, second.stderr
     (told,) = [event["text"] for event in second.events if "is damaged" in event.get("text", "")]
     assert told.startswith(f"`{kept}` is damaged")
+    (other,) = set((ground.folder / "runs").iterdir()) - {killed}
+    modes = [json.loads((run / "log.jsonl").read_bytes().splitlines()[0])["mode"] for run in (killed, other)]
+    assert modes == ["process", "software"], "who decided stands in the log"
     third = ground.run(ground.bundle(name="another"), *words, speed=SPEED).end()
     assert third.code == 3, third.stderr
     assert third.events[-1]["slug"] == "boundary-damaged"

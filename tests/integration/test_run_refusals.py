@@ -45,7 +45,7 @@ def test_no_vehicle(ground: Any, capfd: Any, port: int) -> None:
 def test_no_vehicle_leaves_the_bundle_unopened(ground: Any, capfd: Any, port: int) -> None:
     bundle = ground.bundle()
     refused(capfd, bundle, "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
-    assert not (ground.store.folder.parent / "state").exists()
+    assert not (ground.store.folder.parent / "state" / "replay").exists()
 
 
 def test_a_busy_port(ground: Any, capfd: Any) -> None:

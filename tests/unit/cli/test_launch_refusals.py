@@ -114,7 +114,9 @@ def test_a_link_whose_timestamps_are_not_known_brings_home_what_flies(
     else:
         shutil.rmtree(tmp_path / "link")
         (tmp_path / "link").touch()
-    order: Any = SimpleNamespace(signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False)
+    order: Any = SimpleNamespace(
+        signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False, unbuilt=False
+    )
     of = loaded()
     signing = launch._sign(order, of, SystemClock())
     assert isinstance(signing.verifier, SignedLink), "it can be heard whether it flies"

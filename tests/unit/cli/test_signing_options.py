@@ -110,7 +110,9 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
         store.path.write_bytes(b"{")
     of, order = (
         loaded(),
-        SimpleNamespace(signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False),
+        SimpleNamespace(
+            signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False, unbuilt=False
+        ),
     )
     asked: Any = order
     with pytest.raises(launch.Refused) as refused:
@@ -128,7 +130,9 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
 )
 def test_a_link_without_a_key_that_others_may_reach_is_told_of(tmp_path: Path, link: str | None, told: bool) -> None:
     at = None if link is None else address.parse(link)
-    order: Any = SimpleNamespace(signing_key=None, state=tmp_path, unsigned_radio=False, link=at, dry_run=False)
+    order: Any = SimpleNamespace(
+        signing_key=None, state=tmp_path, unsigned_radio=False, link=at, dry_run=False, unbuilt=False
+    )
     assert any("speak as the vehicle" in note for note in launch._sign(order, loaded(), SystemClock()).notes) == told
 
 

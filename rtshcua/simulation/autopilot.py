@@ -205,10 +205,10 @@ class Autopilot:
         self.parameters = Parameters(flavour.parameters, handling, flavour.bytewise)
         for name in SYSTEM_PARAMETERS:
             self.parameters.assign(name, config.system)
+        if config.signing_key is not None:
+            self.parameters.assign("MAV_SIGN_CFG", 1)  # unless its owner says otherwise
         for name, value in config.parameters:
             self.parameters.own(name, value)
-        if config.signing_key is not None:
-            self.parameters.assign("MAV_SIGN_CFG", 1)
         self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()}, self._time)
         self.signing = VehicleSigning(config.signing_key, config.utc_us, config.speed, flavour.key_ahead_us)
         self.plans = Plans()

@@ -299,7 +299,7 @@ def some_mission(random: Random, mission: Mission, kept: int) -> Mission:
     steps = list(mission.invocations[:kept])
     for _ in range(random.randrange(3)):
         new = {} if random.random() < 0.2 else {"invocation_id": random.randbytes(16)}
-        steps.append(replace(random.choice(mission.invocations[1:]), step=len(steps), **new))
+        steps.append(replace(random.choice(mission.invocations[1:] or mission.invocations), step=len(steps), **new))
     last = replace(mission.invocations[-1], step=len(steps), invocation_id=random.randbytes(16))
     return replace(mission, issued_at_us=mission.issued_at_us + 1, invocations=(*steps, last))
 

@@ -36,6 +36,7 @@ MEANINGS = {
 }
 #: the same, of what makes a log incomplete
 _SHORT = {
+    "boundary": "The enforcement boundary was lost in flight, says who wrote the log: it signed nothing of the rest.",
     "anchor": "The log is whole, and witnesses outside did not see all of it: `rtshcua witness` cosigns it.",
     "close": "The program stopped before it closed the log, or its end was cut off. What came after is not known.",
     "tail": MEANINGS["tail"],

@@ -12,7 +12,7 @@ from hashlib import sha256
 from struct import error as struct_error
 from typing import Final, NamedTuple
 
-from rtshcua.evidence.chain import BOUNDARY
+from rtshcua.evidence.chain import BOUNDARY, BOUNDARY_LOST
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
@@ -26,7 +26,7 @@ from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS, Tag
 from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.preparation import MOST, ParameterWrite
-from rtshcua.wire.request import Request
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, Request
 from rtshcua.wire.response import Status
 from rtshcua.wire.statement import Statement, counted
 from rtshcua.wire.trust import TrustRoot, key_refusal
@@ -54,6 +54,7 @@ _DIFFERS: Final = Flaw("boundary/differs", _MOVED)
 _INVENTED: Final = Flaw(
     "boundary/invented", "the boundary signed how far it got, and made no entry after that for this"
 )
+_AFTER: Final = Flaw("boundary/after-loss", "the boundary was lost before this: it made no such thing")
 
 #: tag and payload of what the boundary made of something
 Entry = tuple[Tag, bytes]
@@ -88,6 +89,7 @@ class BoundaryEvidence:
         self.last: Statement | None = None
         self._stated = False  # in this epoch
         self._recovered = False
+        self._lost: tuple[int, int] | None = None  # the record that says so, and where it begins
 
     def check(self, record: AnyRecord, offset: int) -> Finding | None:
         """What the boundary's evidence says against the next record, which begins at an octet of the log, or against
@@ -95,6 +97,10 @@ class BoundaryEvidence:
         """
         if not self.asked:
             return None
+        if self._lost is not None:
+            return _AFTER.at(record.seq, offset) if _is_made(record) else None
+        if isinstance(record, Effect) and record.event == BOUNDARY_LOST:
+            return self._lose(record, offset)
         if isinstance(record, Effect) and record.event == BOUNDARY:
             found = self._stated_by(record)
             return found.at(record.seq, offset) if isinstance(found, Flaw) else found
@@ -105,6 +111,15 @@ class BoundaryEvidence:
             flaw = self._sealed(record)
         self._recovered = self._recovered or isinstance(record, Recover)
         self._stated = False
+        return None if flaw is None else flaw.at(record.seq, offset)
+
+    def _lose(self, record: Effect, offset: int) -> Finding | None:
+        """The runtime says that the boundary is gone: nothing is its own from here on."""
+        self._lost = record.seq, offset
+        last = self.last
+        if last is None:
+            return _unsigned("before this").at(record.seq, offset)
+        flaw = _omitted(last.count - self._count) if self._count < last.count else None
         return None if flaw is None else flaw.at(record.seq, offset)
 
     # -------------------------------------------------------- what the log tells of
@@ -207,6 +222,13 @@ class BoundaryEvidence:
 
     # -------------------------------------------------------- what that proves
 
+    def shortfall(self) -> Finding | None:
+        """Why the boundary's evidence is not whole, in a log in which nothing was found."""
+        if self._lost is None:
+            return None
+        text = "the runtime says that the boundary was lost in flight: what follows is its word alone"
+        return Flaw("boundary/lost", text).at(*self._lost)
+
     def claims(self) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
         """What was proven of a log in which nothing was found, and what was not."""
         last = self.last
@@ -222,7 +244,25 @@ class BoundaryEvidence:
         proven = (Claim("boundary", text),)
         if last.final:
             return proven, ()
+        if self._lost is not None:
+            text = (
+                f"what the boundary made after its last signature, and that it was lost at record {self._lost[0]}: "
+                "that links flew from there on as it had signed them ahead says the runtime alone"
+            )
+            return proven, (Claim("boundary", text),)
         return proven, (Claim("boundary", "what the boundary made after its last signature: it broke off"),)
+
+
+def _is_made(record: AnyRecord) -> bool:
+    """Whether a record tells of something that only a boundary makes. Of the others, links fly without it, and what it
+    did not answer counts as refused.
+    """
+    if isinstance(record, Decision):
+        return True
+    if not isinstance(record, Effect) or record.event in ("refused", "not-permitted"):
+        return False
+    of_link = record.event == "dispatched" and record.kind in (FALLBACK_LINK, CONTINGENCY_LINK)
+    return record.event == BOUNDARY or (record.event in _EFFECTS and not of_link)
 
 
 def _unsigned(when: str) -> Flaw:

@@ -31,6 +31,8 @@ from rtshcua.wire.request import NOTHING, Ref
 
 #: the effect that holds what the boundary signed of its own evidence (`wire.statement`), in base64
 BOUNDARY: Final = "boundary"
+#: the effect that says that the boundary is gone for good: from here on nothing in the log is its own
+BOUNDARY_LOST: Final = "boundary-lost"
 
 #: How much later than `EPOCH_US` and `EPOCH_RECORDS` an epoch is sealed before anything else is recorded; a fifth.
 _LATE = 5

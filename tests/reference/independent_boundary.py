@@ -102,14 +102,20 @@ class Boundary:
         self.counts: list[int] = []  # of the statements
         self.last: list | None = None
         self.marks: dict[int, bytes] = {}
-        self.stated = self.recovered = False
+        self.stated = self.recovered = self.lost = False
 
     def line(self, record: dict) -> None:
         """One record more, behind the genesis. Raises `Disputed`."""
         kind = record["type"]
         if not self.keys:
             return
-        if kind in ("decision", "effect") and record.get("event") != "boundary":
+        if self.lost:
+            self._alone(record)
+        elif kind == "effect" and record["event"] == "boundary-lost":
+            self.lost = True
+            if self.last is None or len(self.digests) - 1 < self.last[3]:
+                raise Disputed("no statement before it was lost, or entries of one without a record")
+        elif kind in ("decision", "effect") and record.get("event") != "boundary":
             self._entry(record)
         elif kind == "effect":
             self._statement(record)
@@ -121,6 +127,15 @@ class Boundary:
                 raise Disputed("no final statement, or entries of it without a record")
             self.recovered = self.recovered or kind == "recover"
             self.stated = False
+
+    def _alone(self, record: dict) -> None:
+        """A record from which on there was no boundary."""
+        event = record.get("event")
+        by_standing = event == "dispatched" and record["kind"] in (1, 2)
+        if record["type"] == "decision" or event == "boundary":
+            raise Disputed("a decision or a statement of a boundary that was lost")
+        if event not in (None, "refused", "not-permitted") and not by_standing and entry(record) is not None:
+            raise Disputed("an entry of a boundary that was lost")
 
     def _entry(self, record: dict) -> None:
         made = entry(record)

@@ -128,6 +128,8 @@ class Walk:
             return Verdict("anchor", str(error), None, self.seq)
         if self.disputed is not None:
             return Verdict("boundary", *self.disputed, self.seq, anchored)
+        if self.boundary is not None and self.boundary.lost:
+            kind = "incomplete"
         return Verdict(kind, "", None, self.seq, anchored)
 
     def line(self, line: bytes) -> None:

@@ -154,7 +154,10 @@ class Auditor:
         assert self._basis is not None
         assert self._boundary is not None
         seen, unseen = self._boundary.claims()
-        report = report._replace(proven=(*report.proven, *seen), unproven=(*report.unproven, *unseen))
+        shortfall = report.shortfall or self._boundary.shortfall()
+        report = report._replace(
+            proven=(*report.proven, *seen), unproven=(*report.unproven, *unseen), shortfall=shortfall
+        )
         if self._meaning is None:
             unproven = (*report.unproven, Claim("decisions", _NOT_DERIVED))
             return trusted(report._replace(unproven=unproven), self._basis)

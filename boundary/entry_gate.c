@@ -46,7 +46,7 @@ const char *rt_test_gate_seal(const uint8_t *frame, uint32_t size, int64_t now_u
 }
 
 const char *rt_test_gate_sign_ahead(const uint8_t *frame, uint32_t size, int64_t now_us) {
-    uint8_t out[RT_STAMPED];
+    uint8_t out[RT_SIGNATURE];
     return rt_gate_sign_ahead(&gate, &last, (rt_bytes){frame, size}, now_us, out);
 }
 

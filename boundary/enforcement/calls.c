@@ -191,7 +191,7 @@ static uint32_t answer_ahead(rt_boundary *boundary, reader *left, int64_t own_us
         if (refused != NULL) return refuse(refused, out);
         left->at += size;
         left->left -= (uint32_t)size;
-        at += executor->gate.signs ? RT_STAMPED : 0;
+        at += executor->gate.signs ? RT_SIGNATURE : 0;
     }
     return (uint32_t)(at - out);
 }

@@ -197,7 +197,7 @@ rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes
     if (gate->signs) {
         memcpy(octets, frame.at, whole);
         uint32_t size = rt_sign_ahead(&gate->signer, octets, whole, now_us);
-        memcpy(out, octets + size - RT_STAMPED, RT_STAMPED);
+        memcpy(out, octets + size - RT_SIGNATURE, RT_SIGNATURE);
     }
     return NULL;
 }

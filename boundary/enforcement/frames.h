@@ -45,9 +45,8 @@ void rt_gate_observe(rt_gate *gate, rt_bytes frame, int64_t now_us);
 /* Why a frame is not sent at a monotonic time, NULL where it is; `out`, of RT_LARGEST_FRAME octets, is what to send then. */
 rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *out, uint32_t *size);
 
-/* Sign a frame of a command ahead, to be sent only when no boundary is there any more: why not, or NULL, and its timestamp and
-   signature in `out`, of RT_STAMPED octets, where the link has a key. The gate stays as it is. */
-#define RT_STAMPED (RT_SIGNATURE - 1)
+/* Sign a frame of a command ahead, to be sent only when no boundary is there any more: why not, or NULL, and its
+   signature in `out`, of RT_SIGNATURE octets, where the link has a key. The gate stays as it is. */
 rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes frame, int64_t now_us, uint8_t *out);
 
 #endif

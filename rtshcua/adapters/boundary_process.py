@@ -148,14 +148,21 @@ class BoundaryProcess:
         return [text for measure, text in MISSING.items() if measure not in self.measures]
 
     def call(self, octets: bytes) -> bytes:
-        """One call. Raises OSError when nobody answers; an empty answer says that it is gone."""
-        self._socket.send(octets)
-        if octets[0] != LOAD:
+        """One call. Raises OSError when nobody answers; an empty answer says that it is gone. One that is late is put
+        to an end: it must not go on behind the back of who did not wait for it.
+        """
+        loads = octets[0] == LOAD
+        try:
+            self._socket.send(octets)
+            if loads:
+                self._socket.settimeout(PATIENCE_S)
             return self._socket.recv(_ANSWER)
-        self._socket.settimeout(PATIENCE_S)
-        answer = self._socket.recv(_ANSWER)
-        self._socket.settimeout(ANSWER_S)
-        return answer
+        except TimeoutError:
+            self._process.kill()
+            raise
+        finally:
+            if loads:
+                self._socket.settimeout(ANSWER_S)
 
     def close(self) -> None:
         """Let it end: it does so when its socket is closed."""

@@ -359,7 +359,7 @@ class Flight:
             lambda text: self._feed.post(Note(text)),
             self._agents.tell if self._agents is not None else lambda line: None,
         )  # fmt: skip
-        if ending is not None and not missing:
+        if ending is not None and not missing and self._loaded.boundary.lost is None:
             self._boundary.ended(self._loaded.attestation.digest)
         return missing
 

@@ -63,7 +63,7 @@ class Apart:
     def waiting(self, base: Loaded) -> Loaded:
         """What is waited with, in this process: what leaves meanwhile, leaves by the boundary."""
         commands = Commands(base.bundle.policy, base.bundle.mission)
-        executor = IsolatedExecutor(self._caller, commands, IsolatedGate(self._caller, signs=self._caller.signs))
+        executor = IsolatedExecutor(self._caller, commands, IsolatedGate(self._caller, commands))
         return replace(base, executor=executor, mode=Mode.PROCESS)
 
     def load(self, bundle: bytes, now: Now) -> Loaded | Refusal:

@@ -30,6 +30,7 @@ from rtshcua.wire.request import STEP
 _TURNS = frozenset({
     "violated", "failed", "taken-over", "interrupted", "recall", "cancellation", "gap", "link-lost", "long-silence",
     "crashed", "stranded", "not-landed", "resumed", "already-airborne", "left", "refused", "undecided", "stood-down",
+    "boundary-lost",
 })  # fmt: skip
 _MOST = 20  # what is told of how it ended, in records
 

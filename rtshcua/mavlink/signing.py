@@ -60,6 +60,7 @@ class Counts:
     strayed: int = 0  # our own, or sent by its sender on another link than the one that we hear it by
     stale: int = 0
     crowded: int = 0  # rightly signed, of a stream for which there is no room
+    unverified: int = 0  # taken in when nobody was there to verify them
 
 
 class Verifier(Protocol):
@@ -146,7 +147,7 @@ class SignedLink:
             return False
         # 4. "Timestamp is older than the previous packet from the same logical stream", or the same: a replay;
         #    "more than 1 minute (6,000,000) behind the local system's timestamp"
-        timestamp = int.from_bytes(frame[-_TAG - _STAMP : -_TAG], "little")
+        timestamp = timestamp_in(frame)
         local = max(self._ahead, self._clock(now_us))
         last = self._streams.get(stream, -1)
         least = local - MINUTE if last < 0 or not self._as_library else 0
@@ -189,3 +190,8 @@ class SignedLink:
 def stream_of(frame: bytes) -> Stream:
     """Which stream a signed frame belongs to."""
     return frame[5], frame[6], frame[-SIGNATURE]
+
+
+def timestamp_in(frame: bytes) -> int:
+    """The timestamp of a signed frame."""
+    return int.from_bytes(frame[-_TAG - _STAMP : -_TAG], "little")

@@ -297,6 +297,11 @@ class Boundary(Protocol):
     world.
     """
 
+    @property
+    def lost(self) -> str | None:
+        """That it is gone for good, in words, and what that means; None while it is there."""
+        ...
+
     def enforce(self, request: bytes) -> bytes:
         """Decide one request; the answer is a decision with, on `allow`, permits."""
         ...

@@ -3,7 +3,7 @@ no permit covers. It has the socket, the files of its own user, and the rights o
 
 Outcomes: the keys are not to be read; what is asked out of turn, ahead of time or with a seal of another session is
 refused; nonsense is answered and changes nothing; a second runtime finds the boundary held; when the boundary dies,
-nothing more leaves by it.
+nothing leaves that it had not signed ahead.
 """
 
 import os
@@ -24,6 +24,7 @@ from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now, State
+from rtshcua.onboard.enforcement.ahead import NO_COPY
 from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, LOAD, LOST, OBSERVE, PART, SEAL, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.ports import BoundaryKey
@@ -312,10 +313,11 @@ def test_one_that_stands_still_is_as_good_as_gone(held: Held) -> None:
     assert held.caller(ENFORCE, b"anything") is LOST, "an answer that comes late is not taken for another's"
 
 
-def test_when_it_dies_nothing_more_leaves(held: Held) -> None:
+def test_when_it_dies_nothing_leaves_that_was_not_signed_ahead(held: Held) -> None:
     os.kill(held.process.pid, signal.SIGKILL)
     gate = held.loaded.executor.frames
-    assert gate.seal(armed_frame(), now().monotonic_us) is LOST
+    assert gate.seal(armed_frame(), now().monotonic_us) is NO_COPY
+    assert held.caller(SEAL, armed_frame()) is LOST
     assert held.ask(0) is Status.MALFORMED
     assert held.caller.lost
     assert held.caller(ENFORCE) is LOST

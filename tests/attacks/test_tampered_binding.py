@@ -79,6 +79,8 @@ def test_a_tampered_request_in_the_air_flies_the_contingency() -> None:
     first, second = (of.bundle.mission.invocations[step].binding for step in (0, 1))
 
     class Tampering:
+        lost = None
+
         def enforce(self, request: bytes) -> bytes:
             return of.boundary.enforce(request.replace(second, first))
 

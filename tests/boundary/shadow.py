@@ -70,18 +70,19 @@ def library(boundary: ctypes.CDLL) -> Callable[[bytes], bytes]:
 def begin(
     boundary: ctypes.CDLL, signed_root: bytes, pin: bytes, vehicle: str, session_key: bytes, now: Now,
     settings: Mapping[str, int] = MappingProxyType({}), owed: Mapping[str, Owed] = MappingProxyType({}),
+    link_key: bytes | None = None,
 ) -> Caller:  # fmt: skip
     """A boundary in C that begins, nothing opened on its vehicle before."""
     boundary.rt_test_boundary_begin.restype = ctypes.c_char_p
     boundary.rt_test_boundary_forget()
     name = vehicle.encode()
     refused = boundary.rt_test_boundary_begin(
-        signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, None, OWN_KEY,
+        signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, link_key, OWN_KEY,
         listed({name: Owed(0, value) for name, value in settings.items()}), listed(owed),
         (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us),
     )  # fmt: skip
     same("the trust root", None, refused)
-    return Caller(library(boundary))
+    return Caller(library(boundary), signs=link_key is not None)
 
 
 class _Write(ctypes.Structure):
@@ -143,6 +144,8 @@ class BothAttestations:
 
 class BothBoundaries:
     """`ports.Boundary`."""
+
+    lost = None
 
     def __init__(self, here: Any, there: IsolatedBoundary, counts: dict[str, int]) -> None:
         self._here, self._there, self._counts = here, there, counts

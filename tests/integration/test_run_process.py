@@ -7,7 +7,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from rtshcua.adapters.store.writing import lock
+from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.tlog import read
 
 SPEED = 3
 AS = ("--boundary-user", "nobody") if os.geteuid() == 0 else ()
@@ -78,3 +82,105 @@ def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground:
     third = ground.run(ground.bundle(name="another"), *words, speed=SPEED).end()
     assert third.code == 3, third.stderr
     assert third.events[-1]["slug"] == "boundary-damaged"
+
+
+FLIGHTS = [("px4", True), ("ardupilot", True), ("px4", False)]
+
+
+def link_key(ground: Any) -> list[str]:
+    key = ground.folder / "link.key"
+    key.write_text("5a" * 32 + "\n")
+    key.chmod(0o600)
+    return ["--signing-key", str(key), "--unsigned-radio"]
+
+
+def kill_boundary(run: Any) -> None:
+    os.kill(run.child("rtshcua-boundary"), signal.SIGKILL)
+
+
+def heights(folder: Path, after_us: int) -> tuple[list[int], list[int]]:
+    """What the vehicle said after a moment (UTC): how high above home it was, in mm, and whether it was landed."""
+    height, landed = [], []
+    for entry in read((folder / "telemetry.tlog").read_bytes()):
+        for each in Codec(0, 0).parse(entry.frame) if entry.at_us >= after_us else ():
+            if each.component == 1 and each.name == "GLOBAL_POSITION_INT":
+                height.append(each.message.relative_alt)
+            elif each.component == 1 and each.name == "EXTENDED_SYS_STATE":
+                landed.append(each.message.landed_state)
+    return height, landed
+
+
+@pytest.mark.parametrize(("flavour", "signed"), FLIGHTS)
+def test_a_boundary_that_is_killed_in_flight(flavour: str, signed: bool, ground: Any) -> None:
+    """What it had signed ahead brings the vehicle down, which obeys nothing else; the log says so, and proves no more
+    than it can.
+    """
+    words = link_key(ground) if signed else []
+    run = ground.run(ground.bundle(), "--mode", "process", *AS, "--flavour", flavour, *words, speed=SPEED)
+    run.until("obeyed", step=1)
+    kill_boundary(run)
+    run.end()
+    assert run.code == 6, run.stderr
+    records = run.log()
+    (lost,) = [record for record in records if record.get("event") == "boundary-lost"]
+    after = records[lost["seq"] :]
+    links = [(r["kind"], r["step"], r["detail"]) for r in after if r.get("event") == "dispatched"]
+    assert links[0][:2] == (1, 1), "the chain of the step that ran"
+    assert links[-1][2] in ("return_home", "emergency_land")
+    assert not [record for record in after if record["type"] == "decision"]
+    assert [record for record in after if record.get("event") in ("succeeded", "landed")]
+    height, landed = heights(run.folder, lost["utc_us"])
+    assert max(height) > 3_000
+    assert abs(height[-1]) < 1_000
+    assert landed[-1] == 1
+
+    verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()
+    (said,) = verified.events
+    assert (verified.code, said["verdict"], said["failure"]) == (10, "incomplete", None)
+    assert (said["shortfall"]["slug"], said["shortfall"]["record"]) == ("boundary/lost", lost["seq"])
+    assert "boundary" in {claim["slug"] for claim in said["unproven"]}
+
+
+#: with a key as fast as life alone: a vehicle that is flown faster signs by the time outside, and falls behind
+RESTARTS = [pytest.param(False, SPEED, id="keyless"), pytest.param(True, 1, id="signed", marks=pytest.mark.soak)]
+
+
+@pytest.mark.parametrize(("signed", "speed"), RESTARTS)
+def test_a_run_whose_boundary_died_with_it_comes_down_by_the_contingency(
+    signed: bool, speed: int, ground: Any, port: int
+) -> None:
+    """As one in software mode does: the boundary knows the bundle, and begins no step of it."""
+    key = link_key(ground) if signed else []
+    ground.vehicle(port, speed, *key[:2])
+    words = (
+        "--connect",
+        f"udpin:127.0.0.1:{port}",
+        "--vehicle",
+        "quad-07",
+        "--mode",
+        "process",
+        *AS,
+        *key,
+        "--utc-error",
+        "1s",
+    )
+    bundle = ground.bundle()
+    first = ground.run(bundle, *words, speed=speed)
+    first.until("dispatched", step=1)
+    first.signal(signal.SIGSTOP)  # both at once
+    kill_boundary(first)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    (killed,) = (ground.folder / "runs").iterdir()
+
+    second = ground.run(bundle, *words, speed=speed).end()
+    assert second.code == 6, second.stderr
+    (other,) = set((ground.folder / "runs").iterdir()) - {killed}
+    records = [json.loads(line) for line in (other / "log.jsonl").read_text().splitlines()]
+    assert "resumed" in [record.get("event") for record in records]
+    flown = [(record["kind"], record["detail"]) for record in records if record.get("event") == "dispatched"]
+    assert {kind for kind, _ in flown} == {2}, "the contingency, and no step"
+    assert flown[-1][1] in ("return_home", "emergency_land")
+    for folder in (killed, other):
+        verified = ground.start("verify-log", "--audit", str(folder), "--json").end()
+        assert verified.code == 0, verified.events

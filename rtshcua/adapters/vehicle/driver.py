@@ -6,9 +6,9 @@ from typing import Protocol
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages, observed, preflight
-from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stages
+from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
 from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink, is_radio
-from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre
+from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendings
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
@@ -224,6 +224,7 @@ class Driver:
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
+        self._renew_ahead(now_us, events, begins=False)
         if self.seen.notes or self.stream_requests.notes or self.preflight.notes:
             self._tell_notes(now_us, events)
         if self._announcer.waiting:
@@ -245,11 +246,8 @@ class Driver:
             return [ports.Failed(now_us, command.token, "taken-over", self._others)], []
         self.link.begin()
         before = modes_of(self.left, flavour) if self._manoeuvre is None else self._manoeuvre.modes
-        way, packs = flavour.stages, self._manoeuvres
-        if packs:  # a skill of its own, else it is flown as any skill of its kind
-            way = packs.get(f"{flavour.name}.{command.skill}") or packs.get(flavour.name, way)
         try:
-            stages = way(command, self.seen, self.system)
+            stages = self._stages(flavour, command)
         except Exception as error:  # noqa: BLE001  a pack's code: whatever it raises, its skill has failed
             slug = "no-datum" if isinstance(error, NoDatum) else "broken-manoeuvre"
             return [ports.Failed(now_us, command.token, slug, str(error))], []
@@ -257,8 +255,28 @@ class Driver:
         self._unsent = command.token
         events: list[Event] = []
         send: list[Message] = []
+        self._renew_ahead(now_us, events, begins=True)  # what brings it down is there before it sets off
         self._advance(now_us, send, events)
         return events, self._pack(send, now_us, events)
+
+    def _stages(self, flavour: AutopilotFlavour, command: Command) -> list[Stage]:
+        way, packs = flavour.stages, self._manoeuvres
+        if packs:  # a skill of its own, else it is flown as any skill of its kind
+            way = packs.get(f"{flavour.name}.{command.skill}") or packs.get(flavour.name, way)
+        return way(command, self.seen, self.system)
+
+    def _renew_ahead(self, now_us: int, events: list[Event], *, begins: bool) -> None:
+        notes = self.link.renew_ahead(self._encoded, now_us, begins=begins)
+        events += [ports.Noted(now_us, text) for text in notes]
+
+    def _encoded(self, command: Command) -> Sequence[Message]:
+        """What a command would be flown by from here, retries included; nothing where that is not known."""
+        assert self.flavour is not None
+        try:
+            stages = self._stages(self.flavour, command)
+        except Exception:  # noqa: BLE001  see `begin`
+            return ()
+        return [each for stage in stages if stage.message is not None for each in sendings(stage.message)]
 
     def release(self) -> None:
         """Stand down: nothing that moves the vehicle is sent any more."""
@@ -390,6 +408,8 @@ class Driver:
         """
         watch = self._watch
         was = watch.down
+        if self.link.is_mute:
+            watch.unasked()
         changed = watch.look(now_us)
         self.seen.up_us, down = watch.up_us, watch.down
         if watch.mute != self._was_mute:

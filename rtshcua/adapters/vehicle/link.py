@@ -2,7 +2,7 @@
 whether it is up.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle import messages
@@ -14,8 +14,8 @@ from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM, UnsignedRadio
 from rtshcua.mavlink.signing import Verifier
-from rtshcua.onboard.enforcement.frames import OURS, Gate
-from rtshcua.onboard.ports import Event
+from rtshcua.onboard.enforcement.frames import OURS, UNSIGNED, Gate
+from rtshcua.onboard.ports import Command, Event
 
 #: what we call ourselves before we know whose system we belong to; nothing is sent under it
 _NOBODY: Final = 255
@@ -55,6 +55,7 @@ class VehicleLink:
         self._named = system is not None
         self._greets_as = system or _DELIVERED
         self._codec = Codec(_NOBODY, OURS, only=None if system is None else {system}, verifier=verifier)
+        self._codec_ahead = Codec(_NOBODY, OURS)
         self._system = 0
         #: until the flight begins: what is not the chosen vehicle's, of its own sender and of another one
         self._others: tuple[Codec, Codec] | None = None
@@ -66,6 +67,7 @@ class VehicleLink:
         self._system = system
         heard = {system} if self._named else {system, RADIO_SYSTEM}
         self._codec = Codec(system, OURS, only=heard, verifier=self._verifier)
+        self._codec_ahead = Codec(system, OURS)
         others = Codec(0, 0, only=frozenset(range(256)) - {system}, verifier=self._verifier)
         # with a key, a second sender of the vehicle's own frames is nobody: at most it repeats them
         self._others = others, Codec(0, 0) if self._verifier is None else others
@@ -120,11 +122,27 @@ class VehicleLink:
         refused: list[Refusal] = []
         for message in send:
             sealed = self._frames.seal(self._codec.pack(message), now_us)
-            if isinstance(sealed, Refusal):
-                refused.append(sealed)
-            else:
+            if not isinstance(sealed, Refusal):
                 frames.append(sealed)
+            elif sealed is not UNSIGNED:
+                refused.append(sealed)
         return frames, refused
+
+    @property
+    def is_mute(self) -> bool:
+        """Whether nothing can be asked any more."""
+        return self._frames.is_mute
+
+    def renew_ahead(
+        self, encode: Callable[[Command], Sequence[Message]], now_us: int, *, begins: bool
+    ) -> Sequence[str]:
+        """Have signed ahead what is due, where there may be a need for it; why something is not, in words. The frames
+        have numbers of their own: they count as none of those that leave.
+        """
+        codec = self._codec_ahead
+        return self._frames.renew_ahead(
+            lambda command: [codec.pack(each) for each in encode(command)], now_us, begins=begins
+        )
 
 
 # ---------------------------------------------------------------- whether it is up
@@ -167,6 +185,10 @@ class LinkWatch:
         """Something was asked that the autopilot answers."""
         if self._unanswered_us is None:
             self._unanswered_us = now_us
+
+    def unasked(self) -> None:
+        """Nothing is asked any more, so that no answer is missed."""
+        self._unanswered_us = None
 
     def answered(self) -> None:
         """It answered."""

@@ -31,6 +31,15 @@ RESULTS = {
 }  # fmt: skip
 
 
+def sendings(message: Message) -> list[Message]:
+    """A message as often as it may have to be sent, with `confirmation` raised on each retry."""
+    made = [copy(message) for _ in range(1 + RETRIES)]
+    for tries, each in enumerate(made):
+        if hasattr(each, "confirmation"):
+            each.confirmation = tries
+    return made
+
+
 class Commander:
     """Sends the message of one stage and follows its acknowledgement; it serves all manoeuvres of a vehicle in turn.
 

@@ -63,6 +63,9 @@ class SoftwareBoundary:
     `enforced` false is mode `none`: it decides and answers as ever, and issues a step's permit whatever the decision.
     """
 
+    #: it is there as long as the runtime
+    lost = None
+
     def __init__(
         self, policy: PreparedPolicy, in_force: InForce, commands: Commands, vehicle: str, key: bytes,
         chain: BoundaryChain, *, enforced: bool,

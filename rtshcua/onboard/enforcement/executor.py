@@ -46,12 +46,10 @@ BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one t
 
 
 class Ahead(NamedTuple):
-    """A link, signed ahead: the token of its command, and of each frame the timestamp and signature; these are empty
-    where there is no key.
-    """
+    """A link, signed ahead: the token of its command, and the signature of each frame, empty where there is no key."""
 
     token: int
-    stamps: tuple[bytes, ...]
+    signatures: tuple[bytes, ...]
 
 
 class Commands:
@@ -88,6 +86,11 @@ class Commands:
         if kind == FALLBACK_LINK and link < 0 and (STEP, step, -1) in self._made:
             return Command(token, *self._targets[link])
         return Command(token, *self._made[kind, step if kind == FALLBACK_LINK else -1, link])
+
+    def links(self, step: int) -> list[tuple[int, int]]:
+        """Kind and number of each link behind a step: its chain, then the contingency."""
+        chain = [(kind, link) for kind, its, link in self._made if kind == FALLBACK_LINK and its == step]
+        return sorted(chain) + sorted((kind, link) for kind, _, link in self._made if kind == CONTINGENCY_LINK)
 
     def _of_step(self, invocation: Invocation) -> _Made:
         plan, contract = invocation.plan, invocation.contract
@@ -195,13 +198,13 @@ class Executor:
             assert refused is not None
             return refused
         command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial)
-        stamps: list[bytes] = []
+        signatures: list[bytes] = []
         for frame in frames:
-            stamp = self._frames.sign_ahead(frame, command, now_us)
-            if isinstance(stamp, Refusal):
-                return stamp
-            stamps.append(stamp)
-        return Ahead(permit.serial, tuple(stamps))
+            signature = self._frames.sign_ahead(frame, command, now_us)
+            if isinstance(signature, Refusal):
+                return signature
+            signatures.append(signature)
+        return Ahead(permit.serial, tuple(signatures))
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
         """What may be set of the vehicle from now on, by a preparation permit, or why nothing may. It is good once, on

@@ -12,7 +12,7 @@ A rule needs to know which autopilot it speaks to and how high its home lies. Bo
 in (`observe`), never asked of the adapter that wants to send. With a key, those frames were verified first.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -39,8 +39,6 @@ HOME_MOVES: Final = 10_000
 
 #: us: how old a heartbeat, and a word of the ground, may be of a vehicle that counts as standing there
 STANDS_US: Final = 3_000_000
-#: octets of a timestamp and a signature, as they stand at the end of a frame
-STAMPED: Final = SIGNATURE - 1
 
 _LANDED: Final = LAYOUTS[EXTENDED_SYS_STATE].at("landed_state")
 _KIND: Final = LAYOUTS[HEARTBEAT].at("autopilot")
@@ -65,6 +63,8 @@ NO_SESSION: Final = Refusal("frame/no-session", "it moves the vehicle, and nothi
 NOT_COVERED: Final = Refusal("frame/not-covered", "it is no part of the command that was permitted")
 #: the leg there was never checked
 OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "it is to a point of the path before its turn")
+#: not sent, and nothing failed by that
+UNSIGNED: Final = Refusal("frame/unsigned", "it moves nothing, and nobody is there any more to sign it")
 LATE: Final = Refusal("frame/late", "it is the command's first frame, after its permit's time")
 
 
@@ -93,6 +93,18 @@ class Gate(Protocol):
         """The octets to send for a frame, or why it is not sent."""
         ...
 
+    @property
+    def is_mute(self) -> bool:
+        """Whether nothing leaves any more but what was signed ahead: no question is asked, so none is answered."""
+        ...
+
+    def renew_ahead(self, encode: Callable[[Command], Sequence[bytes]], now_us: int, *, begins: bool) -> Sequence[str]:
+        """Have signed ahead what is due, where there may be a need for it; why something is not, in words. `encode`
+        makes the frames that a command is flown by, each as often as it may have to be sent. `begins`: nothing but what
+        a step needs that is about to begin.
+        """
+        ...
+
 
 @dataclass(slots=True)
 class _Session:
@@ -106,6 +118,9 @@ class _Session:
 
 class FrameSession:
     """The gate that frames leave by. Opened and closed by the executor alone."""
+
+    #: this gate is there as long as who sends by it
+    is_mute = False
 
     def __init__(self) -> None:
         #: where what leaves is chained
@@ -192,15 +207,19 @@ class FrameSession:
             self.chain.leave(frame)
         return sealed
 
+    def renew_ahead(self, encode: Callable[[Command], Sequence[bytes]], now_us: int, *, begins: bool) -> Sequence[str]:
+        """Nothing: see `is_mute`."""
+        return ()
+
     def sign_ahead(self, frame: bytes, command: Command, now_us: int) -> bytes | Refusal:
-        """Sign a frame of a command ahead, to be sent only when no boundary is there any more: its timestamp and
-        signature, nothing without a key; or why not. The gate stays as it is.
+        """Sign a frame of a command ahead, to be sent only when no boundary is there any more: its signature,
+        none without a key; or why not. The gate stays as it is.
         """
         refused = self._refuse_ahead(frame, command)
         if refused is not None:
             self.chain.stop(frame)
             return refused
-        return b"" if self._signer is None else self._signer.sign_ahead(frame, now_us)[-STAMPED:]
+        return b"" if self._signer is None else self._signer.sign_ahead(frame, now_us)[-SIGNATURE:]
 
     def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
         """Why a frame does not leave, or else whether it carries out a command."""

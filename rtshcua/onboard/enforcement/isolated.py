@@ -14,12 +14,13 @@ from typing import Final
 
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
-from rtshcua.mavlink.signing import Counts
+from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, SIGNATURE
+from rtshcua.mavlink.signing import MINUTE, UNIT_US, Counts, Stream, stream_of, timestamp_in
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import executor, frames, preparation
+from rtshcua.onboard.enforcement.ahead import NOT_AHEAD, Encode, FramesAhead
+from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
 from rtshcua.onboard.enforcement.executor import Ahead, Commands
-from rtshcua.onboard.enforcement.frames import STAMPED
 from rtshcua.onboard.ports import BoundaryKey, Command, Dispatch
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
@@ -47,6 +48,7 @@ _SHOWN: Final = Struct(">qqqII")
 _STANDING: Final = Struct(">qBb")
 _PERMITTED: Final = Struct(">BhhQq")
 _SERIAL_BYTES: Final = 8
+_ALWAYS: Final = (1 << 63) - 1  # us
 
 #: what an answer that makes no sense, or none at all, comes to
 LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or answers what makes no sense")
@@ -101,6 +103,18 @@ class Caller:
                 return answer
         return None
 
+    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+        """Have the frames of a link signed ahead: as `Executor.ahead`."""
+        listed = (len(frame).to_bytes(2) + frame for frame in frames)
+        answer = self(AHEAD, _STANDING.pack(now_us, kind, link), sealed, *listed)
+        if isinstance(answer, Refusal):
+            return answer
+        each = SIGNATURE if self.signs else 0
+        if len(answer) != _SERIAL_BYTES + each * len(frames):
+            return self.lose()
+        begins = (_SERIAL_BYTES + each * number for number in range(len(frames)))
+        return Ahead(int.from_bytes(answer[:_SERIAL_BYTES]), tuple(answer[at : at + each] for at in begins))
+
     def load(self, bundle: bytes, now: Now) -> bytes | Refusal:
         """Hand a bundle over: the id of its flight, which the boundary draws."""
         refused = self.put(LOAD, bundle)
@@ -129,6 +143,14 @@ class IsolatedBoundary:
         self._caller = caller
         self._in_force = in_force
         self._commands = commands
+
+    @property
+    def lost(self) -> str | None:
+        """That it is gone, in words, and what that means; None while it is there."""
+        if not self._caller.lost:
+            return None
+        unverified = ", and what comes from the vehicle is not verified" if self._caller.signs else ""
+        return f"nothing is decided any more{unverified}: links fly as they were signed ahead, and nothing else does"
 
     def enforce(self, request: bytes) -> bytes:
         """The boundary's response; of one that is gone, that nothing was decided."""
@@ -163,13 +185,19 @@ class IsolatedBoundary:
 
 
 class IsolatedGate:
-    """The gate over calls: `frames.Gate`, and `mavlink.signing.Verifier` where the boundary has the link's key."""
+    """The gate over calls: `frames.Gate`, and `mavlink.signing.Verifier` where the boundary has the link's key.
 
-    def __init__(self, caller: Caller, *, signs: bool) -> None:
+    When it is lost, what was signed ahead leaves, and without a key housekeeping too. Nothing that comes can be
+    verified then: what looks as the vehicle's frames looked is taken in all the same, so that the way down is seen.
+    """
+
+    def __init__(self, caller: Caller, commands: Commands) -> None:
         self._caller = caller
-        self._signs = signs
+        #: what leaves when it is lost
+        self.ahead = FramesAhead(commands, caller.ahead)
         #: what came, by what the boundary made of it
         self.counts = Counts()
+        self._heard: dict[Stream, tuple[int, int]] = {}  # the last timestamp of what was verified, and when it came
 
     def stands(self, now_us: int) -> bool:
         """Whether the vehicle is known to be on the ground, disarmed, and nothing permitted is under way."""
@@ -177,7 +205,7 @@ class IsolatedGate:
 
     def observe(self, frame: bytes, now_us: int = 0) -> None:
         """Show it one good frame. With a key it has seen the frame when it verified it."""
-        if not self._signs:
+        if not self._caller.signs:
             self._caller(OBSERVE, _TIME.pack(now_us), frame)
 
     def accept(self, frame: bytes, now_us: int) -> bool:
@@ -186,19 +214,60 @@ class IsolatedGate:
             self.counts.unsigned += 1
             return False
         answer = self._caller(OBSERVE, _TIME.pack(now_us), frame)
+        if self._caller.lost:
+            return self._seems_to_be(frame, now_us)
         names = ("accepted", "unsigned", "forged", "strayed", "stale", "crowded")
         if isinstance(answer, Refusal) or len(answer) != 1 or answer[0] >= len(names):
             return False
         setattr(self.counts, names[answer[0]], getattr(self.counts, names[answer[0]]) + 1)
+        if answer[0] == 0:
+            self._heard[stream_of(frame)] = timestamp_in(frame), now_us
         return answer[0] == 0
+
+    def _seems_to_be(self, frame: bytes, now_us: int) -> bool:
+        """Whether a frame goes on where a stream left off that was verified: nothing that was recorded does, and no
+        other stream. Who makes frames up can tell of another flight, and have it brought down in another way.
+        """
+        stream, timestamp = stream_of(frame), timestamp_in(frame)
+        last, heard_us = self._heard.get(stream, (None, 0))
+        if last is None or not last < timestamp <= last + MINUTE + (now_us - heard_us) // UNIT_US:
+            self.counts.stale += 1
+            return False
+        self._heard[stream] = timestamp, now_us
+        self.counts.unverified += 1
+        return True
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
         """The octets to send for a frame, or why it is not sent."""
-        return self._caller(SEAL, _TIME.pack(now_us), frame)
+        answer = self._caller(SEAL, _TIME.pack(now_us), frame)
+        if self._caller.lost:
+            return self._seal_alone(frame)
+        if self._caller.signs and not isinstance(answer, Refusal):
+            self.ahead.sent(answer)
+        return answer
+
+    def _seal_alone(self, octets: bytes) -> bytes | Refusal:
+        frame = read_frame(octets)
+        if frame is None:
+            return frames.NOT_ONE_FRAME
+        if is_housekeeping(frame):
+            return frames.UNSIGNED if self._caller.signs else octets
+        return self.ahead.take(frame)
+
+    @property
+    def is_mute(self) -> bool:
+        """Whether nobody is there any more to sign a question."""
+        return self._caller.lost and self._caller.signs
+
+    def renew_ahead(self, encode: Encode, now_us: int, *, begins: bool) -> Sequence[str]:
+        """Have signed ahead what is due; why something is not, in words."""
+        return () if self._caller.lost else self.ahead.renew(encode, now_us, begins=begins)
 
 
 class IsolatedExecutor:
-    """`Executor` over calls. What is to be sent is looked up at this end; what may be is decided at the other."""
+    """`Executor` over calls. What is to be sent is looked up at this end; what may be is decided at the other, and when
+    that is lost was signed ahead there.
+    """
 
     def __init__(self, caller: Caller, commands: Commands, gate: IsolatedGate) -> None:
         self._caller = caller
@@ -207,13 +276,17 @@ class IsolatedExecutor:
 
     def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
         """What to send for a permit at a monotonic time, or why nothing is sent."""
-        return self._permitted(self._caller(DISPATCH, _TIME.pack(now_us), sealed))
+        return self._permitted(self._caller(DISPATCH, _TIME.pack(now_us), sealed), sealed)
 
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
         """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
-        return self._permitted(self._caller(STAND_IN, _STANDING.pack(now_us, kind, link), sealed))
+        answer = self._caller(STAND_IN, _STANDING.pack(now_us, kind, link), sealed)
+        if not self._caller.lost:
+            return self._permitted(answer, sealed)
+        command = self.frames.ahead.begin(kind, link)
+        return NOT_AHEAD if command is None else Dispatch(command, _ALWAYS, needs_record=False)
 
-    def _permitted(self, answer: bytes | Refusal) -> Dispatch | Refusal:
+    def _permitted(self, answer: bytes | Refusal, sealed: bytes) -> Dispatch | Refusal:
         if isinstance(answer, Refusal):
             return answer
         try:
@@ -221,6 +294,10 @@ class IsolatedExecutor:
             command: Command = self._commands.command(kind, step, link, serial)
         except (struct_error, LookupError):
             return self._caller.lose()
+        if kind == STEP:
+            self.frames.ahead.stands(sealed, step)
+        else:
+            self.frames.ahead.flown()
         return Dispatch(command, not_after_us, needs_record=kind == STEP)
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
@@ -234,29 +311,24 @@ class IsolatedExecutor:
         """What was to be set is set, or was given up."""
         self._caller(PREPARED)
 
-    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
-        """Have the frames of a link signed ahead: as `Executor.ahead`."""
-        listed = (len(frame).to_bytes(2) + frame for frame in frames)
-        answer = self._caller(AHEAD, _STANDING.pack(now_us, kind, link), sealed, *listed)
-        if isinstance(answer, Refusal):
-            return answer
-        each = STAMPED if self._caller.signs else 0
-        if len(answer) != _SERIAL_BYTES + each * len(frames):
-            return self._caller.lose()
-        begins = (_SERIAL_BYTES + each * number for number in range(len(frames)))
-        return Ahead(int.from_bytes(answer[:_SERIAL_BYTES]), tuple(answer[at : at + each] for at in begins))
-
     def ended(self, token: int | None = None) -> None:
         """The running step ended, or that command did."""
         self._caller(ENDED, b"" if token is None else token.to_bytes(8, "big"))
+        self.frames.ahead.ended(token)
 
     def landed(self) -> None:
         """The vehicle landed: standing permits lapse."""
         self._caller(LANDED)
+        self.frames.ahead.lapse()
 
     def release(self) -> None:
         """Nothing more that moves the vehicle is to be sent."""
         self._caller(RELEASE)
+        self.frames.ahead.close()
+
+    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+        """Have the frames of a link signed ahead: as `Executor.ahead`."""
+        return self._caller.ahead(sealed, kind, link, frames, now_us)
 
 
 class IsolatedIssuer:

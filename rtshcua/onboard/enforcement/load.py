@@ -132,7 +132,7 @@ def load(
     commands = Commands(policy.policy, opened.mission)
     commands.called_off = caller.reopened
     boundary = IsolatedBoundary(caller, in_force, commands)
-    executor = IsolatedExecutor(caller, commands, IsolatedGate(caller, signs=caller.signs))
+    executor = IsolatedExecutor(caller, commands, IsolatedGate(caller, commands))
     settable = IsolatedIssuer(caller, settings)
     return Loaded(boundary, executor, in_force, policy, vehicle, mode, settable, IsolatedAttestation(caller))
 

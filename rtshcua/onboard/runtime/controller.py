@@ -55,6 +55,7 @@ class MissionController:
         self._cause: Ending | None = None  # why the mission was given up; None: it was not
         self._began_us: int | None = None
         self._recording = True  # records are kept, or the policy does not ask
+        self._alone = False  # the boundary is lost
         self._stopping = False  # somebody asked this program to stop
         self.vehicle = VehicleStatus()
         self.monitor = StateMonitor(loaded.policy)
@@ -86,6 +87,7 @@ class MissionController:
         """Do one thing that can be done now; False when there is none left."""
         if self._began_us is None:
             self._began_us = now.monotonic_us
+        self.look_at_boundary(now)
         if self.stage is _ENDED or (self.link.state is not _UP and not self._judges(now)):
             return False
         if self.link.mute and self._is_gone(now.monotonic_us):
@@ -346,6 +348,16 @@ class MissionController:
             self._end(now, cause)
         elif self.stage is not _FALLING and not self.dispatcher.homeward:
             self.fall_back(kind if self.stage is _RUNNING else CONTINGENCY_LINK, cause)
+
+    def look_at_boundary(self, now: Now) -> None:
+        """Where the boundary is lost nothing more is decided: the mission is given up."""
+        if self._alone or self.stage is _ENDED or not self._journal.look_at_boundary(now):
+            return
+        self._alone = True
+        if self.aloft:
+            self.break_off(now, Ending.ABORTED)
+        else:
+            self._come_down(now)
 
     def stop(self, now: Now) -> None:
         """Somebody asked this program to stop, and waits for it."""

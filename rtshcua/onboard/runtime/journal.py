@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Final
 
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.chain import BOUNDARY_LOST, Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Action, Append, Dispatch
+from rtshcua.onboard.ports import Action, Append, Boundary, Dispatch
 from rtshcua.wire.request import NOTHING, Ref
 
 #: how often a note of the same text leaves a record, in us: those between are counted
@@ -33,8 +33,11 @@ class Journal:
     should have been sealed long ago is sealed before anything else is recorded.
     """
 
-    def __init__(self, recorder: Recorder) -> None:
+    def __init__(self, recorder: Recorder, boundary: Boundary | None = None) -> None:
         self.recorder = recorder
+        self._boundary = boundary
+        #: whether it was recorded that the boundary is lost: nothing that it makes is recorded after that
+        self.told_loss = False
         self._entries: list[Action | Telling] = []
         self._first: Action | None = None  # of what is done, and not only told
         self._noted: dict[str, int] = {}  # when a text was last recorded as a note,
@@ -66,8 +69,17 @@ class Journal:
 
     def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: Detail = "") -> None:
         """Record something that happened. `detail` may be the world's own text."""
+        self.look_at_boundary(now)
         line = partial(self._effect, now, event, ref, token, detail)
         self._entries.append(partial(self.record, line, now, WRITTEN, awaited=False))
+
+    def look_at_boundary(self, now: Now) -> bool:
+        """Record that the boundary is lost, once, and before what follows from that; whether it is."""
+        lost = None if self._boundary is None or self.told_loss else self._boundary.lost
+        if lost is not None:
+            self.told_loss = True
+            self.effect(now, BOUNDARY_LOST, detail=lost)
+        return self.told_loss
 
     def _effect(self, now: Now, event: str, ref: Ref, token: int, detail: Detail) -> bytes:
         return self.recorder.effect(now, event, ref, token=token, detail=said(detail))

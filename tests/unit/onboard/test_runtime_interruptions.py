@@ -233,7 +233,9 @@ def test_landing_by_the_air_state_alone_ends_a_fallback() -> None:
 
 
 class Deaf:
-    """A boundary that answers until it is told not to, as one whose process died."""
+    """A boundary that answers until it is told not to; it is there all the same, as far as anybody can tell."""
+
+    lost: str | None = None
 
     def __init__(self, run_boundary: object) -> None:
         self.boundary = run_boundary
@@ -254,6 +256,43 @@ def test_a_boundary_that_does_not_answer_leaves_the_standing_permits(answer: byt
     assert run.ending is Ending.ABORTED
     assert run.events.count("undecided") == 3
     assert_audited(run)
+
+
+def test_a_boundary_that_is_lost_is_recorded_before_what_follows_and_asked_no_more() -> None:
+    """The running step falls back by its standing permit; nothing is recorded as the boundary's."""
+    of = loaded()
+    deaf = Deaf(of.boundary)
+    run = Run(replace(of, boundary=deaf)).until_flies("goto")
+    deaf.answer, deaf.lost = b"", "it is gone"
+    run.until_over()
+    assert run.flown == ["takeoff", "goto", "hover", "return_home"]
+    assert run.ending is Ending.ABORTED
+    assert "undecided" not in run.events
+    assert run.events.count("boundary-lost") == 1
+    said = next(n for n, record in enumerate(run.records) if record.get("event") == "boundary-lost")
+    after = [(r["kind"], r["step"], r["link"]) for r in run.records[said:] if r.get("event") == "dispatched"]
+    assert after == [(1, 1, 0), (1, 1, 1)]
+    assert not [record for record in run.records[said:] if record["type"] == "decision"]
+
+
+def test_a_boundary_that_is_lost_on_the_ground_ends_the_run() -> None:
+    of = loaded()
+    deaf = Deaf(of.boundary)
+    deaf.answer, deaf.lost = b"", "it is gone"
+    run = Run(replace(of, boundary=deaf))
+    assert run.ending is Ending.REFUSED
+    assert run.flown == []
+
+
+def test_what_brings_it_home_goes_on_when_the_boundary_is_lost() -> None:
+    of = loaded()
+    deaf = Deaf(of.boundary)
+    run = Run(replace(of, boundary=deaf)).until_flies("return_home")
+    deaf.answer, deaf.lost = b"", "it is gone"
+    run.until_over()
+    assert run.flown.count("return_home") == 1
+    assert run.flown[-1] == "return_home"
+    assert run.ending is Ending.ABORTED, "nobody was there to say that all was done"
 
 
 def test_a_boundary_that_never_answers_lets_nothing_fly() -> None:
@@ -291,6 +330,8 @@ def test_a_vehicle_that_never_moves_again_is_stood_down_from() -> None:
 
 class Echo:
     """A boundary whose answers are kept, and played again when told to."""
+
+    lost = None
 
     def __init__(self, of: Loaded) -> None:
         self._boundary = of.boundary

@@ -26,6 +26,7 @@ from rtshcua.onboard.enforcement.isolated import (
 from rtshcua.onboard.enforcement.load import Loaded, Mode
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import BoundaryKey, Dispatch
+from rtshcua.wire.permit import SIZE
 from rtshcua.wire.preparation import MOST, Preparation
 from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.receipt import decode as read_receipt
@@ -203,7 +204,7 @@ class BothExecutors:
     def __init__(self, here: Any, there: IsolatedExecutor, counts: dict[str, int]) -> None:
         self._here, self._there, self._counts = here, there, counts
         self.frames: Any = BothGates(here.frames, there.frames, counts)
-        self._sealed = b""  # the last permit that came, and when
+        self._sealed = bytes(SIZE)  # the last permit that came, and when
         self._now_us = 0
 
     def _both(self, what: str, one: Dispatch | Refusal, other: Dispatch | Refusal) -> Dispatch | Refusal:
@@ -221,7 +222,9 @@ class BothExecutors:
                 self._counts["ahead"] += not isinstance(one, Refusal) and bool(frames)
 
     def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
-        self._sealed, self._now_us = sealed, now_us
+        self._now_us = now_us
+        if len(sealed) == SIZE:  # the call has no way to say how long one is
+            self._sealed = sealed
         return self._both("dispatch", self._here.dispatch(sealed, now_us), self._there.dispatch(sealed, now_us))
 
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:

@@ -3,9 +3,12 @@
 
        rtshcua-boundary --socket FD --root FD --pin HEX --vehicle IDENTITY --kept FD [--link-key FD] [--boundary-key FD]
                         [--user UID --group GID] [--settings FD] [--owed FD] [--paced]
+       rtshcua-boundary --socket FD --measures [--user UID --group GID]
 
    SETTINGS are the parameters that are set of the vehicle before a flight, OWED those that an earlier run set and did not put back,
    each as the body of a preparation (wire/preparation.h).
+
+   With `--measures` it takes the measures of isolation.h, sends its first message, and ends.
 
    Every file is opened by who starts it, so that it needs no path and, once it began, no right to open one. It first sends one
    message: the measures that are in force (4 octets, isolation.h), and the name of the link's key (8 octets, 0 without one). It ends with 0 when the socket is closed, 64 for a wrong command
@@ -38,7 +41,7 @@ typedef struct {
     int socket, root, kept, link_key, boundary_key, settings, owed;
     const char *vehicle, *pin;
     uint32_t user, group;
-    int paced;
+    int paced, measures;
 } options;
 
 static int number(const char *text, uint32_t *value) {
@@ -49,7 +52,7 @@ static int number(const char *text, uint32_t *value) {
 }
 
 static int read_options(int count, char **words, options *given) {
-    *given = (options){-1, -1, -1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0};
+    *given = (options){-1, -1, -1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0, 0};
     struct { const char *name; int *file; } files[] = {
         {"--socket", &given->socket}, {"--root", &given->root}, {"--kept", &given->kept},
         {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key}, {"--settings", &given->settings}, {"--owed", &given->owed},
@@ -59,6 +62,10 @@ static int read_options(int count, char **words, options *given) {
         int known = 0;
         if (strcmp(words[at], "--paced") == 0) {
             given->paced = 1;
+            continue;
+        }
+        if (strcmp(words[at], "--measures") == 0) {
+            given->measures = 1;
             continue;
         }
         if (at + 1 == count)
@@ -80,7 +87,7 @@ static int read_options(int count, char **words, options *given) {
         if (!known)
             return 0;
     }
-    return given->socket >= 0 && given->root >= 0 && given->kept >= 0 && given->vehicle != NULL;
+    return given->socket >= 0 && (given->measures || (given->root >= 0 && given->kept >= 0 && given->vehicle != NULL));
 }
 
 static size_t read_all(int file, void *into, size_t most) {
@@ -245,6 +252,14 @@ static void name_link(const uint8_t key[RT_KEY_BYTES], uint8_t *name) {
     memcpy(name, digest, LINK_NAME);
 }
 
+/* The first message: the measures in force, and the name of the link's key where there is one. */
+static int greet(int socket, uint32_t measures, const uint8_t *link) {
+    uint8_t greeting[4 + LINK_NAME] = {0};
+    for (int octet = 0; octet < 4; octet++) greeting[octet] = (uint8_t)(measures >> 8 * octet & 0xFF);
+    if (link != NULL) name_link(link, greeting + 4);
+    return send(socket, greeting, sizeof greeting, 0) == sizeof greeting;
+}
+
 int main(int count, char **words) {
     static uint8_t root[1 << 20];
     options given;
@@ -252,6 +267,10 @@ int main(int count, char **words) {
     if (!read_options(count, words, &given))
         return USAGE;
     rt_keys *keys = rt_key_memory(sizeof *keys, &measures);
+    if (given.measures) {
+        measures |= rt_isolate(given.user, given.group);
+        return greet(given.socket, measures, NULL) ? FINE : IO;
+    }
     rt_kept *kept = read_kept(given.kept);
     if (keys == NULL || getrandom(keys->session, sizeof keys->session, 0) != sizeof keys->session)
         return IO;
@@ -279,10 +298,7 @@ int main(int count, char **words) {
         {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
     if (rt_boundary_begin(&boundary, &setup) != NULL)
         return UNTRUSTED;
-    uint8_t greeting[4 + LINK_NAME] = {0};
-    for (int octet = 0; octet < 4; octet++) greeting[octet] = (uint8_t)(measures >> 8 * octet & 0xFF);
-    if (given.link_key >= 0) name_link(keys->link, greeting + 4);
-    if (send(given.socket, greeting, sizeof greeting, 0) != sizeof greeting)
+    if (!greet(given.socket, measures, given.link_key >= 0 ? keys->link : NULL))
         return IO;
     int64_t kept_us = own_time_us(CLOCK_MONOTONIC);
     for (;;) {

@@ -85,6 +85,28 @@ def kept_file(state: Path, vehicle: str) -> Path:
     return state / "boundary" / f"vehicle-{quote(vehicle, safe='')}.kept"
 
 
+def measures_here(user: tuple[int, int] | None) -> Measure:
+    """The measures that a boundary's process takes on this machine, as this user and group or ours: one begins, says
+    them, and ends. Raises BoundaryError.
+    """
+    path = program()
+    if path is None:
+        raise BoundaryError("missing", "the boundary's program was not built", UNBUILT_HELP)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    words = ["--socket", str(theirs.fileno()), "--measures"]
+    words += [] if user is None else ["--user", str(user[0]), "--group", str(user[1])]
+    with ours, theirs:
+        try:
+            subprocess.run(
+                [path, *words], pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL, env={}, cwd="/", timeout=PATIENCE_S, check=True,
+            )  # fmt: skip
+            greeting = ours.recv(_ANSWER, socket.MSG_DONTWAIT)
+        except (OSError, subprocess.SubprocessError) as error:
+            raise BoundaryError("not-begun", f"the boundary's process does not begin: {error}") from None
+    return Measure(int.from_bytes(greeting[:4], "little"))
+
+
 class BoundaryProcess:
     """A boundary that runs. `measures` are those in force.
 
@@ -103,8 +125,7 @@ class BoundaryProcess:
     ) -> None:  # fmt: skip
         path = program()
         if path is None:
-            text = "the boundary's program was not built"
-            raise BoundaryError("missing", text, UNBUILT_HELP)
+            raise BoundaryError("missing", "the boundary's program was not built", UNBUILT_HELP)
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         files: list[int] = [theirs.fileno()]
         try:

@@ -14,7 +14,7 @@ import msgspec
 import typer
 
 from rtshcua import library
-from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP, program
+from rtshcua.adapters.boundary_process import MISSING, UNBUILT, UNBUILT_HELP, BoundaryError, measures_here, program
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
@@ -54,6 +54,8 @@ app = typer.Typer(add_completion=False)
 
 _HEARTBEAT_S = 10.0
 _POLL_US = 50_000
+#: a user that is not root; which one makes no difference to what is asked
+_SOMEBODY = 65_534
 _EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
 
 
@@ -115,7 +117,7 @@ def doctor(
             return refuse(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
-        findings = [_boundary(), *agents]
+        findings = _boundary() + agents
         findings += list(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
@@ -135,12 +137,23 @@ def doctor(
     return code
 
 
-def _boundary() -> VehicleFinding:
-    """Where a run on this machine decides."""
+def _boundary() -> list[VehicleFinding]:
+    """Where a run on this machine decides, and which measures that keep others out of a process of its own it would be
+    without. As root that is asked as another user, as whom `--boundary-user` has it run.
+    """
     slug = "boundary/process"
-    if program() is not None:
-        return VehicleFinding(slug, MissionVerdict.OK, "a run decides in a process of its own (`run --mode process`)")
-    return VehicleFinding(slug, MissionVerdict.WARN, UNBUILT, "a process of its own", UNBUILT_HELP)
+    if program() is None:
+        return [VehicleFinding(slug, MissionVerdict.WARN, UNBUILT, "a process of its own", UNBUILT_HELP)]
+    try:
+        here = measures_here((_SOMEBODY, _SOMEBODY) if os.geteuid() == 0 else None)
+    except BoundaryError as error:
+        return [VehicleFinding(slug, MissionVerdict.WARN, str(error), "a process of its own", error.help)]
+    found = [VehicleFinding(slug, MissionVerdict.OK, "a run decides in a process of its own (`run --mode process`)")]
+    for measure, text in MISSING.items():
+        if measure not in here:
+            name = f"boundary/{str(measure.name).lower().replace('_', '-')}"
+            found.append(VehicleFinding(name, MissionVerdict.WARN, f"that process would be without {text}"))
+    return found
 
 
 def _owed(debts: OwedParameters) -> list[VehicleFinding]:

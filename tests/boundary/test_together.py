@@ -14,7 +14,6 @@ from boundary.shadow import Differs
 from boundary.together import ask_both, decided
 from rtshcua.adapters.boundary_process import program
 
-pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
 CHECKOUT = Path(__file__).resolve().parents[2]
 CHUNKS, CHUNK = 100, 10_000
 

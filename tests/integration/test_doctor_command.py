@@ -1,6 +1,7 @@
 """`rtshcua doctor` beside a simulated vehicle that is a process of its own, and where there is none to be heard."""
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -8,7 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.adapters import boundary_process
+from rtshcua.adapters.boundary_process import MISSING, Measure, measures_here
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.adapters.simulator import Simulator
+from rtshcua.cli.doctor import _boundary
 from virtual.forked import Forked
 
 COMMAND = [sys.executable, "-m", "rtshcua.cli.app", "doctor"]
@@ -34,6 +39,10 @@ def test_a_vehicle_over_real_udp() -> None:
     assert found["link/heartbeat"] == found["autopilot/version"] == found["link/answers"] == "ok"
     assert said["exit_code"] == done.returncode
     assert done.stderr == ""
+    user = (65_534, 65_534) if os.geteuid() == 0 else None
+    missing = {f"boundary/{each.name.lower().replace('_', '-')}" for each in Measure if each not in measures_here(user)}
+    assert {slug for slug in found if slug.startswith("boundary/")} == missing | {"boundary/process"}
+    assert all(found[slug] == "warn" for slug in missing)
 
 
 @pytest.mark.parametrize(
@@ -51,3 +60,26 @@ def test_wrong_words(commands: Forked, words: list[str], code: int, says: str, t
     assert done.code == code
     assert says in done.err
     assert "Traceback" not in done.err
+
+
+def test_each_measure_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """By a program that lacks it, which is a script here; and that it breaks off."""
+    script = tmp_path / "boundary"
+
+    def asked(program: str) -> list[tuple[str, MissionVerdict, str]]:
+        script.write_text(f"#!{sys.executable}\n{program}\n")
+        script.chmod(0o755)
+        return [(each.slug, each.verdict, each.found) for each in _boundary()]
+
+    says = "import os, sys; os.write(int(sys.argv[2]), ({}).to_bytes(4, 'little') + bytes(8))"
+    every = sum(Measure)
+    monkeypatch.setattr(boundary_process, "program", lambda: script)
+    for measure in Measure:
+        (_, (slug, verdict, text)) = asked(says.format(every - measure))
+        assert (slug, verdict) == (f"boundary/{measure.name.lower().replace('_', '-')}", MissionVerdict.WARN)
+        assert MISSING[measure] in text
+    assert [each[:2] for each in asked(says.format(every))] == [("boundary/process", MissionVerdict.OK)]
+    for broken in ("raise SystemExit(3)", "pass"):
+        ((slug, verdict, text),) = asked(broken)
+        assert (slug, verdict) == ("boundary/process", MissionVerdict.WARN)
+        assert "does not begin" in text

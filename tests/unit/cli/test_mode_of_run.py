@@ -52,7 +52,7 @@ def test_a_run_says_that_there_is_no_program(tmp_path: Path, unbuilt: bool) -> N
 @pytest.mark.parametrize("built", [True, False])
 def test_the_doctor_says_whether_there_is_one(built: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "program", lambda: BUILT if built else None)
-    finding = doctor._boundary()
+    finding, *_ = doctor._boundary()
     assert finding.verdict is (MissionVerdict.OK if built else MissionVerdict.WARN)
     assert (finding.found == UNBUILT) != built
 

@@ -20,6 +20,9 @@ typedef struct {
     uint32_t count;
 } rt_list;
 
+/* An item of a table. The checks found every index within it; the remainder, which is the index itself, makes that evident here too. */
+#define RT_AT(table, index) ((table)[(uint64_t)(index) % (sizeof(table) / sizeof *(table))])
+
 /* Why something is refused, the slug of the Python refusal; NULL where all is well. */
 typedef const char *rt_refusal;
 

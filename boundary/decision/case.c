@@ -9,7 +9,7 @@ void rt_situate(const rt_prepared_policy *policy, const rt_state *state, const r
     for (int64_t slot = 0; slot < slots; slot++) {
         int64_t value = state->values[slot], age = state->ages[slot], most = policy->most[slot];
         bool known = believed && state->known[slot] && rt_within(age, 0, policy->stale_us[slot]) && rt_within(value, -most, most);
-        situation->slots[slot] = (rt_value){known ? value : 0, known};
+        situation->slots[slot] = (rt_value){known ? rt_max(-most, rt_min(value, most)) : 0, known}; /* which is the value itself */
     }
     for (uint32_t at = 0; said && at < monitors; at++) {
         uint8_t truth = state->monitors[at];

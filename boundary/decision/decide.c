@@ -70,8 +70,7 @@ void rt_decide(rt_prepared_invocation *invocation, const rt_state *state, const 
     };
     rt_case one;
     rt_begin_case(invocation, state, context, now, &one);
-    decision->target = RT_NO_TARGET;
-    decision->valid_until_us = now->monotonic_us;
+    *decision = (rt_decision){RT_DENY, RT_BINDING_MISMATCH, 0, RT_NO_CLAUSE, RT_NO_TARGET, now->monotonic_us};
     for (size_t at = 0; at < sizeof steps / sizeof *steps; at++) {
         decision->step = steps[at].number;
         if (!steps[at].passes(&one, decision)) {

@@ -22,9 +22,11 @@ static rt_truth compare(int64_t op, const cell *left, const cell *right, int64_t
 
 static cell signal(int64_t slot, const rt_environment *at) {
     if (at->ranging && slot == at->now->policy->policy->vehicle.height) return (cell){0, 1, at->volume->level ? 0 : RT_UNKNOWN};
-    rt_value value = at->now->slots[slot];
+    rt_value value = RT_AT(at->now->slots, slot);
     return (cell){value.value, 0, value.known ? 0 : RT_UNKNOWN};
 }
+
+static int64_t argument(int64_t number, const rt_environment *at) { return at->arguments[(uint64_t)number % RT_MAX_CELLS]; }
 
 /* Conditions that ask neither for numbers nor for other conditions. */
 static rt_truth atom(int64_t op, int64_t a, int64_t b, const rt_environment *at) {
@@ -32,88 +34,90 @@ static rt_truth atom(int64_t op, int64_t a, int64_t b, const rt_environment *at)
     const rt_policy *policy = now->policy->policy;
     const rt_vehicle *vehicle = &policy->vehicle;
     int64_t utc = now->utc_us, zone;
+    rt_value value;
+    rt_list table;
     rt_truth truth;
     switch (op) {
     case RT_OP_SIGNAL_IN:
-        return !now->slots[a].known ? RT_UNKNOWN : rt_holds(policy->sets[b], now->slots[a].value) ? RT_TRUE : RT_FALSE;
+        value = RT_AT(now->slots, a);
+        return !value.known ? RT_UNKNOWN : rt_holds(RT_AT(policy->sets, b), value.value) ? RT_TRUE : RT_FALSE;
     case RT_OP_ARGUMENT_IN:
-        return rt_holds(policy->sets[b], at->arguments[a]) ? RT_TRUE : RT_FALSE;
+        return rt_holds(RT_AT(policy->sets, b), argument(a, at)) ? RT_TRUE : RT_FALSE;
     case RT_OP_KNOWN:
-        return now->slots[a].known ? RT_TRUE : RT_UNKNOWN;
+        return RT_AT(now->slots, a).known ? RT_TRUE : RT_UNKNOWN;
     case RT_OP_POSITION_IN:
         return rt_zone_holds(now, (uint32_t)a, at->volume, at->through_us);
     case RT_OP_POSITION_IN_ARGUMENT:
-        zone = at->arguments[a];
-        if (!rt_within(zone, 0, (int64_t)policy->tables[b].count - 1))
+        zone = argument(a, at);
+        table = RT_AT(policy->tables, b);
+        if (!rt_within(zone, 0, (int64_t)table.count - 1))
             return RT_UNKNOWN; /* an argument out of range is no zone */
-        return rt_zone_holds(now, (uint32_t)rt_int_at(policy->tables[b], (uint32_t)zone), at->volume, at->through_us);
+        return rt_zone_holds(now, (uint32_t)rt_int_at(table, (uint32_t)zone), at->volume, at->through_us);
     case RT_OP_ARGUMENT_POINT_IN:
-        truth = rt_zone_contains(now->policy, (uint32_t)b, at->arguments[a], at->arguments[a + 1]) ? RT_TRUE : RT_FALSE;
-        if (!rt_zone_timed(&policy->zones[b])) return truth;
-        return rt_and(truth, rt_zone_exists(vehicle, &policy->zones[b], utc, utc + at->through_us, now->error_us));
+        truth = rt_zone_contains(now->policy, (uint32_t)b, argument(a, at), argument(a + 1, at)) ? RT_TRUE : RT_FALSE;
+        if (!rt_zone_timed(&RT_AT(policy->zones, b))) return truth;
+        return rt_and(truth, rt_zone_exists(vehicle, &RT_AT(policy->zones, b), utc, utc + at->through_us, now->error_us));
     case RT_OP_TIME_IN:
         return rt_time_of_day(vehicle, a, b, utc, utc, now->error_us);
     case RT_OP_WEEK_IN:
-        return rt_time_of_week(vehicle, policy->sets[a], utc, utc, now->error_us);
+        return rt_time_of_week(vehicle, RT_AT(policy->sets, a), utc, utc, now->error_us);
     case RT_OP_PHASE_IN:
-        return rt_holds(policy->sets[b], at->phase) ? RT_TRUE : RT_FALSE;
+        return rt_holds(RT_AT(policy->sets, b), at->phase) ? RT_TRUE : RT_FALSE;
     default:
-        return now->monitors[a];
+        return RT_AT(now->monitors, a);
     }
 }
 
 rt_truth rt_evaluate(rt_list code, const rt_environment *at) {
-    cell stack[RT_MAX_STACK + 1] = {{0, 0, 0}};
-    cell *top = stack; /* the last value; the first of the stack is none */
-    int64_t op, a, b;
+    cell stack[2 * RT_MAX_STACK] = {{0, 0, 0}};
+    uint32_t top = 0; /* the last value; the first of the stack is none */
+    int64_t op = 0, a = 0, b = 0;
     while (rt_next_int(&code, &op) && rt_next_int(&code, &a) && rt_next_int(&code, &b)) {
+        top += (uint32_t)rt_pushes(op);
+        cell *to = &RT_AT(stack, top), *right = &RT_AT(stack, top + 1); /* `right` where there are two operands */
         switch (op) {
         case RT_OP_CONST:
-            *++top = (cell){a, 0, 0};
+            *to = (cell){a, 0, 0};
             break;
         case RT_OP_SIGNAL:
-            *++top = signal(a, at);
+            *to = signal(a, at);
             break;
         case RT_OP_ARGUMENT:
-            *++top = (cell){at->arguments[a], 0, 0};
+            *to = (cell){argument(a, at), 0, 0};
             break;
         case RT_OP_ADD:
         case RT_OP_SUB:
-            top--;
-            top->number += op == RT_OP_ADD ? top[1].number : -top[1].number;
-            top->factor += op == RT_OP_ADD ? top[1].factor : -top[1].factor;
-            top->truth |= top[1].truth;
+            to->number += op == RT_OP_ADD ? right->number : -right->number;
+            to->factor += op == RT_OP_ADD ? right->factor : -right->factor;
+            to->truth |= right->truth;
             break;
         case RT_OP_SCALE:
-            top->number *= a;
-            top->factor *= a;
+            to->number *= a;
+            to->factor *= a;
             break;
         case RT_OP_LT:
         case RT_OP_LE:
         case RT_OP_EQ:
         case RT_OP_NE:
-            top--;
-            top->truth = compare(op, top, top + 1, op == RT_OP_LT ? -1 : 0, at);
-            if (op == RT_OP_NE) top->truth = rt_not(top->truth);
+            to->truth = compare(op, to, right, op == RT_OP_LT ? -1 : 0, at);
+            if (op == RT_OP_NE) to->truth = rt_not(to->truth);
             break;
         case RT_OP_GT:
         case RT_OP_GE:
-            top--;
-            top->truth = compare(op, top + 1, top, op == RT_OP_GT ? -1 : 0, at);
+            to->truth = compare(op, right, to, op == RT_OP_GT ? -1 : 0, at);
             break;
         case RT_OP_AND:
         case RT_OP_OR:
-            top--;
-            top->truth = op == RT_OP_AND ? rt_and(top->truth, top[1].truth) : rt_or(top->truth, top[1].truth);
+            to->truth = op == RT_OP_AND ? rt_and(to->truth, right->truth) : rt_or(to->truth, right->truth);
             break;
         case RT_OP_NOT:
-            top->truth = rt_not(top->truth);
+            to->truth = rt_not(to->truth);
             break;
         default:
-            (++top)->truth = atom(op, a, b, at);
+            to->truth = atom(op, a, b, at);
         }
     }
-    return top->truth;
+    return RT_AT(stack, top).truth;
 }
 
 rt_truth rt_matches(const rt_rule *rule, const rt_environment *at) {

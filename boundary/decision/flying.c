@@ -38,7 +38,7 @@ static rt_wide narrow(int64_t value) {
     return (rt_wide){0, (uint64_t)value};
 }
 
-uint64_t rt_root(uint64_t square) {
+uint32_t rt_root(uint64_t square) {
     uint64_t root = 0, rest = square;
     for (uint64_t bit = (uint64_t)1 << 62; bit; bit >>= 2) {
         if (rest >= root + bit) {
@@ -48,7 +48,7 @@ uint64_t rt_root(uint64_t square) {
             root >>= 1;
         }
     }
-    return root;
+    return (uint32_t)root;
 }
 
 /* How long so many mm (not below 0) take at mm in a second, rounded up; `speed` is at most RT_MAX_SPEED. */
@@ -68,7 +68,7 @@ static rt_wide leg_us(const rt_speeds *speeds, int64_t distance, int64_t speed) 
         if (at_most(times(middle * (uint64_t)a, middle), most)) root = middle;
         else end = middle;
     }
-    return narrow((int64_t)root + 1);
+    return narrow((int64_t)end);
 }
 
 static rt_wide rising_us(const rt_speeds *speeds, int64_t height) {

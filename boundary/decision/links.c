@@ -18,7 +18,7 @@ static bool admissible(const rt_link *link, const rt_situation *now, int64_t pha
     const rt_contract *contract = &policy->contracts[link->skill];
     rt_list left = link->arguments, require = contract->require;
     rt_volume here = rt_here(now);
-    int64_t arguments[RT_MAX_CELLS];
+    int64_t arguments[RT_MAX_CELLS] = {0};
     rt_clause clause;
     for (uint32_t cell = 0; cell < RT_MAX_CELLS && rt_next_int(&left, &arguments[cell]); cell++) {}
     rt_environment at = {now, arguments, phase, &here, false, 0};
@@ -51,7 +51,7 @@ int64_t rt_fallback(const rt_case *one) {
     int64_t target = degrade(one);
     rt_list left = one->invocation->invocation.contract.fallback;
     rt_link link;
-    for (int64_t number = 0; target == RT_NO_TARGET && rt_next_link(&left, &link); number++)
+    for (int64_t number = 0; number < RT_MAX_LINKS && target == RT_NO_TARGET && rt_next_link(&left, &link); number++)
         if (admissible(&link, &one->now, one->invocation->phase)) target = number;
     return target;
 }

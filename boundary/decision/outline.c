@@ -54,9 +54,9 @@ static bool in_rings(const rt_prepared_policy *policy, const rt_prepared_zone *z
     int64_t band = band_of(zone, y);
     bool inside = false;
     if (!rt_within(band, 0, zone->bands - 1)) return false;
-    const uint32_t *start = &policy->starts[zone->starts + (uint32_t)band];
-    for (uint32_t at = start[0]; at < start[1]; at++) {
-        const rt_edge *edge = &policy->edges[zone->first + policy->entries[at]];
+    const uint32_t start = RT_AT(policy->starts, zone->starts + (uint32_t)band), end = RT_AT(policy->starts, zone->starts + (uint32_t)band + 1);
+    for (uint32_t at = start; at < end; at++) {
+        const rt_edge *edge = &RT_AT(policy->edges, zone->first + RT_AT(policy->entries, at));
         bool up = edge->y0 < edge->y1;
         int64_t x0 = up ? edge->x0 : edge->x1, y0 = up ? edge->y0 : edge->y1, x1 = up ? edge->x1 : edge->x0,
                 y1 = up ? edge->y1 : edge->y0;
@@ -80,10 +80,10 @@ static bool clear_of_rings(const rt_prepared_policy *policy, const rt_prepared_z
     int64_t west = rt_min(x0, x1) - error, east = rt_max(x0, x1) + error, south = rt_min(y0, y1) - error,
             north = rt_max(y0, y1) + error;
     int64_t first = rt_max(band_of(zone, south), 0), last = rt_min(band_of(zone, north), zone->bands - 1);
-    const uint32_t *start = &policy->starts[zone->starts];
     if (first > last) return true;
-    for (uint32_t at = start[first]; at < start[last + 1]; at++) { /* an edge that spans bands comes once for each */
-        const rt_edge *edge = &policy->edges[zone->first + policy->entries[at]];
+    const uint32_t start = RT_AT(policy->starts, zone->starts + (uint32_t)first), end = RT_AT(policy->starts, zone->starts + (uint32_t)last + 1);
+    for (uint32_t at = start; at < end; at++) { /* an edge that spans bands comes once for each */
+        const rt_edge *edge = &RT_AT(policy->edges, zone->first + RT_AT(policy->entries, at));
         if (rt_max(edge->x0, edge->x1) < west || rt_min(edge->x0, edge->x1) > east) continue;
         if (rt_max(edge->y0, edge->y1) < south || rt_min(edge->y0, edge->y1) > north) continue;
         if (!parted(x1 - x0, y1 - y0, edge, x0, y0, x1, y1, error) &&
@@ -116,8 +116,8 @@ static bool outside_circle(const rt_prepared_zone *zone, int64_t x0, int64_t y0,
    with those of an edge's ends (2**30) within 2**61, squares of a circle within 2**62 and their sum below 2**63. */
 bool rt_zone_contains(const rt_prepared_policy *policy, uint32_t number, int64_t x, int64_t y) {
     const int64_t most = 2 * RT_MAX_COORDINATE;
-    if (!rt_within(x, -most, most) || !rt_within(y, -most, most)) return false;
-    const rt_prepared_zone *zone = &policy->zones[number];
+    if (x < -most || x > most || y < -most || y > most) return false;
+    const rt_prepared_zone *zone = &RT_AT(policy->zones, number);
     return zone->count ? in_rings(policy, zone, x, y) : in_circle(zone, x, y, 0);
 }
 
@@ -125,8 +125,9 @@ bool rt_zone_contains(const rt_prepared_policy *policy, uint32_t number, int64_t
    differences are within 2**30, cross products within 2**61 and their sums with the error's within 2**62. */
 bool rt_zone_clear(const rt_prepared_policy *policy, uint32_t number, int64_t x0, int64_t y0, int64_t x1, int64_t y1,
                    int64_t error) {
-    const rt_prepared_zone *zone = &policy->zones[number];
+    const rt_prepared_zone *zone = &RT_AT(policy->zones, number);
     if (zone->count) return clear_of_rings(policy, zone, x0, y0, x1, y1, error);
     if (in_circle(zone, x0, y0, error) && in_circle(zone, x1, y1, error)) return true; /* a disc is convex */
-    return outside_circle(zone, x0, y0, x1, y1, zone->radius + (int64_t)rt_root((uint64_t)(2 * error * error)) + 1);
+    int64_t diagonal = rt_min(rt_root((uint64_t)(2 * error * error)), 2 * error); /* which it does not reach */
+    return outside_circle(zone, x0, y0, x1, y1, zone->radius + diagonal + 1);
 }

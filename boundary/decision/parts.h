@@ -54,7 +54,7 @@ rt_volume rt_plan_volume(const rt_situation *situation, const rt_planner *planne
 int64_t rt_farthest(const rt_volume *volume);
 
 /* flying.py, contracts.py */
-uint64_t rt_root(uint64_t square); /* rounded down */
+uint32_t rt_root(uint64_t square); /* rounded down */
 static inline int64_t rt_root_up(int64_t square) { return square > 0 ? (int64_t)rt_root((uint64_t)square - 1) + 1 : 0; }
 /* Whether a charge is enough for the way home from so far and between two heights, rounded up. */
 bool rt_brings_home(const rt_vehicle *vehicle, int64_t charge, int64_t distance, int64_t low, int64_t high, int64_t asked);
@@ -92,6 +92,11 @@ typedef struct {
     int64_t through_us; /* zones are asked about all moments until then */
 } rt_environment;
 
+/* By how many values an instruction changes the stack. */
+static inline int rt_pushes(int64_t op) {
+    if (op == RT_OP_SCALE || op == RT_OP_NOT) return 0;
+    return (op >= RT_OP_ADD && op <= RT_OP_NE) || op == RT_OP_AND || op == RT_OP_OR ? -1 : 1;
+}
 rt_truth rt_evaluate(rt_list code, const rt_environment *at);
 rt_truth rt_matches(const rt_rule *rule, const rt_environment *at);
 

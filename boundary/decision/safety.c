@@ -21,7 +21,7 @@ static int64_t own_number(const rt_case *one, const rt_clause *clause) {
     const rt_contract *contract = &one->invocation->invocation.contract;
     const rt_list lists[3] = {contract->require, contract->assume, contract->maintain};
     int64_t number = one->policy->rule_count + one->policy->has_airspace, found = RT_NO_CLAUSE;
-    rt_clause other;
+    rt_clause other = *clause;
     for (int at = 0; at < 3; at++) {
         rt_list left = lists[at];
         for (; rt_next_clause(&left, &other); number++)

@@ -105,13 +105,12 @@ static bool atom(int64_t op, int64_t a, int64_t b, const rt_scope *scope) {
 
 /* Do one instruction; false where it is malformed. `top` is above the last value. */
 static bool step(sum *stack, uint32_t *top, int64_t op, int64_t a, int64_t b, const rt_scope *scope) {
-    const bool unary = op == RT_OP_SCALE || op == RT_OP_NOT,
-               binary = (op >= RT_OP_ADD && op <= RT_OP_NE && !unary) || op == RT_OP_AND || op == RT_OP_OR;
+    const int pushes = rt_pushes(op);
     const bool truths = op >= RT_OP_AND;
     sum *made = &stack[*top];
-    if (unary || binary) {
-        uint32_t count = unary ? 1 : 2;
-        if (*top < count || made[-1].truth != truths || (binary && made[-2].truth != truths)) return false;
+    if (pushes < 1) {
+        uint32_t count = pushes < 0 ? 2 : 1;
+        if (*top < count || made[-1].truth != truths || (count == 2 && made[-2].truth != truths)) return false;
         *top -= count - 1;
         made = &stack[*top - 1];
     } else {

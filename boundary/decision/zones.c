@@ -26,7 +26,8 @@ static rt_truth along_leg(const rt_prepared_policy *policy, uint32_t zone, const
 static rt_truth along_path(const rt_prepared_policy *policy, uint32_t zone, const rt_volume *volume) {
     const rt_planner *planner = volume->planner;
     rt_truth truth;
-    if (planner->along && planner->along[zone]) return planner->along[zone];
+    uint8_t *known = planner->along ? &planner->along[zone % RT_MAX_ZONES] : NULL;
+    if (known && *known) return *known;
     if (planner->points > 1) {
         truth = rt_zone_along(policy, zone, planner->path, volume->error);
     } else {
@@ -36,7 +37,7 @@ static rt_truth along_path(const rt_prepared_policy *policy, uint32_t zone, cons
         end.y = planner->y;
         truth = along_leg(policy, zone, &end);
     }
-    if (planner->along) planner->along[zone] = (uint8_t)truth;
+    if (known) *known = (uint8_t)truth;
     return truth;
 }
 
@@ -50,7 +51,7 @@ static rt_truth between(const rt_zone *zone, int64_t low, int64_t high, bool kno
 
 rt_truth rt_zone_holds(const rt_situation *situation, uint32_t number, const rt_volume *volume, int64_t through_us) {
     const rt_prepared_policy *policy = situation->policy;
-    const rt_zone *zone = &policy->policy->zones[number];
+    const rt_zone *zone = &RT_AT(policy->policy->zones, number);
     rt_truth truth = 0, vertical = between(zone, volume->leg_low, volume->high, volume->level);
     if (vertical == RT_FALSE) truth = RT_FALSE;
     else truth = rt_and(vertical, volume->located ? along_leg(policy, number, volume) : RT_UNKNOWN);

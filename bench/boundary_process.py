@@ -133,7 +133,7 @@ def starts() -> bool:
             answer = Caller(process.call).load(bundle, now)
             ready.append((perf_counter_ns() - begin) / 1e6)
             process.close()
-            assert isinstance(answer, tuple), answer
+            assert isinstance(answer, bytes), answer
     held = max(ready) <= START_MS
     print(
         f"{'held  ' if held else 'MISSED'}  start: greeting after {median(greeted):.0f} ms, bundle of {len(bundle)} "

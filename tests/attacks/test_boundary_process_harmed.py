@@ -1,0 +1,376 @@
+"""Threat: whoever has the runtime harms the boundary's process, or what it keeps: it is killed at any point, and so is
+the runtime; its disk is full, its tables are, its file is put back to what it was; what comes is too long, half of it,
+or mixed with something else; two runtimes speak to it at once; a permit comes from another session.
+
+Outcomes: nothing is dispatched that was not permitted, what was kept is whole, and a mission of which something was
+sent is not flown again, but where its file and the run's were both put back: then a witness tells.
+"""
+
+import os
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from boundary.together import PIN, SIGNED_ROOT
+from reference.world import (
+    ROOT,
+    START,
+    VEHICLE,
+    allowed,
+    answer_to,
+    request_for,
+    sealed,
+)
+from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, kept_file, program
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.onboard.enforcement.executor import FORGED, OUT_OF_TURN, USED
+from rtshcua.onboard.enforcement.isolated import ENFORCE, LOAD, MAX_PART, PART, PRESENT, Caller
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.ports import Dispatch
+from rtshcua.wire.response import Answer, Status
+
+pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
+AT_US = START.monotonic_us
+#: of `rt_kept`: its layout, its head, and how many missions it has room for
+LAYOUT, HEAD, MOST_OPENED, OPENED = 0x7274736863756101, struct.Struct("<QQQqQQQ"), 4_096, struct.Struct("<32sq")
+
+
+class Held:
+    """A boundary's process whose time is its caller's, and the bundle that it is given."""
+
+    def __init__(self, state: Path) -> None:
+        self.process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, state, paced=True)
+        self.caller = Caller(self.process.call)
+
+    def load(self) -> Loaded | Refusal:
+        return load(
+            sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=bytes(32),
+            flight=bytes(16), peer_is_own_simulator=False, caller=self.caller,
+        )  # fmt: skip
+
+    def loaded(self) -> Loaded:
+        found = self.load()
+        assert isinstance(found, Loaded), found
+        return found
+
+    def kill(self) -> None:
+        os.kill(self.process.pid, signal.SIGKILL)
+        self.process.close()
+
+
+@pytest.fixture
+def held(tmp_path: Path) -> Iterator[Held]:
+    made = Held(tmp_path)
+    yield made
+    made.process.close()
+
+
+# -------------------------------------------------------------------------------------------- sessions and turns
+
+
+def test_a_permit_of_another_session_sends_nothing(tmp_path: Path) -> None:
+    """The same bundle, in the process before: its permits were sealed with a key that is gone."""
+    first = Held(tmp_path)
+    permit = allowed(first.loaded())
+    first.process.close()
+    second = Held(tmp_path)
+    of = second.loaded()
+    assert of.executor.dispatch(permit, AT_US) is FORGED
+    assert isinstance(of.executor.dispatch(allowed(of), AT_US), Dispatch)
+    second.process.close()
+
+
+def test_steps_are_sent_in_their_turn_alone(held: Held) -> None:
+    of = held.loaded()
+    assert answer_to(of, request_for(of, step=2)) is Status.NOT_CURRENT
+    first = allowed(of)
+    second = allowed(of, step=1)
+    assert isinstance(of.executor.dispatch(first, AT_US), Dispatch)
+    assert of.executor.dispatch(second, AT_US) is OUT_OF_TURN, "the first one runs"
+    assert of.executor.dispatch(first, AT_US) is USED
+    of.executor.ended()
+    assert isinstance(of.executor.dispatch(second, AT_US), Dispatch)
+
+
+def test_two_runtimes_at_one_socket_get_no_more_than_one(held: Held) -> None:
+    """They ask at once, and read each other's answers: whatever comes of it, a permit is dispatched once."""
+    of = held.loaded()
+    permit, sent = allowed(of), list[bytes]()
+    call = bytes([5]) + struct.pack(">q", AT_US) + permit
+
+    def runtime() -> None:
+        sent.extend(held.process.call(call) for _ in range(200))
+
+    both = [threading.Thread(target=runtime) for _ in range(2)]
+    for each in both:
+        each.start()
+    for each in both:
+        each.join()
+    assert len(sent) == 400
+    assert sum(answer[0] == 0 for answer in sent) == 1
+
+
+# ------------------------------------------------------------------------------------- too long, half, and mixed
+
+
+def test_a_call_that_is_too_long_is_not_read_beyond_its_end(held: Held) -> None:
+    of = held.loaded()
+    for size in (MAX_PART + 64, MAX_PART + 65, 2 * MAX_PART):
+        for kind in (PART, LOAD, ENFORCE, PRESENT, 5, 11):
+            assert held.process.call(bytes([kind]) + bytes(size - 1))[:1] in (b"\0", b"\1")
+            held.process.call(bytes([PART, PRESENT]) + struct.pack(">I", 0))
+    assert isinstance(answer_to(of, request_for(of)), Answer)
+
+
+def test_half_a_bundle_is_none(held: Held) -> None:
+    """Cut anywhere, in whatever parts it comes, and with the size of the whole claimed for it."""
+    bundle, times = sealed(), struct.pack(">qqq", AT_US, START.utc_us, START.utc_error_us)
+    for size in (0, 1, len(bundle) // 2, len(bundle) - 1):
+        assert held.caller.put(LOAD, bundle[:size]) is None
+        for claimed in (size, len(bundle)):
+            refused = held.caller(LOAD, times, struct.pack(">I", claimed))
+            assert isinstance(refused, Refusal), size
+            assert refused.slug in ("malformed", "truncated", "bad-signature"), refused
+        refused = held.caller(ENFORCE, b"")
+        assert isinstance(refused, Refusal)
+        assert refused.slug == "not-loaded"
+    assert isinstance(held.load(), Loaded)
+
+
+def test_parts_of_two_things_do_not_mix(held: Held) -> None:
+    """A part that does not go on where the last one ended is refused, whatever came between."""
+    bundle, random = sealed(), Random(3)
+    for _ in range(30):
+        at = 0
+        while at < len(bundle):
+            size = random.randrange(1, 3_000)
+            astray = bytes([PART, random.choice((LOAD, PRESENT))])
+            answer = held.process.call(astray + struct.pack(">I", at + 1 + random.randrange(99)) + random.randbytes(50))
+            assert answer[0] == 1
+            part = held.caller(PART, bytes([LOAD]) + struct.pack(">I", at), bundle[at : at + size])
+            assert part == b""
+            at += size
+    whole = struct.pack(">qqqI", AT_US, START.utc_us, START.utc_error_us, len(bundle))
+    answer = held.caller(LOAD, whole)
+    assert isinstance(answer, bytes), answer
+
+
+# ---------------------------------------------------------------------------------------------------- kill -9
+
+POINTS = ("begun", "half a bundle", "handed over", "in force", "asked", "sent", "ended")
+
+
+def up_to(held: Held, point: str) -> Loaded | None:
+    """A session up to a point of it."""
+    number = POINTS.index(point)
+    of = None
+    if number == 1:
+        held.caller(PART, bytes([LOAD]) + struct.pack(">I", 0), sealed()[:500])
+    if number == 2:
+        held.caller.put(LOAD, sealed())
+    if number >= 3:
+        of = held.loaded()
+    if of is not None and number >= 4:
+        permit = allowed(of)
+        if number >= 5:
+            assert isinstance(of.executor.dispatch(permit, AT_US), Dispatch)
+        if number >= 6:
+            of.executor.ended()
+    return of
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_killed_at_any_point_it_lets_nothing_out_and_has_what_it_kept(point: str, tmp_path: Path) -> None:
+    """From when the bundle is in force, no step of it begins after a restart; before, all of it may be flown."""
+    first = Held(tmp_path)
+    of = up_to(first, point)
+    first.kill()
+    if of is not None:
+        assert isinstance(of.executor.frames.seal(b"\xfd" + bytes(20), AT_US), Refusal)
+        assert answer_to(of, request_for(of)) is Status.MALFORMED
+    second = Held(tmp_path)
+    again = second.loaded()
+    answer = answer_to(again, request_for(again))
+    if of is None:
+        assert isinstance(answer, Answer)
+        assert answer.permit
+    else:
+        assert answer is Status.NOT_CURRENT
+    second.process.close()
+
+
+def test_killed_while_it_writes_its_file_is_whole(tmp_path: Path) -> None:
+    """Whatever moment the write is broken off at, the place before it is left."""
+    random = Random(7)
+    for _ in range(25):
+        held = Held(tmp_path)  # raises where what was kept is damaged
+        held.caller.put(LOAD, sealed())
+        size = struct.pack(">qqqI", AT_US, START.utc_us, START.utc_error_us, len(sealed()))
+        threading.Timer(random.random() * 0.006, os.kill, (held.process.pid, signal.SIGKILL)).start()
+        held.caller(LOAD, size)
+        time.sleep(0.008)
+        held.process.close()
+    Held(tmp_path).process.close()
+
+
+RUNTIME = """
+import os, sys
+sys.path[:0] = {path!r}
+from pathlib import Path
+from attacks.test_boundary_process_harmed import Held, up_to
+held = Held(Path({state!r}))
+up_to(held, {point!r})
+print(held.process.pid, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("point", ["begun", "half a bundle", "in force", "sent"])
+def test_when_the_runtime_is_killed_it_ends_and_gives_up_the_vehicle(point: str, tmp_path: Path) -> None:
+    code = RUNTIME.format(path=sys.path, state=str(tmp_path), point=point)
+    runtime = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert runtime.stdout is not None
+    assert runtime.stdin is not None
+    assert runtime.stdout.readline().strip().isdigit()
+    runtime.kill()
+    runtime.wait()
+    runtime.stdout.close()
+    runtime.stdin.close()
+    second, until_s = None, time.monotonic() + 10
+    while second is None:
+        assert time.monotonic() < until_s, "the boundary goes on without its runtime"
+        with suppress(BoundaryError):  # in use
+            second = Held(tmp_path)
+    again = second.loaded()
+    answer = answer_to(again, request_for(again))
+    assert (answer is Status.NOT_CURRENT) == (point == "sent"), "what nothing was sent of may be flown"
+    second.process.close()
+
+
+# ----------------------------------------------------------------------------------------- what it keeps, and where
+
+
+def test_where_no_more_missions_can_be_remembered_none_is_opened(tmp_path: Path) -> None:
+    """Its file says that as many were opened as it remembers, and that none of them has expired yet."""
+    Held(tmp_path).process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    data = path.read_bytes()
+    slot = len(data) // 2
+    body = bytearray(data[:slot])
+    head = list(HEAD.unpack_from(body))
+    assert head[0] == LAYOUT
+    head[1], head[4] = 1_000, MOST_OPENED
+    HEAD.pack_into(body, 0, *head)
+    for number in range(MOST_OPENED):
+        OPENED.pack_into(body, HEAD.size + number * OPENED.size, number.to_bytes(32, "big"), 1 << 60)
+    body[-32:] = sha256(body[:-32]).digest()
+    path.write_bytes(bytes(body) + data[slot:])
+    held = Held(tmp_path)
+    refused = held.load()
+    assert isinstance(refused, Refusal)
+    assert refused.slug == "full"
+    refused = held.caller(ENFORCE, b"")
+    assert isinstance(refused, Refusal)
+    assert refused.slug == "not-loaded"
+    held.process.close()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a disk that is small")
+def test_a_full_disk_lets_nothing_begin(tmp_path: Path) -> None:
+    """What cannot be kept is not opened; with room again it is, and what was kept before is whole."""
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(tmp_path)], check=False, capture_output=True
+    )
+    if mounted.returncode != 0:
+        pytest.skip("no file system may be mounted here")
+    try:
+        held = Held(tmp_path)
+        size = kept_file(tmp_path, VEHICLE).stat().st_size
+        filler = tmp_path / "filler"
+        with filler.open("wb", buffering=0) as file, suppress(OSError):
+            while True:
+                file.write(bytes(4_096))
+        refused = held.load()
+        assert isinstance(refused, Refusal), "the second place of its file has no room"
+        assert refused.slug == "not-kept"
+        assert kept_file(tmp_path, VEHICLE).stat().st_size < 2 * size
+        held.process.close()
+        filler.unlink()
+        again = Held(tmp_path)
+        assert isinstance(again.load(), Loaded)
+        again.process.close()
+    finally:
+        subprocess.run(["umount", "-l", str(tmp_path)], check=True, capture_output=True)
+
+
+def test_put_back_to_what_it_was_its_file_forgets_what_was_opened(tmp_path: Path) -> None:
+    """The limit, stated: whoever may write the state folder can put it back, and the boundary cannot tell. Permits that
+    it sealed are not good again, nor is the flight's id the same; the logs of both flights are there for a witness.
+    """
+    Held(tmp_path).process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    before = path.read_bytes()
+    first = Held(tmp_path)
+    of = first.loaded()
+    permit = allowed(of)
+    assert isinstance(of.executor.dispatch(permit, AT_US), Dispatch)
+    first.process.close()
+    path.write_bytes(before)
+    second = Held(tmp_path)
+    again = second.loaded()
+    assert again.executor.dispatch(permit, AT_US) is FORGED
+    assert again.in_force.flight != of.in_force.flight
+    assert isinstance(answer_to(again, request_for(again)), Answer)
+    second.process.close()
+
+
+def test_a_file_that_is_cut_or_changed_is_damage(tmp_path: Path) -> None:
+    """But for one place of the two, of which the other is left."""
+    for _ in range(2):
+        Held(tmp_path).process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    data = path.read_bytes()
+    slot = len(data) // 2
+    for changed in (data[:100], bytes(len(data)), data[: slot - 1]):
+        path.write_bytes(changed)
+        with pytest.raises(BoundaryError) as refused:
+            Held(tmp_path)
+        assert refused.value.slug == "damaged"
+    for place in (0, slot):
+        path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+        Held(tmp_path).process.close()
+
+
+# --------------------------------------------------------------------------------------------------- its keys
+
+
+def test_its_keys_are_in_no_file_and_no_core(tmp_path: Path) -> None:
+    """Crashed, it leaves no core; what it keeps, and its command line, have no octets of the keys that it was given."""
+    key, seed = tmp_path / "link.key", b"the seed of its own signing key."
+    key.write_bytes(b"the key of the link, 32 octets..")
+    key.chmod(0o600)
+    process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, tmp_path, link_key=key, own_seed=seed, paced=True)
+    said = Path(f"/proc/{process.pid}/cmdline").read_bytes()
+    os.kill(process.pid, signal.SIGSEGV)
+    _, status = os.waitpid(process.pid, 0)
+    process.close()
+    kept = kept_file(tmp_path, VEHICLE).read_bytes()
+    for secret in (key.read_bytes(), seed):
+        assert secret not in said
+        assert secret not in kept
+    assert os.WIFSIGNALED(status)
+    assert not os.WCOREDUMP(status)
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {
+        "link.key",
+        kept_file(tmp_path, VEHICLE).name,
+    }

@@ -53,7 +53,13 @@ GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
     (11, (faults.WindStep, faults.BatteryLevel, faults.BatteryCell, faults.BatteryVoltage)),
     (7, (faults.Obstacle, faults.Pillar)),
     (12, (faults.PilotMode, faults.PilotPause, faults.PilotGoto, faults.PilotSticks, faults.Kill)),
-    (12, (faults.RuntimeKilled, faults.HostStall, faults.DiskFull, faults.DiskStall, faults.ClockStep)),
+    (
+        12,
+        (
+            faults.RuntimeKilled, faults.BoundaryKilled, faults.HostStall, faults.DiskFull, faults.DiskStall,
+            faults.ClockStep,
+        ),
+    ),
     (12, (faults.Approval, faults.Disapproval, faults.Recall, faults.Replacement, faults.Babble)),
 )  # fmt: skip
 

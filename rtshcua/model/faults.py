@@ -341,6 +341,11 @@ class RuntimeKilled(HostFault):
 
 
 @dataclass(frozen=True, slots=True)
+class BoundaryKilled(HostFault):
+    """The boundary, a process of its own (`run --mode process`), dies; another begins with the next run."""
+
+
+@dataclass(frozen=True, slots=True)
 class HostStall(HostFault):
     """The process of the runtime does not get to run for this long: nothing is read and nothing sent."""
 
@@ -438,6 +443,7 @@ KINDS: Mapping[str, type[Fault]] = {
     "stuck": MessageStuck,
     "mute": MessageSilence,
     "runtime-killed": RuntimeKilled,
+    "boundary-killed": BoundaryKilled,
     "host-stall": HostStall,
     "disk-full": DiskFull,
     "disk-stall": DiskStall,

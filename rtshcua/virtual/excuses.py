@@ -83,7 +83,7 @@ class Excuses:
             "not-ended": (self._taken, self._wind, self._process, self._misled),
             "motion-after-takeover": (self._unseen,),
             "late": (self._link,),
-            "log": (self._disk,),
+            "log": (self._disk, self._boundary),
             "unlogged-effect": (self._disk, self._killed),
             "not-watched": (self._disk,),
         }  # fmt: skip
@@ -343,6 +343,13 @@ class Excuses:
             if fault.for_us is None or failure.at_us <= fault.at_us + fault.for_us:
                 return "disk"
         return None
+
+    def _boundary(self, failure: Failure) -> str | None:
+        """A log whose boundary was lost in flight proves nothing from there on."""
+        lost = failure.text.startswith("incomplete: boundary/lost") and any(
+            self._before(failure.at_us, faults.BoundaryKilled)
+        )
+        return "boundary" if lost else None
 
     def _killed(self, failure: Failure) -> str | None:
         """What was sent in the last moment before a process died may not be written: a fallback waits for no record."""

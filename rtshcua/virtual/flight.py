@@ -20,12 +20,14 @@ from rtshcua.ground.auditor.audit import Audit, Auditor
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import Action, BoundaryKey, Ending, Event, EvidenceSink, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.fitting import fitting
+from rtshcua.virtual.served import Served
 from rtshcua.virtual.vehicle import SECOND, START, TICK_US, VirtualClock, VirtualVehicle
 from rtshcua.wire import bundle as bundles
 from rtshcua.wire import cose, names
@@ -165,10 +167,13 @@ class VirtualFlight:
         now = self.clock.now()
         self._root_key = cose.unverified(root, limit=MAX_ROOT).kid
         trusted = open_root(root, pinned=self._root_key, now_us=now.utc_us)
+        first = BoundaryKey(boundary, 1, FIRST) if isinstance(boundary, SigningKey) else boundary
+        #: the boundary elsewhere that it flies by, in mode `process`
+        self.served = Served(trusted, policy.vehicle.identity, first and first.key, settings, owed or {})
         loaded = load(
             bundle, root=trusted, vehicle=policy.vehicle.identity, now=now, mode=mode,
             session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=True,
-            settings=settings, owed=owed or {},
+            settings=settings, owed=owed or {}, caller=Caller(self.served) if mode is Mode.PROCESS else None,
         )  # fmt: skip
         if isinstance(loaded, Refusal):
             raise ValueError(f"{loaded.slug}: {loaded.text}")
@@ -200,7 +205,7 @@ class VirtualFlight:
             ),
             SYNCED_FIRST,
         )
-        loaded.attestation.begin(BoundaryKey(boundary, 1, FIRST) if isinstance(boundary, SigningKey) else boundary)
+        loaded.attestation.begin(first)
         self.recorder.attest = loaded.attestation.statement
         for line in self.recorder.attested(now):
             self.sink.append(line, SYNCED_FIRST)

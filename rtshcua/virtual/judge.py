@@ -483,8 +483,9 @@ def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
                 end_us = min(next(later, 1 << 62) - 1 - flown.start_us, life.ended_us)
                 sent = (frame for frame, parts in motion if kind in parts and at_us <= frame.sent_us <= end_us)
                 first = next(sent, None)
+                decision = decided.pop(ref)  # what is sent again is by another permit, or by a standing one
                 if first is not None:
-                    yield from _in_time(flown, first, decided[ref])
+                    yield from _in_time(flown, first, decision)
 
 
 def _in_time(flown: ScenarioFlown, first: Frame, decision: dict[str, Any]) -> Iterator[Failure]:
@@ -529,7 +530,9 @@ def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
             continue
         at_us = max(0, report.last_us - flown.start_us)
         if report.failure is None:
-            yield Failure("log", life.ended_us, f"incomplete: {report.shortfall.text if report.shortfall else ''}")
+            missing = report.shortfall
+            text = "" if missing is None else f"{missing.slug}: {missing.text}"
+            yield Failure("log", life.ended_us, f"incomplete: {text}")
             continue
         auditor = Auditor(flown.root, derive=False)
         for line in life.lines:

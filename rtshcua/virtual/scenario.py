@@ -25,7 +25,7 @@ from rtshcua.model.faults import AgentFault, Fault, HostFault
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.scenario import Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.enforcement.load import Loaded, Mode
 from rtshcua.onboard.left import left_by
 from rtshcua.onboard.ports import Action, BoundaryKey, Dispatch, Ending, Event, Presented, Readings
 from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
@@ -193,6 +193,9 @@ class _Flight:
         self._babble: list[tuple[int, int, bytes]] = []  # when, its order, and what is said then
         self._drawn = 0
 
+        apart = any(isinstance(each.fault, faults.BoundaryKilled) for each in scenario.incidents)
+        self._mode = Mode.PROCESS if apart else Mode.SOFTWARE
+
         def vehicle(policy: Any) -> SimulationConfig:
             config = self._config(chosen, policy)
             self._configs.append(with_room(config, policy, claimed(bundle)[1].invocations))
@@ -200,7 +203,7 @@ class _Flight:
 
         self._flight = VirtualFlight(
             bundle, vehicle, root=root, log_key=keys.log, utc_us=utc_us, wait_us=WAIT_US, tick_us=tick_us,
-            sink=lambda clock: _Sink(clock, full=False), boundary=keys.session(1, START_DIGEST),
+            sink=lambda clock: _Sink(clock, full=False), boundary=keys.session(1, START_DIGEST), mode=self._mode,
         )  # fmt: skip
         self._kept = self._flight.loaded.attestation.digest  # of the boundary's own evidence, as its store has it
         self._world = self._watch(self._flight.vehicle)
@@ -363,6 +366,8 @@ class _Flight:
             case faults.RuntimeKilled(_, for_us):
                 self._dead_us = for_us
                 raise _Killed
+            case faults.BoundaryKilled():
+                self._flight.served.dead = True
             case faults.HostStall(_, for_us):
                 self._flight.vehicle.stand_still(for_us)
             case faults.DiskFull(at_us, for_us):

@@ -136,6 +136,27 @@ def test_a_takeoff_that_was_sent_is_not_left_alone(after_ms: int, dead_ms: int, 
     nothing_wrong(found)
 
 
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_flight_whose_boundary_is_killed_comes_down_by_what_that_signed_ahead(flavour: str) -> None:
+    found = flown(scenario(incident(15, faults.BoundaryKilled(0))), flavour)
+    assert found.ending == "aborted"
+    after = events(found)[events(found).index("boundary-lost") :]
+    assert [each for each in after if each in ("dispatched", "failed")] == ["dispatched", "dispatched"]
+    assert dispatched(found)[-2:] == ["hover", "return_home"]
+    assert not found.samples[-1].in_air
+    assert [(each.slug, each.cause) for each in judge(found).exceptions] == [("log", "boundary")]
+    assert judge(found).failures == ()
+
+
+def test_the_process_after_that_has_a_boundary_of_its_own() -> None:
+    found = flown(scenario(incident(15, faults.BoundaryKilled(0)), incident(16, faults.RuntimeKilled(0, 2 * S))))
+    first, after = found.lives
+    assert (first.ending, after.ending) == (None, "aborted")
+    assert any(b'"type":"decision"' in line for line in after.lines)
+    assert not found.samples[-1].in_air
+    assert judge(found).failures == ()
+
+
 def test_some_killed_processes_leave_a_torn_line() -> None:
     torn = set()
     for seed in range(1, 8):
@@ -358,7 +379,7 @@ def _with(found: ScenarioFlown, expected: Expected) -> tuple[ScenarioFlown, Any]
 SECOND_LONG: dict[type[Fault], Fault] = {
     type(fault): fault
     for fault in (
-        faults.RuntimeKilled(0, 4 * S), faults.HostStall(0, 5 * S), faults.DiskFull(0, 5 * S),
+        faults.RuntimeKilled(0, 4 * S), faults.BoundaryKilled(0), faults.HostStall(0, 5 * S), faults.DiskFull(0, 5 * S),
         faults.ClockStep(0, 9 * S), faults.Approval(0, "supervisor"), faults.Disapproval(0, "supervisor"),
         faults.Recall(0), faults.Replacement(0), faults.Babble(0), faults.DiskStall(0, 5 * S),
     )

@@ -1,0 +1,51 @@
+"""The boundary that answers calls in virtual time: it decides as the one in the runtime's own process."""
+
+from random import Random
+
+import pytest
+
+from reference.world import ROOT, VEHICLE
+from rtshcua.onboard.enforcement import isolated as calls
+from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.ports import Ending
+from rtshcua.virtual.served import Served
+from virtual.flight import Flight
+from virtual.shipped import shipped, simulated
+
+FLAVOURS = ("px4", "ardupilot")
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_flight_by_calls_is_the_one_without(flavour: str) -> None:
+    one, other = (
+        Flight(shipped("short"), simulated(flavour), attested=True, mode=mode).fly()
+        for mode in (Mode.SOFTWARE, Mode.PROCESS)
+    )
+    assert one.ending is other.ending is Ending.COMPLETED
+    apart = {
+        "mode",
+        "bytes",
+        "_prev",
+        "checkpoint",
+        "digest",
+    }  # what names the mode, how long that is, and hashes of it
+    for here, there in zip(one.records, other.records, strict=True):
+        assert {name for name in here if here[name] != there[name]} <= apart
+    assert other.audit().report.failure is None
+
+
+def test_nonsense_is_answered() -> None:
+    served, of = Served(ROOT, VEHICLE), Random(7)
+    for _ in range(2_000):
+        assert served(of.randbytes(of.randrange(1, 60)))[0] in (0, 1)
+    served(bytes([calls.PART, calls.LOAD]) + bytes(4) + b"no bundle")
+    assert served(bytes([calls.LOAD]) + bytes(28))[0] == 1
+    for kind in (calls.ENFORCE, calls.DISPATCH, calls.AHEAD, calls.STATEMENT, calls.PERMIT):
+        assert served(bytes([kind]) + bytes(80)) == b"\1not-loaded"
+
+
+def test_nobody_answers_once_it_is_dead() -> None:
+    served = Served(ROOT, VEHICLE)
+    served.dead = True
+    with pytest.raises(ConnectionResetError):
+        served(bytes([calls.DIGEST]))

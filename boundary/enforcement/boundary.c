@@ -1,5 +1,6 @@
 #include "boundary.h"
 
+#include "evidence/note.h"
 #include "wire/octets.h"
 
 #define CLOCKS_PART_US 3000000LL
@@ -130,6 +131,7 @@ rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup) {
     boundary->kept = setup->kept;
     boundary->vehicle = setup->vehicle;
     boundary->has_key = setup->has_key;
+    boundary->has_log_key = setup->has_log_key;
     rt_refusal refused = rt_open_root(setup->root, setup->pinned, setup->now.utc_us, &boundary->root);
     if (refused != NULL) return refused;
     rt_gate *gate = &boundary->executor.gate;
@@ -175,7 +177,7 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
         boundary->to_keep = true;
     }
     memset(&boundary->chain, 0, sizeof boundary->chain);
-    boundary->attests = boundary->answered = false;
+    boundary->attests = boundary->answered = boundary->log_begun = false;
     rt_executor_begin(executor, boundary->keys->session, &bundle->policy, &bundle->mission, boundary->serial);
     boundary->version = bundle->policy.version;
     boundary->now_us = 0;
@@ -247,6 +249,15 @@ bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_D
     boundary->attestation = session;
     memcpy(boundary->before, before, RT_DIGEST_BYTES);
     return true;
+}
+
+rt_refusal rt_begin_log(rt_boundary *boundary, rt_bytes checkpoint, uint8_t signature[RT_SIGNATURE_BYTES]) {
+    if (!boundary->has_log_key) return "no-log-key";
+    if (boundary->log_begun) return "log-begun";
+    if (!rt_begins_log(checkpoint, boundary->vehicle, boundary->session.in_force.flight)) return "not-its-log";
+    rt_ed25519_sign(boundary->keys->log, &checkpoint, 1, signature);
+    boundary->log_begun = true;
+    return NULL;
 }
 
 uint32_t rt_attested(rt_boundary *boundary, bool final, uint8_t *out) {

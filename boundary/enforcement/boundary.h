@@ -13,7 +13,8 @@
 typedef struct {
     uint8_t session[RT_KEY_BYTES];  /* of the permits: drawn for each start */
     uint8_t link[RT_KEY_BYTES];     /* of MAVLink's signatures */
-    uint8_t boundary[RT_KEY_BYTES]; /* the seed of its own signing key */
+    uint8_t boundary[RT_KEY_BYTES]; /* the seed of its own signing key, */
+    uint8_t log[RT_KEY_BYTES];      /* and of the one that signs logs */
 } rt_keys;
 
 /* What a boundary is given when it begins. */
@@ -24,6 +25,7 @@ typedef struct {
     rt_bytes vehicle;      /* the identity of the one that we are on */
     bool signs;            /* the link has a key */
     bool has_key;          /* and so has the boundary itself */
+    bool has_log_key;      /* it signs the log of a flight */
     const rt_preparation *settings, *owed; /* what is set of the vehicle, and what is owed to it; NULL for nothing */
     rt_now now;
 } rt_setup;
@@ -52,6 +54,7 @@ typedef struct {
     uint32_t document_count;
     rt_chain chain;  /* its own evidence; */
     bool has_key, attests; /* it may sign that, and does so for a session of this number, after the digest of the one before */
+    bool has_log_key, log_begun; /* it may sign the log of this flight, and has done so */
     int64_t attestation;
     uint8_t before[RT_DIGEST_BYTES];
     bool answered; /* the last answer about a step, as far as one that equals it is counted */
@@ -77,6 +80,9 @@ bool rt_give_back(rt_boundary *boundary);
    second time. Then sign how far it got into `out` of RT_MAX_STATEMENT octets; 0 where nothing is signed. */
 bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_DIGEST_BYTES]);
 uint32_t rt_attested(rt_boundary *boundary, bool final, uint8_t *out);
+
+/* Sign the checkpoint that begins the log of the flight that is in force, once; nothing else is signed with this key. */
+rt_refusal rt_begin_log(rt_boundary *boundary, rt_bytes checkpoint, uint8_t signature[RT_SIGNATURE_BYTES]);
 
 /* Decide one request into `out` of RT_MAX_RESPONSE octets; answers how many there are. Hostile bytes get a refusal. `own_us` is our
    own monotonic time, -1 where the caller's is the only one. */

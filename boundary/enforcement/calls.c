@@ -257,6 +257,11 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
         size = RT_FLIGHT_BYTES;
         refused = NULL;
         break;
+    case RT_CALL_LOG:
+        if (!boundary->loaded) return refuse("not-loaded", out);
+        refused = rt_begin_log(boundary, rest_of(&left), out + 1);
+        size = RT_SIGNATURE_BYTES;
+        break;
     case RT_CALL_DIGEST:
         memcpy(out + 1, boundary->chain.digest, RT_DIGEST_BYTES);
         size = RT_DIGEST_BYTES;

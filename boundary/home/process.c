@@ -1,7 +1,7 @@
 /* The boundary as a process of its own: it answers the calls of `enforcement/calls.h` that come over one socket, with what it was
    given at its start: the trust root, the identity of the vehicle, the keys and one file of its own.
 
-       rtshcua-boundary --socket FD --root FD --pin HEX --vehicle IDENTITY --kept FD [--link-key FD] [--boundary-key FD]
+       rtshcua-boundary --socket FD --root FD --pin HEX --vehicle IDENTITY --kept FD [--link-key FD] [--boundary-key FD] [--log-key FD]
                         [--user UID --group GID] [--settings FD] [--owed FD] [--paced]
        rtshcua-boundary --socket FD --measures [--user UID --group GID]
 
@@ -38,7 +38,7 @@ static rt_kept slots[2];
 static uint8_t call[RT_MAX_CALL], result[RT_MAX_RESULT];
 
 typedef struct {
-    int socket, root, kept, link_key, boundary_key, settings, owed;
+    int socket, root, kept, link_key, boundary_key, log_key, settings, owed;
     const char *vehicle, *pin;
     uint32_t user, group;
     int paced, measures;
@@ -52,10 +52,11 @@ static int number(const char *text, uint32_t *value) {
 }
 
 static int read_options(int count, char **words, options *given) {
-    *given = (options){-1, -1, -1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0, 0};
+    *given = (options){-1, -1, -1, -1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0, 0};
     struct { const char *name; int *file; } files[] = {
         {"--socket", &given->socket}, {"--root", &given->root}, {"--kept", &given->kept},
-        {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key}, {"--settings", &given->settings}, {"--owed", &given->owed},
+        {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key}, {"--log-key", &given->log_key},
+        {"--settings", &given->settings}, {"--owed", &given->owed},
     };
     for (int at = 1; at < count; at++) {
         uint32_t value;
@@ -281,6 +282,8 @@ int main(int count, char **words) {
         return NO_KEY;
     if (given.boundary_key >= 0 && !read_key(given.boundary_key, keys->boundary))
         return USAGE;
+    if (given.log_key >= 0 && !read_key(given.log_key, keys->log))
+        return USAGE;
     static rt_preparation settings, owed;
     const rt_preparation *meant, *left;
     if (!read_writes(given.settings, &settings, &meant) || !read_writes(given.owed, &owed, &left))
@@ -294,7 +297,8 @@ int main(int count, char **words) {
     static uint8_t pin[RT_KEY_BYTES];
     const rt_setup setup = {
         keys, kept, root_bytes, {pin, given.pin == NULL ? 0 : from_hex((const uint8_t *)given.pin, strlen(given.pin), pin, sizeof pin)},
-        {(const uint8_t *)given.vehicle, (uint32_t)strlen(given.vehicle)}, given.link_key >= 0, given.boundary_key >= 0, meant, left,
+        {(const uint8_t *)given.vehicle, (uint32_t)strlen(given.vehicle)}, given.link_key >= 0, given.boundary_key >= 0,
+        given.log_key >= 0, meant, left,
         {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
     if (rt_boundary_begin(&boundary, &setup) != NULL)
         return UNTRUSTED;

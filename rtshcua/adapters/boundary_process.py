@@ -110,18 +110,18 @@ def measures_here(user: tuple[int, int] | None) -> Measure:
 class BoundaryProcess:
     """A boundary that runs. `measures` are those in force.
 
-    `own_seed` is that of the key that it signs its own evidence with; `settings` are the parameters that are set of the
-    vehicle before the flight, and `owed` those that earlier runs set and did not put back, each as the body of a
-    preparation (`wire.preparation`); `user` is the user and group that it runs as,
-    None for ours. `paced`: the caller's time is not the machine's, as on a simulated vehicle that is flown faster.
+    `own_seed` is that of the key that it signs its own evidence with, `log_seed` that of the log's key. `settings` are
+    the parameters that are set of the vehicle before the flight, and `owed` those that earlier runs set and did not put
+    back, each as the body of a preparation (`wire.preparation`). `user` is the user and group that it runs as, None for
+    ours. `paced`: the caller's time is not the machine's, as on a simulated vehicle that is flown faster.
 
     Raises BoundaryError, LinkKeyError, and OSError for files that cannot be opened.
     """
 
     def __init__(
         self, root: bytes, pinned: bytes, vehicle: str, state: Path, *, link_key: Path | None = None,
-        own_seed: bytes | None = None, settings: bytes | None = None, owed: bytes | None = None,
-        user: tuple[int, int] | None = None, paced: bool = False,
+        own_seed: bytes | None = None, log_seed: bytes | None = None, settings: bytes | None = None,
+        owed: bytes | None = None, user: tuple[int, int] | None = None, paced: bool = False,
     ) -> None:  # fmt: skip
         path = program()
         if path is None:
@@ -131,7 +131,13 @@ class BoundaryProcess:
         try:
             words = ["--socket", str(files[0]), "--pin", pinned.hex(), "--vehicle", vehicle]
             words += ["--paced"] if paced else []
-            given = {"--root": root, "--boundary-key": own_seed, "--settings": settings, "--owed": owed}
+            given = {
+                "--root": root,
+                "--boundary-key": own_seed,
+                "--log-key": log_seed,
+                "--settings": settings,
+                "--owed": owed,
+            }
             for name, handle in self._handles(vehicle, state, link_key, given):
                 files.append(handle)
                 words += [name, str(handle)]

@@ -25,6 +25,7 @@ from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
 from rtshcua.cli.live.telling import Teller, plan_of
 from rtshcua.cli.live.watching import Watching
+from rtshcua.cli.log_signer import LogSigner
 from rtshcua.cli.past import LOG_BEFORE, Past
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.simulation import SIMULATED
@@ -37,7 +38,6 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Append, Ending, Event, Interrupted, Presented
 from rtshcua.onboard.runtime.runtime import Runtime
-from rtshcua.wire.keys import Duty, SigningKey
 
 if TYPE_CHECKING:
     from rtshcua.cli.incidents import Incidents, Watch
@@ -89,7 +89,7 @@ class Flight:
     def __init__(
         self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts,
         tape: Tape,
-        *, bundle: bytes, root: bytes, log_key: SigningKey, run: RunFolder, speed: float, live: bool, resumed: bool,
+        *, bundle: bytes, root: bytes, log_key: LogSigner, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, boundary: BoundarySession, witnesses: Witnessing, utc: UtcWatch,
         lapsed: Callable[[], Refused | None], debts: OwedParameters, agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None,
@@ -105,7 +105,7 @@ class Flight:
         self._early = list(events)
         self._agents = agents
         self._witnesses = witnesses
-        self._recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, draw)
+        self._recorder = Recorder(log_key.sign, log_key.public, draw)
         log = run.log()
         past.begin(log.path, aloft=resumed)
         self._past = past

@@ -32,8 +32,8 @@ class Apart:
 
     def __init__(
         self, vehicle: str, root: TrustRoot, signed_root: bytes, state: Path, *,
-        link_key: Path | None, own_key: SigningKey | None, user: tuple[int, int] | None, paced: bool,
-        settings: Mapping[str, int], owed: Mapping[str, Owed],
+        link_key: Path | None, own_key: SigningKey | None, log_key: SigningKey,
+        user: tuple[int, int] | None, paced: bool, settings: Mapping[str, int], owed: Mapping[str, Owed],
     ) -> None:  # fmt: skip
         self._vehicle, self._root, self._settings = vehicle, root, settings
         pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
@@ -41,6 +41,7 @@ class Apart:
             seed = None if own_key is None else own_key.private.private_bytes_raw()
             self.process = BoundaryProcess(
                 signed_root, pinned, vehicle, state, link_key=link_key, own_seed=seed, user=user, paced=paced,
+                log_seed=log_key.private.private_bytes_raw(),
                 settings=_listed({name: Owed(0, value) for name, value in settings.items()}), owed=_listed(owed),
             )  # fmt: skip
         except BoundaryError as error:
@@ -59,6 +60,10 @@ class Apart:
         self.expect()
         assert isinstance(answer, bytes)
         return answer
+
+    def sign_log(self, checkpoint: bytes) -> bytes | Refusal:
+        """The signature of the log's key under the checkpoint that begins the log of the flight, once."""
+        return self._caller.sign_log(checkpoint)
 
     def waiting(self, base: Loaded) -> Loaded:
         """What is waited with, in this process: what leaves meanwhile, leaves by the boundary."""

@@ -36,6 +36,7 @@ from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.isolating import IN_USE, Apart
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
+from rtshcua.cli.log_signer import LogSigner
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
 from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, still_flies
 from rtshcua.cli.past import Past
@@ -54,7 +55,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.frames import Gate
-from rtshcua.onboard.enforcement.isolated import IsolatedGate
+from rtshcua.onboard.enforcement.isolated import IsolatedExecutor, IsolatedGate
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
 from rtshcua.onboard.ports import Ending, Event
@@ -148,10 +149,9 @@ def launch(order: Launch) -> ExitCode:
     bundle = _read(order.bundle)
     clock: LinkClock = SystemClock() if order.speed == 1 else PacedClock(order.speed)
     utc = _utc(order, clock)
-    trust, log_key, loaded = _trusting(order, bundle, clock)
-    log_kid = log_key.kid
+    trust, log_key, loaded = _signed_by(*_trusting(order, bundle, clock))
     witnesses = Witnessing(order.witnesses, trust.root.witnesses(loaded.vehicle, clock.now().utc_us))
-    past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key)
+    past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key.key())
     with ExitStack() as view:  # it may still be shown when everything else is over
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
@@ -159,7 +159,7 @@ def launch(order: Launch) -> ExitCode:
             debts = OwedParameters(order.state, loaded.vehicle, sets=sets)
             stack.callback(debts.close)
             slack = max(1, round(order.speed / _UNHURRIED))
-            begun = _begin(order, bundle, loaded, trust, log_kid, past, debts.left, clock, interrupts, slack, stack)
+            begun = _begin(order, bundle, loaded, trust, log_key, past, debts.left, clock, interrupts, slack, stack)
             bundle, loaded, trust, (own_key, keyless), apart, absent, transport, agents = begun
             root, signed_root = trust.root, trust.signed
             signing = _sign(order, loaded, clock, apart)
@@ -181,7 +181,7 @@ def launch(order: Launch) -> ExitCode:
             vehicle.driver.asks_utc = utc.waits
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
-            lapsed = _lapsed(bundle, signed_root, log_kid, loaded, clock)
+            lapsed = _lapsed(bundle, signed_root, log_key.kid, loaded, clock)
             _expect_current(lapsed, resumed=not order.dry_run and order.sortie is None)
             if order.sortie is not None:
                 events += order.sortie.before(vehicle, clock)
@@ -213,10 +213,10 @@ def launch(order: Launch) -> ExitCode:
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
                 past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc, debts=debts,
-                lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, log_kid, loaded, clock),
+                lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, log_key.kid, loaded, clock),
                 simulated=simulation.told(order.speed, own=order.link is None), boundary=inside,
             )  # fmt: skip
-            del log_key  # it signed the first record; nothing in flight needs it, so nothing in flight holds it
+            log_key.hand_over(_signs_no_more)  # nothing in flight needs it, so nothing in flight holds it
             if refusal is not None:
                 flight.settle()
                 raise refusal
@@ -261,7 +261,7 @@ class _Begun(NamedTuple):
 
 
 def _begin(
-    order: Launch, bundle: bytes, loaded: Loaded, trust: Trusted, log_key: bytes, past: Past | None,
+    order: Launch, bundle: bytes, loaded: Loaded, trust: Trusted, log_key: LogSigner, past: Past | None,
     owed: Mapping[str, Owed], clock: LinkClock, interrupts: Interrupts, slack: int, stack: ExitStack,
 ) -> _Begun:  # fmt: skip
     """The boundary begins, until the stack is closed, and takes the bundle, or one that is waited for. Where it does
@@ -272,7 +272,7 @@ def _begin(
     key = _boundary_key(order, trust.root, loaded, clock)
     _expect_all(key[1], resumed=not order.dry_run)
     try:
-        apart = _apart(order, loaded, trust, key[0], owed, stack)
+        apart = _apart(order, loaded, trust, key[0], log_key, owed, stack)
         if order.wait_s is None:
             loaded = _taken_over(apart, loaded, bundle, clock)
         elif apart is not None:  # it draws the id of the flight that the sockets tell of
@@ -281,6 +281,8 @@ def _begin(
         if (isinstance(error, Refused) and error.slug == IN_USE) or not _may_hang(order, loaded, past):
             raise
         apart, absent = None, error
+    if apart is not None:
+        log_key.hand_over(apart.sign_log)
     if order.wait_s is None:
         begun = _Begun(bundle, loaded, trust, key, apart, absent)
     else:
@@ -303,8 +305,8 @@ def _may_hang(order: Launch, loaded: Loaded, past: Past | None) -> bool:
 
 
 def _apart(
-    order: Launch, loaded: Loaded, trust: Trusted, own_key: SigningKey | None, owed: Mapping[str, Owed],
-    stack: ExitStack,
+    order: Launch, loaded: Loaded, trust: Trusted, own_key: SigningKey | None, log_key: LogSigner,
+    owed: Mapping[str, Owed], stack: ExitStack,
 ) -> Apart | None:  # fmt: skip
     """A boundary that runs apart, where that is asked for, until the stack is closed. What may have expired is brought
     down by the one in this process, which does not ask. Raises `Refused` and OSError.
@@ -314,6 +316,7 @@ def _apart(
     try:
         apart = Apart(
             loaded.vehicle, trust.root, trust.signed, order.state, link_key=order.signing_key, own_key=own_key,
+            log_key=log_key.key(),
             user=order.boundary_user, paced=order.speed != 1, settings=order.settings, owed=owed,
         )  # fmt: skip
     except LinkKeyError as error:
@@ -408,7 +411,7 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
 
 
 def _wait(
-    order: Launch, base: Loaded, trusted: Trusted, log_key: bytes, past: Past | None, clock: LinkClock,
+    order: Launch, base: Loaded, trusted: Trusted, log_key: LogSigner, past: Past | None, clock: LinkClock,
     interrupts: Interrupts, slack: int, transport: Transport, agents: Agents, apart: Apart | None,
     absent: Refused | OSError | None,
 ) -> tuple[Admitted, Trusted]:  # fmt: skip
@@ -433,6 +436,8 @@ def _wait(
             except Refused as refused:
                 say(f"note: {refused}; it is brought down all the same")
                 admitted = Admitted(data, loaded)
+            if not isinstance(admitted.loaded.executor, IsolatedExecutor):
+                log_key.use(_log_key(order))
             agents.fly(admitted.loaded)
             return admitted, under
         if trusted.distrust is not None:  # what it is not enough for is to fly anything new
@@ -448,7 +453,7 @@ def _wait(
 
         def admit(data: bytes) -> Loaded | Refusal:
             trusted.expect_latest()  # a key of it may be revoked: whoever waits for long enough flies under no old root
-            return _admit(order, data, base, trusted, log_key, signing, clock, apart)
+            return _admit(order, data, base, trusted, log_key.kid, signing, clock, apart)
 
         def expect() -> None:
             trusted.expect_latest()
@@ -551,7 +556,7 @@ def _trusting(
     now_us = clock.now().utc_us
     try:
         trusted = trust(order.roots, order.data, order.state, _vehicle(order, bundle), now_us)
-        key = unlock(KeyStore(order.data), Duty.LOG, path=order.log_key, passphrase_file=order.passphrase_file)
+        key = _log_key(order)
         loaded = _loading(order, bundle, trusted, key, clock, flight)
     except Untrusted as error:
         raise Refused(code_of(error.slug), *untrusted(error)) from None
@@ -566,6 +571,19 @@ def _trusting(
     if trusted.distrust is not None and (order.dry_run or not _may_have_flown(order, loaded)):
         raise trusted.distrust
     return trusted, key, loaded
+
+
+def _log_key(order: Launch) -> SigningKey:
+    return unlock(KeyStore(order.data), Duty.LOG, path=order.log_key, passphrase_file=order.passphrase_file)
+
+
+def _signed_by(trusted: Trusted, key: SigningKey, loaded: Loaded) -> tuple[Trusted, LogSigner, Loaded]:
+    """What `_trusting` found, its key in the hands of who signs the log, and of nobody else."""
+    return trusted, LogSigner(key), loaded
+
+
+def _signs_no_more(_checkpoint: bytes) -> Refusal:
+    return Refusal("log-begun", "the log has begun")
 
 
 def _loading(

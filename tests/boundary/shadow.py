@@ -26,6 +26,7 @@ from rtshcua.onboard.enforcement.isolated import (
 from rtshcua.onboard.enforcement.load import Loaded, Mode
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import BoundaryKey, Dispatch
+from rtshcua.wire.keys import Duty
 from rtshcua.wire.permit import SIZE
 from rtshcua.wire.preparation import MOST, Preparation
 from rtshcua.wire.receipt import Receipt
@@ -36,6 +37,8 @@ from virtual import case
 
 #: what the boundary in C signs its own evidence with
 OWN_KEY = case.BOUNDARY_KEY.private.private_bytes_raw()
+#: and logs
+LOG_KEY = case.KEYS[Duty.LOG].private.private_bytes_raw()
 
 #: frames that links are flown by, on either autopilot
 LINKS = [
@@ -78,7 +81,7 @@ def begin(
     boundary.rt_test_boundary_forget()
     name = vehicle.encode()
     refused = boundary.rt_test_boundary_begin(
-        signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, link_key, OWN_KEY,
+        signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, link_key, OWN_KEY, LOG_KEY,
         listed({name: Owed(0, value) for name, value in settings.items()}), listed(owed),
         (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us),
     )  # fmt: skip

@@ -36,8 +36,8 @@ Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
-    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT,
-) = range(1, 21)  # fmt: skip
+    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG,
+) = range(1, 22)  # fmt: skip
 #: octets of a bundle or a document that go in one call
 MAX_PART: Final = 60_000
 
@@ -125,6 +125,10 @@ class Caller:
             return self.lose()
         self.reopened = bool(answer[-1])
         return answer[:-1]
+
+    def sign_log(self, checkpoint: bytes) -> bytes | Refusal:
+        """The signature of the log's key under the checkpoint that begins the log of the flight, once."""
+        return self(LOG, checkpoint)
 
     def flight(self) -> bytes | Refusal:
         """The id of the flight that the next bundle begins."""

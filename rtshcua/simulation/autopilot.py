@@ -337,19 +337,19 @@ class Autopilot:
 
     def _follow_plans(self) -> None:
         """The mission, the fence and the transfers go on."""
-        vehicle, flavour, fence = self.vehicle, self.flavour, self.fence
-        self.transfer.step(self.now_us)
-        self.mission.step(self.now_us, self._where)
+        vehicle, fence, now_us, where = self.vehicle, self.fence, self.now_us, self._where
+        self.transfer.step(now_us)
+        self.mission.step(now_us, where)
         breached, mode = fence.breach is not None, vehicle.mode
         if breached and mode is not self._mode_in_breach:
-            flavour.on_mode_in_breach(self)
+            self.flavour.on_mode_in_breach(self)
         vehicle.return_under = fence.return_under
-        began = fence.step(self.now_us, self._where, vehicle.armed and vehicle.in_air)
+        began = fence.step(now_us, where, vehicle)
         if began is not None:
-            self.take_over(Taker.FAILSAFE, partial(flavour.on_breach, self, began))
+            self.take_over(Taker.FAILSAFE, partial(self.flavour.on_breach, self, began))
         elif breached and fence.breach is None:
-            flavour.on_breach_cleared(self)
-        self._mode_in_breach = vehicle.mode if self._acts_late() else mode
+            self.flavour.on_breach_cleared(self)
+        self._mode_in_breach = vehicle.mode if self.delayed is not None and self._acts_late() else mode
 
     def _acts_late(self) -> bool:
         if self.vehicle.mode is not Mode.LOITER or not self.vehicle.in_air:

@@ -39,7 +39,8 @@ def flight_load(airspeed: float, climb: float, thrust: float = 1.0) -> float:
     """
     slip = airspeed / _HOVER_AIR
     carried = _INDUCED * thrust * sqrt(thrust) / sqrt(1.0 + slip * slip)
-    return max(_LEAST, carried + 1.0 - _INDUCED + _DRAG_POWER * airspeed**3 + _CLIMB_POWER * thrust * climb)
+    load = carried + 1.0 - _INDUCED + _DRAG_POWER * airspeed**3 + _CLIMB_POWER * thrust * climb
+    return max(_LEAST, load)
 
 
 @dataclass(slots=True)
@@ -60,8 +61,10 @@ class Battery:
 
     def drain(self, dt: float, load: float) -> None:
         """Takes out what `load` needs for `dt` seconds."""
-        taken = min(self.level, load * dt / self.hover_s)
-        self.level -= taken
+        level, taken = self.level, load * dt / self.hover_s
+        if taken > level:
+            taken = level
+        self.level = level - taken
         self.load = load
         self.used_mah += taken * CAPACITY_MAH
 

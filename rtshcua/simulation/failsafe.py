@@ -77,7 +77,7 @@ class Failsafes:
         if not vehicle.armed or not vehicle.in_air:
             self._lands_blind = False
             return
-        if self._sensors.has_position and not self._lands_blind:
+        if not self._lands_blind and self._sensors.has_position:
             self._without_s = 0.0
             self._back_s += dt
         else:

@@ -11,6 +11,7 @@ from typing import Self
 
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plans import EXCLUDED, FENCE, INCLUDED, POLYGONS, ROUND_EXCLUDED, ROUND_INCLUDED, Item, Plans
+from rtshcua.simulation.vehicle import Vehicle
 
 Place = tuple[float, float]
 """Metres north and east of home."""
@@ -166,6 +167,8 @@ class FenceWatch:
         self._value = value
         self._area = Area()
         self._limits: FenceLimits | None = None
+        self.return_under = inf
+        """The height above home under which a return stays, for the fence's sake."""
         self._changed_us = 0
         self._checked_us = -CHECK_US
         self._now_us = 0
@@ -183,7 +186,7 @@ class FenceWatch:
 
     def settings_changed(self) -> None:
         """A parameter was set; the fence is another one a moment later."""
-        self._limits = None
+        self._limits, self.return_under = None, inf
         self._stale = True
         self._changed_us = self._now_us
 
@@ -191,11 +194,6 @@ class FenceWatch:
     def in_force(self) -> bool:
         """Whether there is a fence."""
         return self._limits is not None
-
-    @property
-    def return_under(self) -> float:
-        """The height above home under which a return stays, for the fence's sake."""
-        return inf if self._limits is None else self._limits.return_under
 
     @property
     def critical(self) -> bool:
@@ -207,7 +205,7 @@ class FenceWatch:
         limits = self._limits
         return limits is None or (limits.floor <= point.up and limits.holds(point))
 
-    def step(self, now_us: int, where: Callable[[], Point], flying: bool) -> Breach | None:
+    def step(self, now_us: int, where: Callable[[], Point], vehicle: Vehicle) -> Breach | None:
         """Lets time pass; the breach that began now, if one did. `where` tells where the vehicle believes to be."""
         self._now_us = now_us
         if now_us - self._checked_us < CHECK_US and not self._stale:
@@ -216,9 +214,10 @@ class FenceWatch:
             if now_us - self._changed_us < LOADED_US:
                 return None
             self._stale, self._limits = False, self._rules.limits(self._value, self._area)
+            self.return_under = inf if self._limits is None else self._limits.return_under
         self._checked_us = now_us
         limits = self._limits
-        point = where() if limits is not None and flying else None
+        point = where() if limits is not None and vehicle.armed and vehicle.in_air else None
         if limits is None or point is None or limits.holds(point):
             self.breach = None
             return None

@@ -1,7 +1,7 @@
 """From places to velocities: what the autopilot asks of the body. Metres, seconds, radians."""
 
+from dataclasses import dataclass
 from math import atan2, copysign, cos, hypot, inf, sin, sqrt
-from typing import NamedTuple
 
 from rtshcua.simulation.handling import Agility, Handling
 from rtshcua.simulation.kinematics import Approach, Body
@@ -30,7 +30,9 @@ def towards(body: Body, north: float, east: float, speed: float, approach: Appro
         return 0.0, 0.0
     # Where it will be by the time that it has turned over, so that it does not slow down too late.
     closing = (north * body.v_north + east * body.v_east) / distance if distance > _NEAR_M else 0.0
-    speed = min(speed, approach.speed(max(distance - closing * LEAD_S, 0.0)))
+    stops = approach.speed(max(distance - closing * LEAD_S, 0.0))
+    if stops < speed:
+        speed = stops
     return north / distance * speed, east / distance * speed
 
 
@@ -44,7 +46,8 @@ _BACK_M_S, _BACK_M = 0.5, 2.5
 """How fast it comes back, and from how far at most: the recorded ones took four to nine seconds."""
 
 
-class Past(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Past:
     """How far, in metres, and in which direction it flies past a target before it comes back to it."""
 
     north: float
@@ -52,12 +55,12 @@ class Past(NamedTuple):
 
     def is_over(self, body: Body, north: float, east: float) -> bool:
         """Whether it has flown past the target (north, east) and comes back."""
-        far = hypot(self.north, self.east)
-        north, east = body.north - north, body.east - east
-        along = (north * self.north + east * self.east) / far
+        to_north, to_east = self.north, self.east
+        far = hypot(to_north, to_east)
+        along = ((body.north - north) * to_north + (body.east - east) * to_east) / far
         if along <= 0:
             return False
-        speed = (body.v_north * self.north + body.v_east * self.east) / far
+        speed = (body.v_north * to_north + body.v_east * to_east) / far
         return speed < _TURNED_M_S or far - along < _TURNED_M
 
 
@@ -101,7 +104,10 @@ def climb_rate(up: float, target: float, handling: Handling, taking_off: bool) -
     fastest = handling.climb if away > 0 else handling.descent
     if taking_off:
         fastest = min(fastest, handling.takeoff_climb)
-    return copysign(min(fastest, handling.agility.climb_approach.speed(abs(away))), away)
+    stops = handling.agility.climb_approach.speed(abs(away))
+    if stops < fastest:
+        fastest = stops
+    return copysign(fastest, away)
 
 
 def steepest(body: Body, north: float, east: float, up: float) -> float:

@@ -47,9 +47,7 @@ class Approach:
     def speed(self, distance: float) -> float:
         """The greatest speed from which the vehicle still stops at `distance`."""
         linear = self.linear
-        if distance <= linear:
-            return distance * self.gain
-        return sqrt(2 * self.braking * (distance - linear / 2))
+        return distance * self.gain if distance <= linear else sqrt(2 * self.braking * (distance - linear / 2))
 
     def distance(self, speed: float) -> float:
         """The inverse of `speed`: how far ahead the place is where a vehicle of that speed can stop."""
@@ -69,8 +67,10 @@ class Body:
     v_east: float = 0.0
     v_up: float = 0.0
     yaw: float = 0.0
-    roll: float = 0.0
-    pitch: float = 0.0
+    _roll: float = 0.0
+    _pitch: float = 0.0
+    _leans_at: float | None = None
+    """The yaw of the last step that it flew, while roll and pitch were not worked out since; else None."""
     a_up: float = 0.0
     """The present acceleration upwards."""
     lean_north: float = 0.0
@@ -93,42 +93,65 @@ class Body:
 
         `climb` is the wanted speed upwards, reached by at most `climb_most`; `wind` is the velocity of the air.
         """
-        north, east = want
-        ask_north = (north - self.v_north) * _FOLLOW
-        ask_east = (east - self.v_east) * _FOLLOW
+        ask_north = (want[0] - self.v_north) * _FOLLOW
+        ask_east = (want[1] - self.v_east) * _FOLLOW
         much = hypot(ask_north, ask_east)
         if much > most:
             ask_north *= most / much
             ask_east *= most / much
-        self._fly(dt, ask_north + self._trim_north, ask_east + self._trim_east, wind)
-        self._climb(dt, climb, climb_most)
+        self._fly(dt, ask_north + self._trim_north, ask_east + self._trim_east, climb, climb_most, wind)
 
     def drift(self, dt: float, climb: float, climb_most: float, wind: tuple[float, float]) -> None:
         """One step held level: without a position the vehicle goes where the air goes."""
-        self._fly(dt, 0.0, 0.0, wind)
-        self._climb(dt, climb, climb_most)
+        self._fly(dt, 0.0, 0.0, climb, climb_most, wind)
 
-    @property
     def thrust(self) -> float:
         """What the motors carry, the weight being 1."""
         return sqrt((GRAVITY + self.a_up) ** 2 + self.lean_north**2 + self.lean_east**2) / GRAVITY
 
+    @property
+    def roll(self) -> float:
+        """How far it leans to its right."""
+        self._work_out_attitude()
+        return self._roll
+
+    @property
+    def pitch(self) -> float:
+        """How far its nose is up."""
+        self._work_out_attitude()
+        return self._pitch
+
+    def _work_out_attitude(self) -> None:
+        """Of the last step that it flew: only when it is asked for, or before something else changes it."""
+        yaw = self._leans_at
+        if yaw is not None:
+            north, east = cos(yaw), sin(yaw)
+            self._pitch = -atan((self.lean_north * north + self.lean_east * east) / GRAVITY)
+            self._roll = atan((self.lean_east * north - self.lean_north * east) / GRAVITY)
+            self._leans_at = None
+
     def fall(self, dt: float) -> None:
         """One step without thrust; it tips over."""
-        self.roll += copysign(min(TUMBLE_RATE * dt, max(0.0, TIPPED - abs(self.roll))), self.roll)
-        self.a_up = max(-GRAVITY, (-MAX_FALL - self.v_up) / dt)
-        self._move(dt, 0.0, 0.0)
-        self._rise(dt)
+        roll = self.roll
+        self._roll = roll + copysign(min(TUMBLE_RATE * dt, max(0.0, TIPPED - abs(roll))), roll)
+        v_up = self.v_up
+        self.a_up = a_up = max(-GRAVITY, (-MAX_FALL - v_up) / dt)
+        self.north += self.v_north * dt
+        self.east += self.v_east * dt
+        self.up += (v_up + a_up * dt / 2) * dt
+        self.v_up = v_up + a_up * dt
 
     def crash(self) -> None:
         """What it flew into stops it."""
+        self._work_out_attitude()
         self.v_north = self.v_east = self.lean_north = self.lean_east = 0.0
 
     def stop(self, upright: bool = True) -> None:
         """Standing on the ground, or lying there as it came down."""
         self.up = self.v_north = self.v_east = self.v_up = self.a_up = 0.0
+        self._work_out_attitude()
         if upright:
-            self.roll = self.pitch = 0.0
+            self._roll = self._pitch = 0.0
         self.lean_north = self.lean_east = self._trim_north = self._trim_east = 0.0
 
     def turn(self, dt: float, yaw: float) -> None:
@@ -136,49 +159,39 @@ class Body:
         away = (yaw - self.yaw + pi) % (2 * pi) - pi
         self.yaw = (self.yaw + within(away, YAW_RATE * dt) + pi) % (2 * pi) - pi
 
-    def _fly(self, dt: float, ask_north: float, ask_east: float, wind: tuple[float, float]) -> None:
+    def _fly(
+        self, dt: float, ask_north: float, ask_east: float, climb: float, climb_most: float, wind: tuple[float, float]
+    ) -> None:
         much = hypot(ask_north, ask_east)
         if much > _MOST:
             ask_north *= _MOST / much
             ask_east *= _MOST / much
         lean_north, lean_east = self.lean_north, self.lean_east
         change_north, change_east = ask_north - lean_north, ask_east - lean_east
-        change = hypot(change_north, change_east)
-        if change > JERK * dt:
-            change_north *= JERK * dt / change
-            change_east *= JERK * dt / change
+        change, jerk = hypot(change_north, change_east), JERK * dt
+        if change > jerk:
+            change_north *= jerk / change
+            change_east *= jerk / change
         self.lean_north = lean_north = lean_north + change_north
         self.lean_east = lean_east = lean_east + change_east
-        wind_north, wind_east = wind
-        air_north, air_east = wind_north - self.v_north, wind_east - self.v_east
+        v_north, v_east, v_up = self.v_north, self.v_east, self.v_up
+        air_north, air_east = wind[0] - v_north, wind[1] - v_east
         drag = _ROTOR_DRAG + _BODY_DRAG * hypot(air_north, air_east)
         drag_north, drag_east = drag * air_north, drag * air_east
         learn = dt / _LEARN_S
         self._trim_north += (-drag_north - self._trim_north) * learn
         self._trim_east += (-drag_east - self._trim_east) * learn
-        self._move(dt, (lean_north + drag_north) * dt, (lean_east + drag_east) * dt)
-        yaw = self.yaw
-        north, east = cos(yaw), sin(yaw)
-        self.pitch = -atan((lean_north * north + lean_east * east) / GRAVITY)
-        self.roll = atan((lean_east * north - lean_north * east) / GRAVITY)
-
-    def _climb(self, dt: float, climb: float, most: float) -> None:
-        a_up = self.a_up
-        change = within((climb - self.v_up) * 2 * _FOLLOW, most) - a_up
-        self.a_up = a_up + within(change, _CLIMB_JERK * dt)
-        self._rise(dt)
-
-    def _rise(self, dt: float) -> None:
-        v_up, a_up = self.v_up, self.a_up
-        self.up += (v_up + a_up * dt / 2) * dt
-        self.v_up = v_up + a_up * dt
-
-    def _move(self, dt: float, d_north: float, d_east: float) -> None:
         # The mean of old and new velocity: exact while the acceleration is constant.
-        v_north, v_east = self.v_north, self.v_east
+        d_north, d_east = (lean_north + drag_north) * dt, (lean_east + drag_east) * dt
         self.north += (v_north + d_north / 2) * dt
         self.east += (v_east + d_east / 2) * dt
         self.v_north, self.v_east = v_north + d_north, v_east + d_east
+        self._leans_at = self.yaw
+        a_up = self.a_up
+        change = within((climb - v_up) * 2 * _FOLLOW, climb_most) - a_up
+        self.a_up = a_up = a_up + within(change, _CLIMB_JERK * dt)
+        self.up += (v_up + a_up * dt / 2) * dt
+        self.v_up = v_up + a_up * dt
 
 
 def within(value: float, most: float) -> float:

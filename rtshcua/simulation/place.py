@@ -44,4 +44,6 @@ class Home:
         if abs(longitude) > _HALF_TURN_E7:
             longitude -= 2 * _HALF_TURN_E7 if longitude > 0 else -2 * _HALF_TURN_E7
         latitude = self.latitude + round(north / _METRES_PER_E7)
-        return max(-_MOST_E7, min(_MOST_E7, latitude)), max(-_MOST_E7, min(_MOST_E7, longitude))
+        if abs(latitude) > _MOST_E7 or abs(longitude) > _MOST_E7:
+            return max(-_MOST_E7, min(_MOST_E7, latitude)), max(-_MOST_E7, min(_MOST_E7, longitude))
+        return latitude, longitude

@@ -90,6 +90,8 @@ class Sensors:
         self.unhealthy = False
         """Whether the estimator says that it cannot be trusted, and goes on estimating."""
         self._drift = 0.0
+        self.error = (0.0, 0.0)
+        """How far the estimate is off, north and east, noise apart. The vehicle steers by the estimate."""
         self._last_fix: Point | None = None
         self._plan = plan
         self._pace = pace
@@ -107,8 +109,11 @@ class Sensors:
         if self.lost or self.glitch != (0.0, 0.0):
             self._without_fix_s += dt
             self._drift += _DRIFT * dt
+            self._sum()
         else:
-            self._without_fix_s = self._drift = 0.0
+            if self._without_fix_s:
+                self._without_fix_s = self._drift = 0.0
+                self._sum()
             if self._strays:
                 self._stray(dt)
         if self.stray != (0.0, 0.0) and not self.lost:
@@ -125,6 +130,7 @@ class Sensors:
                 -north * back + self._chance.gauss(0, spread), -east * back + self._chance.gauss(0, spread)
             )  # fmt: skip
         self._wander = (self._wander[0] + self._wandering[0] * dt, self._wander[1] + self._wandering[1] * dt)
+        self._sum()
 
     def follow(self, dt: float, body: Body) -> None:
         """Lets the estimate of the velocity follow, as late as it is."""
@@ -137,6 +143,7 @@ class Sensors:
     def restart(self) -> None:
         """The autopilot starts again: sensors and estimator come up anew. What is wrong with the receiver stays."""
         self.age_s = self._without_fix_s = self._drift = 0.0
+        self._sum()
         self._come_up()
 
     def _come_up(self) -> None:
@@ -158,12 +165,15 @@ class Sensors:
         """Whether the checks of the sensors against each other pass."""
         self.locates = age_s >= plan.position_s
         """Whether the estimator has come up far enough to vouch for a position."""
+        self.estimates = self._without_fix_s < self._coast_s and self.locates
+        """Whether the estimator has a position, whatever it says of it."""
         self.tells_position = self.answers if plan.tells_early else self.locates
         """Whether GLOBAL_POSITION_INT is sent, whatever it is worth."""
 
     def jump(self, north_m: float, east_m: float) -> None:
         """From now on the receiver, and with it the estimate, is off by this much more."""
         self._jump = (self._jump[0] + north_m, self._jump[1] + east_m)
+        self._sum()
 
     # ------------------------------------------------------------------------------------------------ position
 
@@ -180,18 +190,12 @@ class Sensors:
     @property
     def has_position(self) -> bool:
         """Whether the estimator vouches for its position."""
-        return self._without_fix_s < self._coast_s and self.locates and not self.unhealthy
+        return self.estimates and not self.unhealthy
 
-    @property
-    def estimates(self) -> bool:
-        """Whether the estimator has a position, whatever it says of it."""
-        return self._without_fix_s < self._coast_s and self.locates
-
-    @property
-    def error(self) -> tuple[float, float]:
-        """How far the estimate is off, north and east, noise apart. The vehicle steers by the estimate."""
+    def _sum(self) -> None:
         (north, east), (wander_north, wander_east), drift = self._jump, self._wander, self._drift
-        return north + drift + wander_north, east + drift + wander_east
+        self.error = north + drift + wander_north, east + drift + wander_east
+        self.estimates = self._without_fix_s < self._coast_s and self.locates
 
     def velocity(self, body: Body) -> tuple[float, float, float]:
         """The velocity that GLOBAL_POSITION_INT reports: north, east and up."""

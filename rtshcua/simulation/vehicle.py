@@ -60,6 +60,8 @@ class Activity(Enum):
 _REST, _CLIMB, _TRACK, _RETURN_CLIMB, _RETURN_CROSS, _RETURN_WAIT = tuple(Activity)[:6]
 _CIRCLE, _DESCEND, _TOUCHED, _FALL, _WRECK = tuple(Activity)[6:]
 
+_RETURN = Mode.RETURN
+
 _FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
 
 _DOWN = (_REST, _TOUCHED, _WRECK)
@@ -135,7 +137,7 @@ class Vehicle:
     def speed(self) -> float:
         """The ground speed that it flies to a target with."""
         handling = self.handling
-        if self.mode is Mode.RETURN and handling.return_speed > 0:
+        if self.mode is _RETURN and handling.return_speed > 0:
             return min(handling.return_speed, handling.max_speed)
         return min(handling.cruise if self._speed is None else self._speed, handling.max_speed)
 
@@ -348,7 +350,7 @@ class Vehicle:
         if not self.armed:
             return battery.REST
         airspeed = hypot(body.v_north - wind[0], body.v_east - wind[1])
-        return battery.flight_load(airspeed, body.v_up, body.thrust)
+        return battery.flight_load(airspeed, body.v_up, body.thrust())
 
     def _believed(self, north: float, east: float, up: float) -> Point:
         """A place as it takes it to be: it steers by its estimate, which may be off."""
@@ -389,21 +391,21 @@ class Vehicle:
         self._waiting_s -= dt
         if self._activity not in _STEADY:
             self._advance(error)
-        most = agility.takeoff_acceleration if self._activity is _CLIMB else agility.climb_acceleration
-        self.blind = self.blind or not sees
-        target = self.target
+        activity, target, past = self._activity, self.target, self._past
+        most = agility.takeoff_acceleration if activity is _CLIMB else agility.climb_acceleration
         north, east = target.north - error[0], target.east - error[1]
-        if self.blind:
+        if self.blind or not sees:
+            self.blind = True
             body.drift(dt, self._climb_rate(north, east), most, wind)
             return
-        if self._past is not None:
-            if self._past.is_over(body, north, east):
+        if past is not None:
+            if past.is_over(body, north, east):
                 self._past = None
                 self._comes_back = True
             else:
-                north, east = north + self._past.north, east + self._past.east
+                north, east = north + past.north, east + past.east
         speed = self.speed
-        if self._activity is _CIRCLE:
+        if activity is _CIRCLE:
             want = guidance.around(body, north, east, self._radius, speed)
         else:
             if self._comes_back:
@@ -446,15 +448,12 @@ class Vehicle:
 
     def _climb_rate(self, north: float, east: float) -> float:
         """Upwards; (north, east) is the target as it is steered to."""
-        if self._activity is _DESCEND:
-            if self._waiting_s > 0:
-                return 0.0
-            return guidance.landing_rate(self.body, self.handling)
-        climbs = self._activity is _CLIMB
-        rate = guidance.climb_rate(self.body.up, self.target.up, self.handling, climbs)
-        if self._activity is _TRACK:
-            rate = within(rate, guidance.steepest(self.body, north, east, self.target.up))
-        return rate
+        activity, body = self._activity, self.body
+        if activity is _DESCEND:
+            return 0.0 if self._waiting_s > 0 else guidance.landing_rate(body, self.handling)
+        up = self.target.up
+        rate = guidance.climb_rate(body.up, up, self.handling, activity is _CLIMB)
+        return within(rate, guidance.steepest(body, north, east, up)) if activity is _TRACK else rate
 
     # ---------------------------------------------------------------------------------------------- on the ground
 

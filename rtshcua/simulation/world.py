@@ -89,8 +89,8 @@ class Simulation:
     def advance(self, to_us: int) -> list[bytes]:
         """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
         autopilot, face, up, down, inbox = self._autopilot, self._face, self._up, self._down, self._inbox
-        while self._ticked_us + TICK_US <= to_us:
-            at_us = self._ticked_us + TICK_US
+        at_us = self._ticked_us + TICK_US
+        while at_us <= to_us:
             if inbox is not None and inbox.next_us is not None:
                 self._obey(inbox, at_us - 1)
             self._ticked_us = at_us
@@ -111,7 +111,10 @@ class Simulation:
                 self._taken_over_us = at_us
             if at_us >= face.radio_due_us:
                 down.send(face.radio(at_us), at_us)
-        self._now_us = now_us = max(self._now_us, to_us)
+            at_us += TICK_US
+        now_us = self._now_us
+        if to_us > now_us:
+            self._now_us = now_us = to_us
         if inbox is not None and inbox.next_us is not None:
             self._obey(inbox, now_us)
         return down.due(now_us) if down.under_way else []

@@ -78,7 +78,7 @@ class VirtualVehicle:
         events, self._pending = self._pending, []
         waiting, self._waiting = self._waiting, []
         self._take(waiting, events)
-        clock, driver = self.clock, self.driver
+        clock, driver, advance, tick_us = self.clock, self.driver, self.simulation.advance, self._tick_us
         end_us = clock.elapsed_us + timeout_us
         looked_at = 0
         while True:
@@ -86,14 +86,15 @@ class VirtualVehicle:
             events += happened
             if frames:
                 self._send(frames, events)
-            if clock.elapsed_us >= end_us:
+            elapsed_us = clock.elapsed_us
+            if elapsed_us >= end_us:
                 return events
             while looked_at < len(events):
                 if type(events[looked_at]) is not Readings:
                     return events
                 looked_at += 1
-            clock.elapsed_us = min(end_us, clock.elapsed_us + self._tick_us)
-            datagrams = self.simulation.advance(clock.elapsed_us)
+            clock.elapsed_us = elapsed_us = min(end_us, elapsed_us + tick_us)
+            datagrams = advance(elapsed_us)
             if datagrams:
                 self._take(datagrams, events)
 

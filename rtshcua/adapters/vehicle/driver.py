@@ -183,12 +183,15 @@ class Driver:
         for frame in received:
             if self.flavour is None:
                 self._choose(frame)
-            if self.flavour is not None and (frame.system == self.system or is_radio(frame)):
-                if frame.component == AUTOPILOT and (watch.heard_us != now_us or watch.down or self._was_mute):
+                if self.flavour is None:
+                    continue
+            _, _, system, component, _, _, _ = frame
+            if system == self.system or is_radio(frame):
+                if component == AUTOPILOT and (watch.heard_us != now_us or watch.down or self._was_mute):
                     watch.heard_us = now_us  # one frame tells of a moment what all of that moment do
                     self._look(now_us, events)
-                told = self._take(frame, now_us, events, send)
-                if told or (self._manoeuvre is not None and now_us >= self._manoeuvre.due_us):
+                told, manoeuvre = self._take(frame, now_us, events, send), self._manoeuvre
+                if told or (manoeuvre is not None and now_us >= manoeuvre.due_us):
                     self._advance(now_us, send, events)
         return _heard(Heard, (events, self._pack(send, now_us, events) if send else [], received))
 
@@ -201,8 +204,9 @@ class Driver:
         if self._beat_us is None or now_us - self._beat_us >= HEARTBEAT_US:
             self._beat_us = now_us
             send.append(messages.heartbeat())
-        aged = self.seen.pass_time(now_us)
-        self._watch.strict = self._watch.strict or self.seen.airborne  # what is sent to it there has to arrive
+        seen = self.seen
+        aged = seen.pass_time(now_us)
+        self._watch.strict = self._watch.strict or seen.airborne  # what is sent to it there has to arrive
         if now_us >= self.source.clock.due_us:
             send += self._ask_time(now_us)
         if self.asks_utc and now_us - self._asked_utc_us >= EACH_US:
@@ -210,9 +214,9 @@ class Driver:
             send.append(messages.request(self.system, "SYSTEM_TIME"))
         if now_us >= self.stream_requests.due_us:
             send += self.stream_requests.due(self.system, now_us)
-        if self.asks is not None and self.seen.down:
+        if self.asks is not None and seen.down:
             send += self.asks.due(self.system, now_us)
-        if not self._was_ready and self.seen.down and not self.prepares:
+        if not self._was_ready and seen.down and not self.prepares:
             send += self.preflight.due(self.system, now_us)
         if self._texts.parts:
             self._hear(self._texts.due(now_us), events)
@@ -225,7 +229,7 @@ class Driver:
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
         self._renew_ahead(now_us, events, begins=False)
-        if self.seen.notes or self.stream_requests.notes or self.preflight.notes:
+        if seen.notes or self.stream_requests.notes or self.preflight.notes:
             self._tell_notes(now_us, events)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
@@ -317,41 +321,41 @@ class Driver:
 
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; whether a manoeuvre may see something new in it."""
-        message, name, _, component, _, _, _ = frame
-        at_us = self.source.of(frame, now_us)
-        if self.source.stepped:
-            self.seen.made_us.clear()
+        message, name, _, component, _, _, octets = frame
+        source, seen = self.source, self.seen
+        at_us = source.of(frame, now_us)
+        if source.stepped:
+            seen.made_us.clear()
         if component == AUTOPILOT:
             self._spoken.add(name)
         elif name in self._spoken:
             return False  # what the autopilot itself tells is not taken from anybody else
         if name == "COMMAND_ACK":
             return self._acknowledge(frame, now_us) or self._asks
-        self.stream_requests.heard(name, now_us, len(frame.frame))
+        self.stream_requests.heard(name, now_us, len(octets))
         if name in self._telemetry.rates:
-            values = self._telemetry.read(name, message, component, self.seen.estimator.doubtful(name, now_us))
+            values = self._telemetry.read(name, message, component, seen.estimator.doubtful(name, now_us))
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
         if component == AUTOPILOT and self.asks is not None:
             self.asks.take(name, message)
         if component != AUTOPILOT or name not in self._heeded:
             return False
-        before = self.seen.mode
-        new = self.seen.take(name, message, now_us, at_us, self.source.place)
-        crashed = self._crash.look(self.seen, now_us)
+        before = seen.mode
+        new = seen.take(name, message, now_us, at_us, source.place)
+        crashed = self._crash.look(seen, now_us)
         if crashed is not None:
             events.append(ports.Crashed(now_us, crashed))
             self._others = "crashed"
-        match name:
-            case "HEARTBEAT":
-                self._watch_mode(before, now_us, events)
-            case "STATUSTEXT":
-                self._hear(self._texts.take(message, now_us), events)
-            case _ if name in _OF_PREFLIGHT and self._is_for_us(message):
-                if name == "PARAM_VALUE":
-                    self.settings.take(message)
-                send += self.preflight.take(name, message, self.system, now_us)
-        if new and self.seen.landed_state:
+        if name == "HEARTBEAT":
+            self._watch_mode(before, now_us, events)
+        elif name == "STATUSTEXT":
+            self._hear(self._texts.take(message, now_us), events)
+        elif name in _OF_PREFLIGHT and self._is_for_us(message):
+            if name == "PARAM_VALUE":
+                self.settings.take(message)
+            send += self.preflight.take(name, message, self.system, now_us)
+        if new and seen.landed_state:
             self._tell_air(now_us, events)
         return new or (name != "ATTITUDE" and self._asks)
 
@@ -411,12 +415,13 @@ class Driver:
         if self.link.is_mute:
             watch.unasked()
         changed = watch.look(now_us)
-        self.seen.up_us, down = watch.up_us, watch.down
+        self.seen.up_us = watch.up_us
         if watch.mute != self._was_mute:
             self._was_mute = watch.mute
             events.append(ports.Answering(now_us, answers=not self._was_mute))
         if not changed:
             return
+        down = watch.down
         if SILENT in (was, down):
             self.stream_requests.interrupted()
             events.append(

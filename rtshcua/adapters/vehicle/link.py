@@ -100,21 +100,22 @@ class VehicleLink:
 
     def parse(self, datagram: bytes, now_us: int) -> list[Received]:
         """The good frames in a datagram, in order; never raises, whatever the bytes."""
-        received: list[Received] = []
         if self._others is not None:
             self.overhear(datagram, now_us, elsewhere=False)
-        for each in self._codec.parse(datagram, now_us):
+        received = self._codec.parse(datagram, now_us)
+        for each in received:
             _, name, system, component, _, signed, frame = each
-            if component == OURS:
-                continue  # what comes back under our own name says nothing of the vehicle
-            if system == RADIO_SYSTEM != self._system and self._system and not is_radio(each):
-                continue
-            received.append(each)
-            if name in _OBSERVED:
+            if component == OURS or (system == RADIO_SYSTEM and self._is_nobody(each)):
+                received = [other for other in received if other is not each]
+            elif name in _OBSERVED:
                 self._frames.observe(unsigned(frame) if signed else frame, now_us)
             elif name == "RADIO_STATUS" and not signed and isinstance(self._verifier, UnsignedRadio):
                 self._verifier.temper(each.message, now_us)
         return received
+
+    def _is_nobody(self, frame: Received) -> bool:
+        """Whether a frame comes under a radio's system id, and is neither of the vehicle nor a radio's status."""
+        return self._system not in (0, RADIO_SYSTEM) and not is_radio(frame)
 
     def pack(self, send: Iterable[Message], now_us: int) -> tuple[list[bytes], list[Refusal]]:
         """The frames that may be sent, and why others may not."""
@@ -196,14 +197,14 @@ class LinkWatch:
 
     def look(self, now_us: int) -> bool:
         """Let time pass; True when `down` is another than at the last look."""
-        heard_us, was = self.heard_us, self.down
+        heard_us, seen_us, was, silent_us = self.heard_us, self._seen_us, self.down, self._silent_us
         if heard_us is None:
             return False
-        if self._seen_us is not None and was is None:
-            self.up_us += min(now_us - self._seen_us, self._silent_us)  # we may have been held up
         self._seen_us = now_us
+        if seen_us is not None and was is None:
+            self.up_us += min(now_us - seen_us, silent_us)  # we may have been held up
         down, asked_us = None, self._unanswered_us
-        if now_us - heard_us > self._silent_us:
+        if now_us - heard_us > silent_us:
             # What was asked meanwhile could not be answered; the question is put anew when it is heard again.
             down, self._unanswered_us = SILENT, None
         elif asked_us is not None and now_us - asked_us > self._unanswered_limit_us and (self.answers or self.strict):

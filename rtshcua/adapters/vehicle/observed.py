@@ -209,13 +209,14 @@ class ObservedVehicle:
         this `place`, but for one that is older than the last of its name. Whether there is news in it: a report of
         mode or place, or anything else that was not so before; a tilt is none.
         """
-        if place < self.places.get(name, place):
+        places, made_us = self.places, self.made_us
+        if place < places.get(name, place):
             return False
-        self.places[name] = place
+        places[name] = place
         if at_us is not None:
-            if at_us < self.made_us.get(name, at_us):
+            if at_us < made_us.get(name, at_us):
                 return False
-            self.made_us[name] = at_us
+            made_us[name] = at_us
         if name not in _OF_DOWN:
             return self._take(name, message, now_us, at_us)
         was_down = self.down

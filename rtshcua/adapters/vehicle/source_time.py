@@ -21,6 +21,8 @@ same measurement again, too.
 """
 
 from collections import deque
+from collections.abc import Callable
+from operator import attrgetter
 from statistics import median_low
 from typing import Any, Final, NamedTuple
 
@@ -180,7 +182,7 @@ _LENGTHS: Final = {"ms": 1_000, "us": 1}
 class _Stamp(NamedTuple):
     """A message's field with its time, how many us one of it is, and whether it has 32 bits."""
 
-    field: str
+    read: Callable[[Any], int]
     us: int
     short: bool
 
@@ -196,7 +198,8 @@ class SourceTime:
         self._offset_us: int | None = None
         self._until_us = 0  # the offset holds until then
         self._unix_us: int | None = None  # UNIX time minus time since boot
-        self._told: dict[tuple[int, str], tuple[int, int]] = {}  # the last stamp of a message, and its time
+        self._told: dict[str, tuple[int, int]] = {}  # the last stamp of a message of the autopilot's, and its time
+        self._others_told: dict[tuple[int, str], tuple[int, int]] = {}  # the same of other components
         self._wind: tuple[tuple[float, ...], int | None] = (), None  # the last estimate, and its time
         self._sent_us: int | None = None  # the last frame was sent at this time or later
         self._came_us = 0
@@ -237,7 +240,7 @@ class SourceTime:
             self._refresh(now_us)
         at_us: int | None = None
         if stamp is not None:
-            at_us = self._at(name, getattr(message, stamp.field), stamp, now_us)
+            at_us = self._at(name, message, stamp, now_us)
             if name == "SYSTEM_TIME" and message.time_unix_usec >= _UNIX_US and message.time_boot_ms:
                 self._unix_us = message.time_unix_usec - message.time_boot_ms * 1_000
         elif name == "WIND":
@@ -261,24 +264,24 @@ class SourceTime:
         if self._sent_us is None:
             return None
         at_us = min(self._sent_us, now_us - max(self._held_us, self._held_before_us))
-        raw = 0 if stamp is None else getattr(message, stamp.field)
+        raw = 0 if stamp is None else stamp.read(message)
         if raw:
-            told = self._told.get((component, name))
+            told = self._others_told.get((component, name))
             if told is not None and told[0] == raw:
                 return told[1]
-            self._told[component, name] = (raw, at_us)
+            self._others_told[component, name] = (raw, at_us)
         return at_us
 
-    def _at(self, name: str, raw: int, stamp: _Stamp, now_us: int) -> int | None:
+    def _at(self, name: str, message: Any, stamp: _Stamp, now_us: int) -> int | None:
         """A stamp of the autopilot's on our clock; None if it cannot be read."""
-        offset_us = self._offset_us
+        read, us, short = stamp
+        offset_us, raw = self._offset_us, read(message)
         if offset_us is None or not raw:
             return None
-        told = self._told.get((AUTOPILOT, name))
+        told = self._told.get(name)
         if told is not None and told[0] == raw:
             return told[1]
-        boot, us = raw, stamp.us
-        short = stamp.short
+        boot = raw
         if not short and raw >= _UNIX_US:
             if self._unix_us is None:
                 return None
@@ -297,7 +300,7 @@ class SourceTime:
             if not 0 < (raw - told[0]) % _WRAP < _HALF:
                 return at_us  # overtaken
             at_us = told[1]  # measured later, though the clocks were seen to run apart
-        self._told[AUTOPILOT, name] = (raw, at_us)
+        self._told[name] = (raw, at_us)
         return at_us
 
     def _checked(self, at_us: int, now_us: int) -> int | None:
@@ -316,6 +319,7 @@ class SourceTime:
         self.stepped = self.clock.answer(message.tc1, message.ts1, now_us)
         if self.stepped:
             self._told.clear()
+            self._others_told.clear()
             self._wind = (), None
             self._sent_us = None
             self._order = [None] * _NUMBERS
@@ -331,6 +335,14 @@ class SourceTime:
 
     def _follow(self, number: int, at_us: int | None, now_us: int) -> int | None:
         """Keep the order of sending, by the frame's number; when this frame was sent, at the earliest."""
+        if (number - self._newest) % _NUMBERS == 1:  # the next one, as nearly all are
+            sent_us = self._sent_us
+            if at_us is not None and (sent_us is None or at_us > sent_us):
+                self._sent_us = sent_us = at_us
+            self._order[number] = sent_us
+            self._newest, self._came_us = number, now_us
+            self.place = self._count = self._count + 1
+            return sent_us
         sent_us, newest, order = self._sent_us, self._newest, self._order
         fresh = at_us is not None and (sent_us is None or at_us > sent_us)
         ahead = (number - newest) % _NUMBERS
@@ -366,7 +378,7 @@ class SourceTime:
             for each in _FIELDS:
                 field = fields.get(each)
                 if field is not None and not field.length and field.unit in _LENGTHS:
-                    found = _Stamp(each, _LENGTHS[field.unit], field.type == "uint32_t")
+                    found = _Stamp(attrgetter(each), _LENGTHS[field.unit], field.type == "uint32_t")
                     break
         self._stamps[name] = found
         return found

@@ -148,8 +148,9 @@ class StreamRequests:
         """A message came, in a frame of so many octets."""
         self._heard_us[name] = now_us
         self._octets += octets
-        if name in self._counts:
-            self._counts[name] += 1
+        counts = self._counts
+        if name in counts:
+            counts[name] += 1
         elif octets and name not in self._at_times and name not in _ANSWERS:
             self._others[name] = self._others.get(name, 0) + octets
 

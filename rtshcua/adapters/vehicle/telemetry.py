@@ -48,6 +48,7 @@ class Telemetry:
         self._told: set[tuple[str, Where]] = set()  # what came of the autopilot: of each, always the same slots
         self._first: dict[tuple[int, str, Where], Any] = {}
         self._by_message: dict[str, list[_Carried]] = {}
+        self._whole: set[str] = set()  # of these the autopilot's own carry all that such a message may carry, each time
         for signal in policy.signals:
             for source in signal.sources:
                 _check(signal, source)
@@ -75,6 +76,8 @@ class Telemetry:
             return ()
         if component != AUTOPILOT:
             doubtful = _NONE
+        elif not doubtful and name in self._whole:
+            return tuple([value for each in carried for value in each.read(message)])
         empty = name == "WIND" and _says_nothing(message)
         values: list[tuple[int, int | None]] = []
         instanced = message.instance_field is not None
@@ -88,11 +91,13 @@ class Telemetry:
             if empty or (doubtful and not doubtful.isdisjoint(fields)):
                 values += [(slot, None) for slot in slots]
             else:
-                values += zip(slots, read(message), strict=True)
+                values += read(message)
         if component == AUTOPILOT:
             if not self._told.issuperset(told):
                 self._told.update(told)
                 self._own.update(slot for slot, _ in values)
+            if name != "WIND" and not instanced and not any(each.where for each in carried):
+                self._whole.add(name)
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
 
@@ -125,34 +130,37 @@ class _Carried(NamedTuple):
 
     fields: tuple[str, ...]
     slots: tuple[int, ...]
-    read: Callable[[Any], Sequence[int | None]]
+    read: Callable[[Any], Sequence[tuple[int, int | None]]]
     where: Where
 
 
 def _carried(signal: Signal, source: SignalSource, projection: Projection) -> _Carried:
     """Prepared once, for it is read from each message of its name."""
     first, *more = [_field(source, field) for field in source.fields]
+    slot = signal.slot
     if signal.kind == POSITION:
-        return _Carried(source.fields, (signal.slot, signal.slot + 1), _place(first, more[0], projection), source.where)
-    return _Carried(source.fields, (signal.slot,), _number(first, *more), source.where)
+        return _Carried(source.fields, (slot, slot + 1), _place(slot, first, more[0], projection), source.where)
+    return _Carried(source.fields, (slot,), _number(slot, first, *more), source.where)
 
 
-def _number(first: _Read, second: _Read | None = None) -> Callable[[Any], Sequence[int | None]]:
+def _number(slot: int, first: _Read, second: _Read | None = None) -> Callable[[Any], Sequence[tuple[int, int | None]]]:
     """A number, or the length of a vector."""
     if second is None:
-        return lambda message: (first(message),)
+        return lambda message: ((slot, first(message)),)
 
-    def length(message: Any) -> tuple[int | None]:
+    def length(message: Any) -> Sequence[tuple[int, int | None]]:
         a, b = first(message), second(message)
-        return (None if a is None or b is None else hypot_mm(a, b),)
+        return ((slot, None if a is None or b is None else hypot_mm(a, b)),)
 
     return length
 
 
-def _place(latitude_of: _Read, longitude_of: _Read, projection: Projection) -> Callable[[Any], Sequence[int | None]]:
-    nowhere = None, None
+def _place(
+    slot: int, latitude_of: _Read, longitude_of: _Read, projection: Projection
+) -> Callable[[Any], Sequence[tuple[int, int | None]]]:
+    nowhere = (slot, None), (slot + 1, None)
 
-    def place(message: Any) -> Sequence[int | None]:
+    def place(message: Any) -> Sequence[tuple[int, int | None]]:
         latitude, longitude = latitude_of(message), longitude_of(message)
         if latitude is None or longitude is None:
             return nowhere
@@ -160,7 +168,7 @@ def _place(latitude_of: _Read, longitude_of: _Read, projection: Projection) -> C
         # farther than any zone can be declared, or on no globe: nonsense, not a place
         if max(abs(x), abs(y)) > MAX_COORDINATE or abs(longitude) > HALF_TURN:
             return nowhere
-        return x, y
+        return (slot, x), (slot + 1, y)
 
     return place
 
@@ -171,9 +179,12 @@ def _field(source: SignalSource, field: str) -> _Read:
 
     def read(message: Any) -> int | None:
         raw = value_of(message)
-        if not isinstance(raw, _NUMBERS):
+        if denominator == 1 and type(raw) is int:  # nothing to round
+            value = None if raw in unknown else raw * numerator
+        elif isinstance(raw, _NUMBERS):
+            value = quantise(raw, numerator, denominator, unknown)
+        else:
             return None
-        value = quantise(raw, numerator, denominator, unknown)
         return None if value is None or abs(value) > MAX_VALUE else value
 
     return read

@@ -35,19 +35,22 @@ class StateMonitor:
 
     def update(self, readings: Readings) -> None:
         """Take over what one frame reported at `readings.at_us`."""
-        self._state = self._held = None
-        values, stamps, at_us = self._values, self._stamps, readings.at_us
+        self._state = None
+        values, stamps, unseen, at_us = self._values, self._stamps, self._unseen, readings.at_us
+        slots = len(values)
         for slot, value in readings.values:
-            if not 0 <= slot < len(values):
+            if not 0 <= slot < slots:
                 continue
             stamp = stamps[slot]
             if stamp is not None and at_us < stamp:
                 continue
             stamps[slot] = at_us
-            if slot in self._where and value != values[slot]:
-                self._moved = True
-            values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
-            self._unseen.add(slot)
+            unseen.add(slot)
+            if value != values[slot]:
+                self._held = None
+                if slot in self._where:
+                    self._moved = True
+                values[slot] = value if value is None or -MAX_VALUE <= value <= MAX_VALUE else None
 
     def moved(self) -> bool:
         """Whether position or height changed since this was asked last."""

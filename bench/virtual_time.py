@@ -18,7 +18,7 @@ from rtshcua.virtual.vehicle import TICK_US
 from virtual.flight import Flight
 from virtual.shipped import NAMES, shipped, simulated
 
-LIMIT = 100
+LIMIT = 150
 FRAMES = 50
 ROUNDS = 3
 MANY_FRAMES = 200

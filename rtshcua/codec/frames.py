@@ -3,7 +3,7 @@
 What pymavlink's `decode` and `pack` do, prepared once for each kind of message. The message is of a class derived from
 pymavlink's own, with every field; its header is not filled in, for who sent it stands in `Received`.
 
-Fast twin of pymavlink's codec. Goal: a flight in virtual time is at least 100 times as fast as life
+Fast twin of pymavlink's codec. Goal: a flight in virtual time is at least 150 times as fast as life
 (bench/virtual_time.py); on a busy machine 52 times with it, 39 with pymavlink's two functions (docs/adr/0037).
 tests/unit/codec/test_decode.py holds that both give the same for every kind of message.
 """

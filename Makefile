@@ -37,7 +37,7 @@ lint: setup ## check style, format, types and layers, of our sources too
 	$(BIN)/rtshcua lint skills policies missions examples
 
 soak: setup ## run the long campaigns, and every property test with many examples; flights go on where they stopped
-	$(BIN)/pytest -n $(JOBS) -m "soak or hypothesis" --hypothesis-profile soak
+	$(BIN)/pytest -n $(JOBS) --most 0 -m "soak or hypothesis" --hypothesis-profile soak
 	RTSHCUA_BOUNDARY=build/boundary/librtshcua.so $(BIN)/pytest -p reference.shadow
 	$(BIN)/rtshcua campaign missions/short.rts --at 2026-06-01T08:00:00Z --flights $(or $(FLIGHTS),100000) -o build/soak-campaign
 

@@ -82,6 +82,9 @@ NOT_IMPORTED = ("__pycache__", "idlelib", "lib2to3", "pip", "site-packages", "te
 def pytest_addoption(parser: Any) -> None:
     group = parser.getgroup("processes")
     group._addoption("-n", dest="processes", type=int, default=0, help="run the tests in this many processes")
+    group._addoption(
+        "--most", type=float, default=1_800, help="of these, end one that is silent for so many s (0: none)"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -96,7 +99,9 @@ def pytest_configure(config: pytest.Config) -> None:
     if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
         keep_byte_code(config)
     if config.option.processes and not config.option.usepdb:
-        config.pluginmanager.register(Processes(config.option.processes, lambda: save_measured(config)))
+        config.pluginmanager.register(
+            Processes(config.option.processes, lambda: save_measured(config), config.option.most)
+        )
 
 
 def save_measured(config: pytest.Config) -> None:

@@ -27,17 +27,27 @@ from _pytest.unraisableexception import collect_unraisable
 
 #: how long those that run tests may take to end once no more is wanted of them
 PATIENCE_S = 10.0
+#: the last word of a process that ran all it was given, and tore down what they shared
+DONE = "done"
 
 
 @dataclass
 class Worker:
-    """A process that runs tests: the tests it has been given and has not begun, and the one it has begun."""
+    """A process that runs tests: the tests it has been given and has not begun, and the one it has begun.
+
+    `owes`: no report of that came yet; `heard_s`: when it last said something; `why` it failed outside of a test;
+    `done`: it said that it was over.
+    """
 
     number: int
     process: int
     pipe: Connection
     given: list[int] = field(default_factory=list)
     begun: int | None = None
+    owes: bool = False
+    heard_s: float = field(default_factory=time.monotonic)
+    why: str = ""
+    done: bool = False
 
     @property
     def node(self) -> SimpleNamespace:
@@ -51,10 +61,13 @@ class Crashed(Exception):
 
 
 class Processes:
-    """Runs the tests of a session in `number` processes. In each, `ended` is called at its end."""
+    """Runs the tests of a session in `number` processes. In each, `ended` is called at its end.
 
-    def __init__(self, number: int, ended: Callable[[], None]) -> None:
-        self._number, self._ended = number, ended
+    A process that says nothing for longer than `most_s` is ended (0: none is).
+    """
+
+    def __init__(self, number: int, ended: Callable[[], None], most_s: float = 0) -> None:
+        self._number, self._ended, self._most_s = number, ended, most_s
         self._workers: list[Worker] = []
         self._begun = 0
 
@@ -72,13 +85,14 @@ class Processes:
             for _ in range(min(self._number, len(files))):
                 self._fork(session)
             while self._workers:
-                for pipe in wait([worker.pipe for worker in self._workers]):
+                for pipe in wait([worker.pipe for worker in self._workers], 1.0 if self._most_s else None):
                     worker = next(each for each in self._workers if each.pipe is pipe)
                     self._hear(session, worker, files)
                     if session.shouldfail:
                         raise session.Failed(session.shouldfail)
                     if session.shouldstop:
                         raise session.Interrupted(session.shouldstop)
+                self._end_those_that_hang()
         finally:
             _end(self._workers)
         if self._begun != len(session.items):
@@ -107,15 +121,17 @@ class Processes:
                 _become(session.config, number, other)
                 _run(session, other)
                 self._ended()
+                other.send(DONE)
+                code = 0
             except Exception:  # noqa: BLE001  told where it is seen
                 other.send(traceback.format_exc())
-            code = 0
         os._exit(code)
 
     def _hear(self, session: pytest.Session, worker: Worker, files: list[list[int]]) -> None:
         """Take what a process says: the test it begins, a report, or (None) that it wants another file."""
         try:
             said = worker.pipe.recv()
+            worker.heard_s = time.monotonic()
             if said is None:
                 file = files.pop() if files else []
                 worker.given += file
@@ -124,15 +140,18 @@ class Processes:
         except (EOFError, OSError):
             self._lost(session, worker, files)
             return
+        if isinstance(said, int | str) and worker.owes:
+            self._failed(session, worker, "nothing was reported of it")
         if isinstance(said, int):
             worker.given.remove(said)
-            worker.begun = said
+            worker.begun, worker.owes = said, True
             self._begun += 1
         elif isinstance(said, str):
-            self._failed(session, worker, said)
+            worker.done, worker.why = said == DONE, said
         else:
             hook = session.config.hook
             report = hook.pytest_report_from_serializable(config=session.config, data=said)
+            worker.owes = worker.owes and report.nodeid != session.items[worker.begun].nodeid
             report.node = worker.node
             hook.pytest_runtest_logreport(report=report)
 
@@ -141,13 +160,23 @@ class Processes:
         self._workers.remove(worker)
         worker.pipe.close()
         code = os.waitstatus_to_exitcode(os.waitpid(worker.process, 0)[1])
-        if code == 0:
+        if code == 0 and worker.done:
             return
-        self._failed(session, worker, f"its process ended with {code}")
+        self._failed(session, worker, worker.why or f"its process ended with {code}")
         if worker.given:
             files.append(worker.given)
         if files:
             self._fork(session)
+
+    def _end_those_that_hang(self) -> None:
+        """End a process whose test takes too long: pytest prints where it is, and `_lost` counts it as failed."""
+        if not self._most_s:
+            return
+        for worker in self._workers:
+            silent_s = time.monotonic() - worker.heard_s
+            if silent_s > self._most_s:
+                worker.why = f"it took longer than {self._most_s:g} s"
+                os.kill(worker.process, signal.SIGABRT if silent_s < self._most_s + PATIENCE_S else signal.SIGKILL)
 
     def _failed(self, session: pytest.Session, worker: Worker, why: str) -> None:
         """Count what went wrong outside of tests as a failure of the one that was begun last."""
@@ -189,7 +218,7 @@ def _become(config: Any, number: int, pipe: Connection) -> None:
     """Get what a process must not share: where it writes, what it captures, the folder of its files."""
     plugins = config.pluginmanager
     plugins.unregister(name="terminalreporter")
-    plugins.register(_Told(config, pipe))
+    plugins.register(_Told(config, pipe), "told")
     captured = plugins.getplugin("capturemanager")._global_capturing
     for stream in (captured.out, captured.err):
         if isinstance(stream, FDCapture):  # it stays the same file for those that have it already

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 CONFTEST = """
+import os
 from processes import Processes
 
 def ended():
@@ -15,7 +16,7 @@ def ended():
         print("over", file=told)
 
 def pytest_configure(config):
-    config.pluginmanager.register(Processes(2, ended))
+    config.pluginmanager.register(Processes(2, ended, float(os.environ.get("MOST_S", 0))))
 """
 PASSES = """
 import os, pytest, sys
@@ -61,6 +62,46 @@ def test_leaves_garbage():
     left = Left()
     left.itself = left
 """
+#: in the middle of a file, at its end, and when what it shared is torn down: as though all were well
+ENDS = """
+import os
+
+def test_before():
+    pass
+
+def test_ends():
+    os._exit(0)
+"""
+ENDS_AFTER = """
+import os, pytest
+
+@pytest.fixture(scope="module", autouse=True)
+def shared():
+    yield
+    os._exit(0)
+
+def test_ends():
+    pass
+"""
+SAYS_NOTHING = """
+import pytest
+
+@pytest.fixture(autouse=True)
+def unheard(request):
+    request.config.pluginmanager.unregister(name="told")
+
+def test_says_nothing():
+    assert 1 + 1 == 3
+"""
+HANGS = """
+import time
+
+def test_hangs():
+    time.sleep(1_000)
+
+def test_after():
+    pass
+"""
 
 
 def run(folder: Path, *words: str, **files: str) -> tuple[int, str]:
@@ -73,7 +114,7 @@ def run(folder: Path, *words: str, **files: str) -> tuple[int, str]:
         [*command, "--rootdir=.", "--basetemp=t", "-W", "error", *words], check=False, capture_output=True, cwd=folder,
         env={**os.environ, "PYTHONPATH": paths, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}, text=True, timeout=120,
     )  # fmt: skip
-    return done.returncode, done.stdout
+    return done.returncode, done.stdout + done.stderr
 
 
 def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
@@ -100,3 +141,26 @@ def test_it_ends_early_or_at_the_end(tmp_path: Path, words: tuple[str, ...], fil
     code, said = run(tmp_path, *words, **files)
     assert code != 0
     assert told in said
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (ENDS, ("test_it.py::test_ends - its process ended with 0", "1 failed, 4 passed")),
+        (ENDS + "\n\ndef test_after():\n    assert 1 + 1 == 3\n", ("ended with 0", "test_after", "2 failed, 4 passed")),
+        (ENDS_AFTER, ("test_it.py::test_ends - its process ended with 0",)),
+        (SAYS_NOTHING, ("test_it.py::test_says_nothing - nothing was reported of it", "1 failed, 3 passed")),
+        (HANGS, ("test_it.py::test_hangs - it took longer than 5 s", "1 failed, 4 passed", "in test_hangs")),
+    ],
+    ids=("ends", "ends-before-others", "ends-after", "says-nothing", "hangs"),
+)
+def test_a_process_that_does_not_do_all_it_was_given_is_a_failure(
+    tmp_path: Path, text: str, told: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where it ends as one does that did."""
+    if text is HANGS:
+        monkeypatch.setenv("MOST_S", "5")
+    code, said = run(tmp_path, test_it=text, test_other=PASSES)
+    assert code == 1, said
+    for each in told:
+        assert each in said, said

@@ -37,6 +37,12 @@ static inline bool rt_same(rt_bytes one, rt_bytes other) {
     return one.size == other.size && (one.size == 0 || memcmp(one.at, other.at, one.size) == 0);
 }
 
+/* Below 0 where some bytes come before others, above 0 where they come after. */
+static inline int rt_compare(rt_bytes one, rt_bytes other) {
+    int found = one.size && other.size ? memcmp(one.at, other.at, one.size < other.size ? one.size : other.size) : 0;
+    return found ? found : (one.size > other.size) - (one.size < other.size);
+}
+
 /* Whether two lists have the same items: each has one encoding. */
 static inline bool rt_same_list(rt_list one, rt_list other) {
     return one.count == other.count &&

@@ -244,6 +244,7 @@ bool rt_next_left_out(rt_list *list, rt_left_out *left_out);
 /* The integer at an index: walks there, for short lists. -1 is no answer: the index is below `count`. */
 int64_t rt_int_at(rt_list list, uint32_t index);
 bool rt_holds(rt_list list, int64_t value); /* whether it is among the integers */
+bool rt_names(rt_list texts, rt_bytes text); /* likewise */
 
 /* situation.py */
 typedef struct {

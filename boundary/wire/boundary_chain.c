@@ -56,30 +56,24 @@ void rt_chain_leave(rt_chain *chain, rt_bytes frame) {
     follow((rt_bytes){FRAMES, sizeof FRAMES}, chain->left, RT_TAG_FRAME, frame, NOTHING);
 }
 
-static uint32_t put(uint8_t *out, uint8_t major, rt_bytes string) {
-    uint32_t size = rt_cbor_head(out, major, string.size);
-    if (string.size > 0) memcpy(out + size, string.at, string.size);
-    return size + string.size;
-}
-
 uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], const uint8_t *flight, int64_t session,
                            const uint8_t before[RT_DIGEST_BYTES], bool final, uint8_t *out) {
     static uint8_t payload[RT_MAX_STATEMENT]; /* the marks make most of it */
     uint8_t protected[64], public[RT_KEY_BYTES], kid[RT_KID_BYTES], signature[RT_SIGNATURE_BYTES];
     uint32_t at = rt_wrap(payload, &RT_STATEMENT);
     at += rt_cbor_head(payload + at, RT_MAJOR_ARRAY, 13);
-    at += put(payload + at, RT_MAJOR_OCTETS, (rt_bytes){flight, RT_FLIGHT_BYTES});
+    at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){flight, RT_FLIGHT_BYTES});
     at += rt_cbor_int(payload + at, session);
-    at += put(payload + at, RT_MAJOR_OCTETS, (rt_bytes){before, RT_DIGEST_BYTES});
+    at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){before, RT_DIGEST_BYTES});
     at += rt_cbor_int(payload + at, chain->count);
-    at += put(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->digest, RT_DIGEST_BYTES});
-    at += put(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->marks, RT_MARK_BYTES * chain->marked});
+    at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->digest, RT_DIGEST_BYTES});
+    at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->marks, RT_MARK_BYTES * chain->marked});
     at += rt_cbor_int(payload + at, chain->frames);
-    at += put(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->left, RT_DIGEST_BYTES});
+    at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->left, RT_DIGEST_BYTES});
     at += rt_cbor_int(payload + at, chain->repeated);
     at += rt_cbor_int(payload + at, chain->declined);
     at += rt_cbor_int(payload + at, chain->stopped);
-    at += put(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->aside, RT_DIGEST_BYTES});
+    at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->aside, RT_DIGEST_BYTES});
     payload[at++] = final ? 0xF5 : 0xF4;
     chain->marked = 0;
     rt_ed25519_public(seed, public);
@@ -88,15 +82,15 @@ uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], co
     static const uint8_t algorithm[] = {0xA3, 0x01, 0x32, 0x03};
     uint32_t header = sizeof algorithm;
     memcpy(protected, algorithm, sizeof algorithm);
-    header += put(protected + header, RT_MAJOR_TEXT, RT_STATEMENT.content_type);
+    header += rt_cbor_string(protected + header, RT_MAJOR_TEXT, RT_STATEMENT.content_type);
     protected[header++] = 0x04;
-    header += put(protected + header, RT_MAJOR_OCTETS, (rt_bytes){kid, RT_KID_BYTES});
+    header += rt_cbor_string(protected + header, RT_MAJOR_OCTETS, (rt_bytes){kid, RT_KID_BYTES});
     rt_sign_for(RT_DUTY_BOUNDARY, seed, (rt_bytes){protected, header}, (rt_bytes){payload, at}, signature);
     static const uint8_t outset[] = {0xD2, 0x84};
     memcpy(out, outset, sizeof outset);
     uint32_t size = sizeof outset;
-    size += put(out + size, RT_MAJOR_OCTETS, (rt_bytes){protected, header});
+    size += rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){protected, header});
     out[size++] = 0xA0;
-    size += put(out + size, RT_MAJOR_OCTETS, (rt_bytes){payload, at});
-    return size + put(out + size, RT_MAJOR_OCTETS, (rt_bytes){signature, RT_SIGNATURE_BYTES});
+    size += rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){payload, at});
+    return size + rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){signature, RT_SIGNATURE_BYTES});
 }

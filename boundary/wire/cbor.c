@@ -155,3 +155,9 @@ uint32_t rt_cbor_head(uint8_t out[RT_HEAD_BYTES], uint8_t major, uint64_t argume
 uint32_t rt_cbor_int(uint8_t out[RT_HEAD_BYTES], int64_t value) {
     return value < 0 ? rt_cbor_head(out, 1, (uint64_t)(-1 - value)) : rt_cbor_head(out, 0, (uint64_t)value);
 }
+
+uint32_t rt_cbor_string(uint8_t *out, uint8_t major, rt_bytes string) {
+    uint32_t size = rt_cbor_head(out, major, string.size);
+    if (string.size > 0) memcpy(out + size, string.at, string.size);
+    return size + string.size;
+}

@@ -34,5 +34,7 @@ enum { RT_MAJOR_INT = 0, RT_MAJOR_OCTETS = 2, RT_MAJOR_TEXT = 3, RT_MAJOR_ARRAY 
 /* The shortest head; how many bytes it has. */
 uint32_t rt_cbor_head(uint8_t out[RT_HEAD_BYTES], uint8_t major, uint64_t argument);
 uint32_t rt_cbor_int(uint8_t out[RT_HEAD_BYTES], int64_t value);
+/* A string of octets or text, with its head; how many bytes it has. */
+uint32_t rt_cbor_string(uint8_t *out, uint8_t major, rt_bytes string);
 
 #endif

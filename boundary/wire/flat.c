@@ -266,3 +266,10 @@ bool rt_holds(rt_list list, int64_t value) {
         if (each == value) return true;
     return false;
 }
+
+bool rt_names(rt_list texts, rt_bytes text) {
+    rt_bytes each;
+    while (rt_next_text(&texts, &each))
+        if (rt_same(each, text)) return true;
+    return false;
+}

@@ -1,6 +1,5 @@
 #include "trust.h"
 
-#include "../model/flat.h"
 #include "flat.h"
 
 const rt_bytes rt_sources[4] = {RT_TEXT("agent"), RT_TEXT("operator"), RT_TEXT("onboard"), RT_TEXT("reflex")};
@@ -194,13 +193,6 @@ uint32_t rt_person(const rt_root *root, const rt_key *key) {
     uint32_t number = 0;
     while (!rt_same(root->keys[number].person, key->person)) number++; /* at the latest it is the key itself */
     return number;
-}
-
-bool rt_names(rt_list texts, rt_bytes text) {
-    rt_bytes each;
-    while (rt_next_text(&texts, &each))
-        if (rt_same(each, text)) return true;
-    return false;
 }
 
 rt_refusal rt_key_refusal(const rt_key *key, rt_bytes vehicle, int64_t now_us) {

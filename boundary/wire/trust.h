@@ -2,7 +2,7 @@
 #ifndef RT_WIRE_TRUST_H
 #define RT_WIRE_TRUST_H
 
-#include "../model/limits.h"
+#include "../model/flat.h"
 #include "artefact.h"
 #include "cose.h"
 
@@ -33,9 +33,6 @@ rt_refusal rt_open_envelope(rt_bytes envelope, const rt_root *root, int64_t duty
 
 /* The number of the person whose approval key this is: the same for all keys of one person. */
 uint32_t rt_person(const rt_root *root, const rt_key *key);
-
-/* Whether a text is among texts. */
-bool rt_names(rt_list texts, rt_bytes text);
 
 /* Why a key may not speak for a vehicle at a UTC time, for a role through a source, under a policy. */
 rt_refusal rt_key_refusal(const rt_key *key, rt_bytes vehicle, int64_t now_us);

@@ -152,24 +152,17 @@ static bool same_parameters(rt_list mine, rt_list policys) {
     return true;
 }
 
-static bool has_text(rt_list texts, rt_bytes wanted) {
-    rt_bytes text;
-    while (rt_next_text(&texts, &text))
-        if (rt_same(text, wanted)) return true;
-    return false;
-}
-
 static bool subset(rt_list texts, rt_list of) {
     rt_bytes text;
     while (rt_next_text(&texts, &text))
-        if (!has_text(of, text)) return false;
+        if (!rt_names(of, text)) return false;
     return true;
 }
 
 static bool records_all(rt_list policys, rt_list mine) {
     rt_bytes text;
     while (rt_next_text(&policys, &text))
-        if (durability(text) < 0 && !has_text(mine, text)) return false;
+        if (durability(text) < 0 && !rt_names(mine, text)) return false;
     return true;
 }
 

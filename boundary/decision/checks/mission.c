@@ -12,20 +12,13 @@ static bool is_name(rt_bytes name) {
     return !begins;
 }
 
-static bool names(rt_list texts, rt_bytes name) {
-    rt_bytes text;
-    while (rt_next_text(&texts, &text))
-        if (rt_same(text, name)) return true;
-    return false;
-}
-
 /* The mission's phases in which a contract may be used. */
 static uint64_t phases_of(const rt_contract *contract, const rt_mission *mission) {
     rt_list left = mission->phases;
     rt_bytes name;
     uint64_t found = 0;
     for (int at = 0; rt_next_text(&left, &name); at++)
-        if (contract->phases.count == 0 || names(contract->phases, name)) found |= (uint64_t)1 << at;
+        if (contract->phases.count == 0 || rt_names(contract->phases, name)) found |= (uint64_t)1 << at;
     return found;
 }
 
@@ -34,7 +27,7 @@ static bool check_phases(const rt_mission *mission) {
     rt_bytes name;
     if (left.count > RT_MAX_PHASES) return false;
     while (rt_next_text(&left, &name))
-        if (!is_name(name) || names(left, name)) return false;
+        if (!is_name(name) || rt_names(left, name)) return false;
     return true;
 }
 
@@ -118,9 +111,8 @@ static bool check_invocation(const rt_invocation *one, const rt_prepared_policy 
 }
 
 static bool id_after(const void *of, uint16_t one, uint16_t other) {
-    const rt_bytes *ids = of, a = ids[one], b = ids[other];
-    int found = a.size && b.size ? memcmp(a.at, b.at, a.size < b.size ? a.size : b.size) : 0;
-    return found > 0 || (found == 0 && a.size > b.size);
+    const rt_bytes *ids = of;
+    return rt_compare(ids[one], ids[other]) > 0;
 }
 
 bool rt_check_mission(const rt_mission *mission, rt_prepared_policy *prepared) {

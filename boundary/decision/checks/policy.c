@@ -76,12 +76,6 @@ static bool check_numbers(const rt_vehicle *v) {
            !(v->braking && (v->north == -1 || v->east == -1 || v->down == -1)) && (!v->has_speeds || check_speeds(&v->speeds));
 }
 
-/* Below 0 where a text comes before another. */
-static int compare(rt_bytes one, rt_bytes other) {
-    int found = one.size && other.size ? memcmp(one.at, other.at, one.size < other.size ? one.size : other.size) : 0;
-    return found ? found : (one.size > other.size) - (one.size < other.size);
-}
-
 static bool is(rt_bytes text, const char *word, uint32_t size) {
     return text.size == size && memcmp(text.at, word, size) == 0;
 }
@@ -92,7 +86,7 @@ static bool check_without(const rt_policy *policy) {
     rt_bytes before = {NULL, 0}, name;
     rt_left_out out;
     for (bool first = true; rt_next_text(&names, &name); first = false, before = name) {
-        if (!first && compare(before, name) >= 0) return false;
+        if (!first && rt_compare(before, name) >= 0) return false;
         for (uint32_t at = 0; at < policy->signal_count; at++)
             if (rt_same(policy->signals[at].name, name)) return false;
     }

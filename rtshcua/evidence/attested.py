@@ -242,7 +242,7 @@ class BoundaryEvidence:
             f"were refused, {last.repeated} answers repeated one and {last.declined} documents were refused"
         )
         proven = (Claim("boundary", text),)
-        if last.final:
+        if last.final and self._lost is None:
             return proven, ()
         if self._lost is not None:
             text = (

@@ -13,6 +13,7 @@ from reference.attested_flight import attested, second
 from reference.forgery import LOG_KEY, edit, expect, prove, read, signed, sound
 from rtshcua.cli.outcome import exit_code_of
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.report import Verdict
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.statement import Statement, open_statement, sign
@@ -273,6 +274,52 @@ def test_a_log_cut_off_and_called_a_crash_says_what_is_not_shown(seal: int) -> N
     report = prove(signed([*LINES[:seal], head, close])).report
     assert report.failure is None, report.failure
     assert ("boundary", "what the boundary made after its last signature: it broke off") in report.unproven
+
+
+# ---------------------------------------------------------------- a loss that is claimed
+
+
+def lost_at(number: int, *more: int) -> list[bytes]:
+    """The log of who says before a record that the boundary is lost, and leaves out what it makes, but for `more`."""
+    claim = edit(LINES[SENT[0]], event="boundary-lost", kind=-1, step=-1, link=-1, token=-1, detail="it is gone")
+    claim = edit(claim, **moment(number))
+    gone = {each for each in (*DECISIONS, *STATEMENTS, APPROVAL, *SENT) if each >= number} - set(more)
+    rest = [line for each, line in enumerate(LINES) if each >= number and each not in gone]
+    return [*LINES[:number], claim, *rest]
+
+
+@rows("number", [*DECISIONS[2:], *SENT[1:], CLOSE])
+def test_a_loss_is_claimed_to_leave_out_what_follows(number: int) -> None:
+    """Nothing contradicts it, and the log is not whole: whoever reads it is told from where on."""
+    assert expect(signed(lost_at(number))) == ("boundary/lost", number)
+    report = prove(signed(lost_at(number))).report
+    assert report.failure is None
+    assert report.verdict is Verdict.INCOMPLETE
+    assert any("says the runtime alone" in text for slug, text in report.unproven if slug == "boundary")
+
+
+def test_what_the_boundary_signed_is_not_left_out_by_a_loss() -> None:
+    """Its last statement speaks of entries that no record before the claim tells of."""
+    statement = next(each for each in STATEMENTS if each > SENT[0])
+    lines = [line for number, line in enumerate(LINES) if number != SENT[0]]
+    claimed = edit(LINES[SENT[0]], event="boundary-lost", kind=-1, step=-1, link=-1, token=-1, detail="gone")
+    lines.insert(statement, edit(claimed, **moment(statement)))
+    slug, _ = expect(signed(lines))
+    assert slug in ("boundary/omitted", "boundary/differs")
+
+
+@rows("kind", [DECISIONS, STATEMENTS, [APPROVAL], [each for each in SENT if read(LINES[each])["kind"] == 0]])
+def test_nothing_that_a_boundary_makes_follows_its_loss(kind: list[int]) -> None:
+    """A decision, a statement, a document, a step: links alone may fly then."""
+    at = SENT[0] + 1
+    made = next(each for each in kind if each > at)
+    lines = lost_at(at, made)
+    number = next(n for n, line in enumerate(lines) if n > at and line == LINES[made])
+    assert expect(signed(lines)) == ("boundary/after-loss", number)
+
+
+def test_nobody_is_lost_before_it_spoke() -> None:
+    assert expect(signed(lost_at(STATEMENTS[0]))) == ("boundary/missing", STATEMENTS[0])
 
 
 def test_it_has_an_exit_code_of_its_own() -> None:

@@ -1,37 +1,185 @@
 """The boundary is lost in flight: what was signed ahead brings the vehicle down, as a fallback by the boundary does."""
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from boundary.losing import KEY, Apart, S, to_and_fro
+from rtshcua.evidence.report import Verdict
+from rtshcua.mavlink.framing import message_id
+from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT
 from rtshcua.onboard.ports import Ending
+from rtshcua.simulation.config import SimulationConfig
+from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
 from virtual import case
 
 FLAVOURS = ("px4", "ardupilot")
 KEYS = (KEY, None)
+NAMES = ("signed", "keyless")
+#: what moves the vehicle is among these
+MOVING = (COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT)
+
+Make = Callable[..., Apart]
 
 
-def config(flavour: str, key: bytes | None, **more: Any) -> Any:
+@pytest.fixture
+def apart(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Make:
+    def made(flavour: str, key: bytes | None = KEY, legs: int = 2, **more: Any) -> Apart:
+        bundle = case.seal(case.mission(to_and_fro(legs)))
+        return Apart(boundary, monkeypatch, bundle, config(flavour, key, **more), key)
+
+    return made
+
+
+def config(flavour: str, key: bytes | None, **more: Any) -> SimulationConfig:
     return case.simulated(flavour, signing_key=key, utc_us=case.flat.ISSUED + 60 * S, **more)
 
 
-@pytest.mark.parametrize("key", KEYS, ids=("signed", "keyless"))
+def at(moment_us: int) -> Callable[[Apart], bool]:
+    return lambda of: of.flight.clock.elapsed_us >= moment_us
+
+
+def flies(step: int) -> Callable[[Apart], bool]:
+    """Five seconds after the vehicle was seen to do this step."""
+    since: list[int] = []
+
+    def dies(of: Apart) -> bool:
+        view = of.flight.runtime.view(of.flight.clock.now())
+        if view.step == step and view.stage.name == "RUNNING" and not since:
+            since.append(of.flight.clock.elapsed_us)
+        return bool(since) and of.flight.clock.elapsed_us - since[0] >= 5 * S
+
+    return dies
+
+
+def after_loss(flown: Any) -> list[tuple[int, int, int]]:
+    """The links that flew without the boundary."""
+    lost = next(n for n, record in enumerate(flown.records) if record.get("event") == "boundary-lost")
+    after = flown.records[lost:]
+    assert not [record for record in after if record["type"] == "decision"]
+    return [(r["kind"], r["step"], r["link"]) for r in after if r.get("event") == "dispatched"]
+
+
+def came_down(flown: Any) -> None:
+    """It did, by us, and the log proves as much as the boundary signed, and no more."""
+    assert flown.ending is Ending.ABORTED
+    truth = flown.vehicle.simulation.truth()
+    assert not truth.in_air
+    assert not truth.armed
+    report = flown.audit().report
+    assert report.failure is None
+    assert report.verdict is Verdict.INCOMPLETE
+    assert report.shortfall is not None
+    assert report.shortfall.slug == "boundary/lost"
+
+
+@pytest.mark.parametrize("key", KEYS, ids=NAMES)
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_ten_minutes_after_takeoff(
-    flavour: str, key: bytes | None, boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bundle = case.seal(case.mission(to_and_fro(80)))
-    apart = Apart(boundary, monkeypatch, bundle, config(flavour, key, hover_us=40 * 60 * S), key)
+def test_ten_minutes_after_takeoff(flavour: str, key: bytes | None, apart: Make) -> None:
+    of = apart(flavour, key, legs=80, hover_us=40 * 60 * S)
     took_off: list[int] = []
 
-    def dies(apart: Apart) -> bool:
-        if apart.vehicle.simulation.truth().in_air and not took_off:
-            took_off.append(apart.flight.clock.elapsed_us)
-        return bool(took_off) and apart.flight.clock.elapsed_us - took_off[0] >= 600 * S
+    def dies(of: Apart) -> bool:
+        if of.vehicle.simulation.truth().in_air and not took_off:
+            took_off.append(of.flight.clock.elapsed_us)
+        return bool(took_off) and of.flight.clock.elapsed_us - took_off[0] >= 600 * S
 
-    flown = apart.fly(dies)
-    assert apart.lost_us is not None
-    assert flown.ending is Ending.ABORTED
+    flown = of.fly(dies)
+    came_down(flown)
+    links = after_loss(flown)
+    step = links[0][1]
+    assert step > 10
+    assert links == [(FALLBACK_LINK, step, 0), (FALLBACK_LINK, step, 1)], "hover, and when its time is over, home"
+    assert (of.gate.counts.unverified > 100) == (key is not None)
+
+
+@pytest.mark.parametrize("second", [12, 30, pytest.param(20, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("key", KEYS, ids=NAMES)
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_whenever_it_is_lost_the_vehicle_comes_down(flavour: str, key: bytes | None, second: int, apart: Make) -> None:
+    came_down(apart(flavour, key).fly(at(second * S)))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("second", range(3, 100, 2))
+@pytest.mark.parametrize("key", KEYS, ids=NAMES)
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_at_each_moment(flavour: str, key: bytes | None, second: int, apart: Make) -> None:
+    of = apart(flavour, key)
+    flown = of.fly(at(second * S))
     assert not flown.vehicle.simulation.truth().in_air
+    if flown.ending is not Ending.COMPLETED:
+        assert flown.ending in (Ending.ABORTED, Ending.REFUSED)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_takeoff_that_has_not_left_the_ground_is_told_to_land(flavour: str, apart: Make) -> None:
+    of = apart(flavour)
+
+    def dies(of: Apart) -> bool:
+        truth = of.vehicle.simulation.truth()
+        return truth.armed and not truth.in_air
+
+    flown = of.fly(dies)
+    assert flown.ending in (Ending.ABORTED, Ending.REFUSED)
+    assert after_loss(flown)[:1] in ([], [(CONTINGENCY_LINK, -1, 2)])
+    assert not flown.vehicle.simulation.truth().in_air
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_frames_that_are_lost_on_the_way_are_sent_again_from_the_copies(flavour: str, apart: Make) -> None:
+    of, lost = apart(flavour), []
+
+    def lose(frame: bytes) -> bool:
+        if of.dead and message_id(frame, 0) in MOVING and len(lost) % 4 != 3:
+            lost.append(frame)
+            return True
+        lost.append(b"") if of.dead else None
+        return False
+
+    of.vehicle.lose = lose
+    flown = of.fly(flies(1))
+    came_down(flown)
+    assert sum(map(bool, lost)) >= 3
+    assert len({frame for frame in lost if frame}) == sum(map(bool, lost)), "each copy leaves once"
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_where_a_link_fails_the_next_one_flies(flavour: str, apart: Make) -> None:
+    """No frame of the first link arrives, however often it is sent."""
+    of = apart(flavour)
+    moving: list[str] = []
+
+    def lose(frame: bytes) -> bool:
+        active = of.flight.runtime.view(of.flight.clock.now()).contract
+        if of.dead and message_id(frame, 0) in MOVING:
+            moving.append(active)
+            return active == "hover"
+        return False
+
+    of.vehicle.lose = lose
+    flown = of.fly(flies(1))
+    came_down(flown)
+    assert [(kind, link) for kind, _, link in after_loss(flown)] == [(FALLBACK_LINK, 0), (FALLBACK_LINK, 1)]
+    assert moving.count("hover") == 6
+    failed = [record["detail"] for record in flown.records if record.get("event") == "failed"]
+    assert failed, "what did not arrive had no effect"
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_what_brings_it_home_goes_on(flavour: str, apart: Make) -> None:
+    of = apart(flavour)
+    flown = of.fly(flies(3))
+    assert after_loss(flown) == []
+    came_down(flown)
+
+
+def test_it_is_signed_anew_all_the_way_and_told_of_nothing(apart: Make) -> None:
+    """A long flight in which it is not lost: no note says that something could not be signed."""
+    flown = apart("px4", legs=8).fly(lambda _: False)
+    assert flown.ending is Ending.COMPLETED
+    assert flown.audit().report.verdict is Verdict.VERIFIED
+    noted = [record["detail"] for record in flown.records if record.get("event") == "noted"]
+    assert not [text for text in noted if "ahead" in text]

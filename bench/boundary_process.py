@@ -30,7 +30,7 @@ from virtual import case
 from virtual.shipped import shipped
 
 ADDED_MEDIAN_US, ADDED_P99_US, START_MS = 300.0, 1_000.0, 150.0
-BLOCKS, ROUNDS, STARTS = 31, 100, 15
+BLOCKS, ROUNDS, STARTS = 61, 100, 15
 PAUSE_S = 0.002
 """Before each request: a runtime asks ten times a second or so, and does not keep the processor busy between."""
 PIN = ROOT_KEY.verification().public

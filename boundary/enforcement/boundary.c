@@ -169,11 +169,10 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
     if (!boundary->opened) {
         uint8_t name[RT_DIGEST_BYTES];
         policy_name(boundary, name);
-        refused = rt_may_open(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version);
+        const int64_t earliest_us = now->utc_us - now->utc_error_us; /* nothing is forgotten that may not have expired yet */
+        refused = rt_may_open(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version, earliest_us);
         if (refused != NULL) return refused;
-        /* nothing is forgotten that may not have expired yet */
-        rt_open_mission(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version,
-                        now->utc_us - now->utc_error_us);
+        rt_open_mission(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version, earliest_us);
         boundary->to_keep = true;
     }
     memset(&boundary->chain, 0, sizeof boundary->chain);
@@ -232,10 +231,25 @@ uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, 
     return rt_write_receipt(&receipt, out);
 }
 
+/* What the session after this one begins with. One that has no number is not kept. */
+static void keep_session(rt_boundary *boundary) {
+    if (boundary->attestation == 0) return;
+    boundary->kept->session = boundary->attestation;
+    memcpy(boundary->kept->session_digest, boundary->chain.digest, RT_DIGEST_BYTES);
+    boundary->to_keep = true;
+}
+
 bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_DIGEST_BYTES]) {
     const rt_in_force *in_force = &boundary->session.in_force;
     uint8_t payload[8 + RT_DIGEST_BYTES + RT_FLIGHT_BYTES], rest[RT_DIGEST_BYTES + 1], *at = payload;
     if (boundary->attests || !boundary->has_key) return false;
+    rt_kept *kept = boundary->kept;
+    if (kept->session > 0 && kept->session >= session - 1) {
+        session = kept->session + 1;
+        before = kept->session_digest;
+    }
+    memcpy(boundary->before, before, RT_DIGEST_BYTES);
+    before = boundary->before;
     rt_put(&at, (uint64_t)session, 8);
     memcpy(at, before, RT_DIGEST_BYTES);
     memcpy(at + RT_DIGEST_BYTES, in_force->flight, RT_FLIGHT_BYTES);
@@ -247,7 +261,7 @@ bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_D
     rt_chain_add(&boundary->chain, RT_TAG_BEGIN, (rt_bytes){payload, sizeof payload}, (rt_bytes){rest, sizeof rest});
     boundary->attests = true;
     boundary->attestation = session;
-    memcpy(boundary->before, before, RT_DIGEST_BYTES);
+    keep_session(boundary);
     return true;
 }
 
@@ -263,6 +277,7 @@ rt_refusal rt_begin_log(rt_boundary *boundary, rt_bytes checkpoint, uint8_t sign
 uint32_t rt_attested(rt_boundary *boundary, bool final, uint8_t *out) {
     if (!boundary->attests || boundary->chain.over) return 0;
     boundary->chain.over = final;
+    if (final) keep_session(boundary);
     return rt_sign_statement(&boundary->chain, boundary->keys->boundary, boundary->session.in_force.flight, boundary->attestation,
                              boundary->before, final, out);
 }

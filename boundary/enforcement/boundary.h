@@ -76,8 +76,8 @@ uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, 
 /* Of what is in force nothing was sent: its mission may be opened again. False where it was used, or nothing is in force. */
 bool rt_give_back(rt_boundary *boundary);
 
-/* Begin a session of the boundary's own evidence, after a digest that was kept of the one before: false without a key, and for a
-   second time. Then sign how far it got into `out` of RT_MAX_STATEMENT octets; 0 where nothing is signed. */
+/* Begin a session of the boundary's own evidence: the one behind that which it kept, or the one that is proposed with the digest of
+   the one before, where that has a greater number. False without a key, and for a second time. Then sign how far it got into `out` of RT_MAX_STATEMENT octets; 0 where nothing is signed. */
 bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_DIGEST_BYTES]);
 uint32_t rt_attested(rt_boundary *boundary, bool final, uint8_t *out);
 

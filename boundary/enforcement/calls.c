@@ -246,7 +246,11 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
     case RT_CALL_BEGIN:
         if (!boundary->loaded || left.left != 8 + RT_DIGEST_BYTES) break;
         now_us = take(&left, 8);
-        refused = now_us >= 0 && rt_attest(boundary, now_us, left.at) ? NULL : "no-boundary-key";
+        if (!is_time(now_us)) break; /* a number within the same bounds */
+        refused = rt_attest(boundary, now_us, left.at) ? NULL : "no-boundary-key";
+        for (uint32_t octet = 0; octet < 8; octet++) out[1 + octet] = (uint8_t)((uint64_t)boundary->attestation >> (56 - 8 * octet) & 0xFF);
+        memcpy(out + 9, boundary->before, RT_DIGEST_BYTES);
+        size = 8 + RT_DIGEST_BYTES;
         break;
     case RT_CALL_STATEMENT:
         size = rt_attested(boundary, take(&left, 1) != 0, out + 1);

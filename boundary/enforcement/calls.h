@@ -20,7 +20,7 @@ enum {
     RT_CALL_RELEASE = 9,
     RT_CALL_OBSERVE = 10, /* now (8), a frame as it came -> what was made of it (1): rt_heard */
     RT_CALL_SEAL = 11,    /* now (8), a frame -> the octets to send */
-    RT_CALL_BEGIN = 12,     /* session (8), the digest that was kept of the one before (32) */
+    RT_CALL_BEGIN = 12,     /* session (8), the digest of the one before (32): what is proposed -> those that it is */
     RT_CALL_STATEMENT = 13, /* whether it is the last (1) -> a signed statement of the boundary's own evidence */
     RT_CALL_DIGEST = 14,    /* -> the digest of that (32) */
     RT_CALL_PERMIT = 15,    /* now (8), what is to be set -> its preparation permit */

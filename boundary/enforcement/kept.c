@@ -9,7 +9,7 @@ bool rt_was_opened(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]) {
 }
 
 rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
-                       const uint8_t policy[RT_DIGEST_BYTES], int64_t version) {
+                       const uint8_t policy[RT_DIGEST_BYTES], int64_t version, int64_t now_us) {
     if (rt_was_opened(kept, digest) || expires_us <= kept->floor_us)
         return "replayed";
     bool known = false;
@@ -19,7 +19,9 @@ rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES
             if (version < kept->versions[at].version)
                 return "old-policy";
         }
-    bool room = kept->opened_count < RT_MOST_OPENED && (known || kept->version_count < RT_MOST_POLICIES);
+    uint64_t lasting = 0; /* the others give up their places */
+    for (uint64_t at = 0; at < kept->opened_count; at++) lasting += kept->opened[at].expires_us >= now_us ? 1 : 0;
+    bool room = lasting < RT_MOST_OPENED && (known || kept->version_count < RT_MOST_POLICIES);
     return room ? NULL : "full";
 }
 
@@ -64,9 +66,35 @@ void rt_seal_kept(rt_kept *kept) {
 
 bool rt_is_whole_kept(const rt_kept *kept) {
     uint8_t check[RT_DIGEST_BYTES];
-    if (kept->layout != RT_KEPT_LAYOUT || kept->opened_count > RT_MOST_OPENED || kept->version_count > RT_MOST_POLICIES ||
+    const bool former = kept->layout == RT_KEPT_LAYOUT_1;
+    if ((kept->layout != RT_KEPT_LAYOUT && !former) || kept->opened_count > (former ? RT_MOST_OPENED + 1ULL : RT_MOST_OPENED) || kept->version_count > RT_MOST_POLICIES ||
         kept->stream_count > RT_MOST_STREAMS)
         return false;
     check_of(kept, check);
     return memcmp(check, kept->check, RT_DIGEST_BYTES) == 0;
+}
+
+/* What is new lies where layout 1 has its last mission. */
+_Static_assert(offsetof(rt_kept, session_digest) == offsetof(rt_kept, opened) + RT_MOST_OPENED * sizeof(rt_opened), "no gap");
+_Static_assert(offsetof(rt_kept, versions) == offsetof(rt_kept, session_digest) + sizeof(rt_opened), "no gap");
+
+void rt_upgrade_kept(rt_kept *kept) {
+    if (kept->layout == RT_KEPT_LAYOUT) return;
+    if (kept->opened_count > RT_MOST_OPENED) { /* one has no room any more: the first to expire, which is not opened again either */
+        rt_opened last, first;
+        uint64_t at = 0;
+        memcpy(&last, (const uint8_t *)kept + offsetof(rt_kept, session_digest), sizeof last);
+        for (uint64_t each = 1; each < RT_MOST_OPENED; each++)
+            if (kept->opened[each].expires_us < kept->opened[at].expires_us) at = each;
+        first = last;
+        if (kept->opened[at].expires_us < last.expires_us) {
+            first = kept->opened[at];
+            kept->opened[at] = last;
+        }
+        if (first.expires_us > kept->floor_us) kept->floor_us = first.expires_us;
+        kept->opened_count = RT_MOST_OPENED;
+    }
+    memset(kept->session_digest, 0, sizeof kept->session_digest);
+    kept->session = 0;
+    kept->layout = RT_KEPT_LAYOUT;
 }

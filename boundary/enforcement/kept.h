@@ -5,7 +5,7 @@
 
 #include "mavlink/signing.h"
 
-#define RT_MOST_OPENED 4096
+#define RT_MOST_OPENED 4095
 #define RT_MOST_POLICIES 256
 
 typedef struct {
@@ -25,17 +25,20 @@ typedef struct {
     int64_t floor_us;  /* what expires by then was opened, or might have been */
     uint64_t opened_count, version_count, stream_count;
     rt_opened opened[RT_MOST_OPENED];
+    uint8_t session_digest[RT_DIGEST_BYTES]; /* of its own evidence, and the number of that session; where layout 1 has one mission more */
+    int64_t session;
     rt_version versions[RT_MOST_POLICIES];
     int64_t link_timestamp;
     rt_stream streams[RT_MOST_STREAMS];
     uint8_t check[RT_DIGEST_BYTES]; /* SHA-256 over all before */
 } rt_kept;
 
-#define RT_KEPT_LAYOUT 0x7274736863756101ULL
+#define RT_KEPT_LAYOUT 0x7274736863756102ULL
+#define RT_KEPT_LAYOUT_1 0x7274736863756101ULL
 
-/* Whether a mission may be opened; NULL, "replayed", "old-policy", or "full" where no more can be remembered. */
+/* Whether a mission may be opened at a time (UTC); NULL, "replayed", "old-policy", or "full" where no more can be remembered. */
 rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
-                       const uint8_t policy[RT_DIGEST_BYTES], int64_t version);
+                       const uint8_t policy[RT_DIGEST_BYTES], int64_t version, int64_t now_us);
 bool rt_was_opened(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]);
 /* Open it: what expired by `now_us` (UTC) is pruned, so that the floor rises. */
 void rt_open_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
@@ -44,6 +47,7 @@ void rt_open_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64
 void rt_forget_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]);
 
 void rt_seal_kept(rt_kept *kept);            /* before it is written */
-bool rt_is_whole_kept(const rt_kept *kept); /* after it was read */
+bool rt_is_whole_kept(const rt_kept *kept); /* after it was read: in this layout, or the one before, */
+void rt_upgrade_kept(rt_kept *kept);        /* which becomes this one */
 
 #endif

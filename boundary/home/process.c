@@ -178,8 +178,10 @@ static rt_kept *read_kept(int file) {
     if (newer == NULL && size == 0) {
         memset(&slots[0], 0, sizeof *slots);
         slots[0].floor_us = -1;
+        slots[0].layout = RT_KEPT_LAYOUT;
         newer = &slots[0];
     }
+    if (newer != NULL) rt_upgrade_kept(newer);
     return newer;
 }
 

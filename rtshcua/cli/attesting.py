@@ -1,6 +1,7 @@
 """The boundary's key and its sessions, for a flight: what it signs its own evidence with."""
 
 from contextlib import suppress
+from errno import ENOSPC
 from pathlib import Path
 
 from rtshcua.adapters.files.boundary import BoundaryStore, DamagedState
@@ -52,6 +53,7 @@ class BoundarySession:
         self._store = store
         self._aloft = aloft
         self.key = None if key is None else BoundaryKey(key, *self._next())
+        self._session = 0 if self.key is None else self.key.session
 
     def _next(self) -> tuple[int, bytes]:
         try:
@@ -66,8 +68,18 @@ class BoundarySession:
             raise Refused(ExitCode.INPUT, "damaged", str(error), help) from None
         return kept.session + 1, kept.digest
 
-    def begun(self, digest: bytes) -> None:
-        """The session began. Raises OSError where that cannot be kept; not for a vehicle that is `aloft`."""
+    def begun(self, digest: bytes, session: int | None) -> None:
+        """The session began, under this number: a boundary of its own process counts itself. Raises OSError where none
+        began, or that cannot be kept; not for a vehicle that is `aloft`.
+        """
+        if self.key is not None and session is None and not self._aloft:
+            raise OSError(ENOSPC, "the boundary's process cannot keep that its session begins")
+        if self.key is not None and session is not None and session != self._session:
+            self.note = (
+                f"the state folder counts {max(0, self._session - 1)} sessions of the boundary, its own process "
+                f"{session - 1}: the folder was put back to what it was, or lost"
+            )
+            self._session = session
         try:
             self._keep(digest)
         except OSError:
@@ -81,4 +93,4 @@ class BoundarySession:
 
     def _keep(self, digest: bytes) -> None:
         if self.key is not None and self.key.session:  # what is damaged stays so, for a person to see
-            self._store.keep(self.key.session, digest)
+            self._store.keep(self._session, digest)

@@ -124,8 +124,8 @@ class Flight:
         )  # fmt: skip
         self._sink.append(genesis, SYNCED_FIRST)
         self._boundary = boundary
-        loaded.attestation.begin(boundary.key)
-        boundary.begun(loaded.attestation.digest)
+        session = loaded.attestation.begin(boundary.key)
+        boundary.begun(loaded.attestation.digest, session)
         self._recorder.attest = loaded.attestation.statement
         for line in self._recorder.attested(now):
             self._sink.append(line, WRITTEN)

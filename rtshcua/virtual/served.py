@@ -91,7 +91,7 @@ class Served:
                 if self._key is None:
                     return Refusal("no-boundary-key", "it has no key of its own")
                 loaded.attestation.begin(BoundaryKey(self._key, *_BEGIN.unpack(rest)))
-                return _NONE
+                return rest
             case calls.STATEMENT:
                 said = loaded.attestation.statement(final=rest == b"\1")
                 return Refusal("no-boundary-key", "nothing is signed") if said is None else said

@@ -34,7 +34,7 @@ from reference.world import (
 from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, kept_file, program
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.executor import FORGED, OUT_OF_TURN, USED
-from rtshcua.onboard.enforcement.isolated import ENFORCE, LOAD, MAX_PART, PART, PRESENT, Caller
+from rtshcua.onboard.enforcement.isolated import BEGIN, ENFORCE, LOAD, MAX_PART, PART, PRESENT, STATEMENT, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.ports import Dispatch
 from rtshcua.wire.response import Answer, Status
@@ -42,15 +42,22 @@ from rtshcua.wire.response import Answer, Status
 pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
 AT_US = START.monotonic_us
 #: of `rt_kept`: its layout, its head, and how many missions it has room for
-LAYOUT, HEAD, MOST_OPENED, OPENED = 0x7274736863756101, struct.Struct("<QQQqQQQ"), 4_096, struct.Struct("<32sq")
+LAYOUT, HEAD, MOST_OPENED, OPENED = 0x7274736863756102, struct.Struct("<QQQqQQQ"), 4_095, struct.Struct("<32sq")
 
 
 class Held:
     """A boundary's process whose time is its caller's, and the bundle that it is given."""
 
-    def __init__(self, state: Path) -> None:
-        self.process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, state, paced=True)
+    def __init__(self, state: Path, *, own: bool = False) -> None:
+        seed = b"the seed of its own signing key." if own else None
+        self.process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, state, own_seed=seed, paced=True)
         self.caller = Caller(self.process.call)
+
+    def session(self, proposed: int) -> tuple[int, bytes]:
+        """Begin a session of its own evidence: its number, and the digest of the one before."""
+        answer = self.caller(BEGIN, proposed.to_bytes(8, "big"), bytes([proposed]) * 32)
+        assert isinstance(answer, bytes)
+        return int.from_bytes(answer[:8], "big"), answer[8:]
 
     def load(self) -> Loaded | Refusal:
         return load(
@@ -349,6 +356,60 @@ def test_a_file_that_is_cut_or_changed_is_damage(tmp_path: Path) -> None:
     for place in (0, slot):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
         Held(tmp_path).process.close()
+
+
+def rewritten(path: Path, layout: int, opened: int) -> None:
+    """Its file as the layout before this one has it, with so many missions opened, the last of which expires last."""
+    data = path.read_bytes()
+    slot = len(data) // 2
+    body = bytearray(data[:slot])
+    head = list(HEAD.unpack_from(body))
+    head[0], head[1], head[4] = layout, 1_000, opened
+    HEAD.pack_into(body, 0, *head)
+    for number in range(MOST_OPENED + 1):
+        OPENED.pack_into(body, HEAD.size + number * OPENED.size, number.to_bytes(32, "big"), number + 1)
+    body[-32:] = sha256(body[:-32]).digest()
+    path.write_bytes(bytes(body) + data[slot:])
+
+
+@pytest.mark.parametrize("opened", [0, 3, MOST_OPENED + 1])
+def test_a_file_of_the_layout_before_goes_on(opened: int, tmp_path: Path) -> None:
+    """It has no sessions; where it is full, the mission that has no room any more is not opened again either."""
+    Held(tmp_path, own=True).process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    rewritten(path, LAYOUT - 1, opened)
+    held = Held(tmp_path, own=True)
+    held.loaded()
+    assert held.session(7) == (7, b"\x07" * 32), "as the state folder says"
+    held.process.close()
+    data = path.read_bytes()
+    heads = [HEAD.unpack_from(data, at) for at in (0, len(data) // 2)]
+    newest = max(heads, key=lambda head: head[1])
+    assert newest[0] == LAYOUT
+    assert newest[3] == (opened or -1), "what has expired, or lost its place, counts as opened"
+    rewritten(path, LAYOUT - 2, opened)
+    path.write_bytes(path.read_bytes()[: len(data) // 2])
+    with pytest.raises(BoundaryError, match="damaged"):
+        Held(tmp_path)
+
+
+def test_it_counts_its_sessions_itself(tmp_path: Path) -> None:
+    """A state folder that was put back does not make it begin to count anew; one that is ahead counts."""
+    digests = []
+    for proposed, found in ((1, 1), (1, 2), (0, 3), (3, 4), (9, 9), (1, 10)):
+        held = Held(tmp_path, own=True)
+        loaded = held.loaded()
+        session, before = held.session(proposed)
+        assert session == found
+        assert before == (bytes([proposed]) * 32 if proposed == found else digests[-1])
+        final = loaded.attestation.digest
+        if found != 4:
+            held.caller(STATEMENT, b"\1")
+            held.process.close()
+        else:  # killed, and what it had at its beginning counts
+            os.kill(held.process.pid, signal.SIGKILL)
+            held.process.close()
+        digests.append(final)
 
 
 # --------------------------------------------------------------------------------------------------- its keys

@@ -26,15 +26,18 @@ class Attestation:
         """The digest to keep for the next session, 32 octets."""
         return self._chain.digest
 
-    def begin(self, key: BoundaryKey | None) -> None:
-        """The flight's log begins. Raises RuntimeError for a second time: a chain has one beginning."""
+    def begin(self, key: BoundaryKey | None) -> int | None:
+        """The flight's log begins: the number of the session, None without a key. Raises RuntimeError for a second
+        time: a chain has one beginning.
+        """
         if self._key is not None:
             raise RuntimeError("the boundary's session has begun already")
         if key is None:
-            return
+            return None
         self._key = key
         payload = boundary_chain.begin(key.session, key.before, self._flight, self._bundle, enforced=self._enforced)
         self._chain.add(Tag.BEGIN, payload)
+        return key.session
 
     def statement(self, *, final: bool = False) -> bytes | None:
         """A signed statement, None without a key or after the final one. After that nothing is dispatched, and no frame

@@ -361,12 +361,15 @@ class IsolatedAttestation:
         answer = self._caller(DIGEST)
         return START if isinstance(answer, Refusal) else answer
 
-    def begin(self, key: BoundaryKey | None) -> None:
-        """The flight's log begins, with a session of this number. Raises RuntimeError for a second time."""
+    def begin(self, key: BoundaryKey | None) -> int | None:
+        """The flight's log begins, with a session of this number, or of the next of those that the boundary kept, which
+        is the answer; None where none begins. Raises RuntimeError for a second time.
+        """
         if self._begun:
             raise RuntimeError("the boundary's session has begun already")
-        if key is not None:
-            self._begun = not isinstance(self._caller(BEGIN, key.session.to_bytes(8, "big"), key.before), Refusal)
+        answer = LOST if key is None else self._caller(BEGIN, key.session.to_bytes(8, "big"), key.before)
+        self._begun = not isinstance(answer, Refusal)
+        return None if isinstance(answer, Refusal) else int.from_bytes(answer[:8], "big")
 
     def statement(self, *, final: bool = False) -> bytes | None:
         """A signed statement, None without a key or after the final one."""

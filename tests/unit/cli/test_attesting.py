@@ -67,16 +67,35 @@ def test_sessions_follow_one_another(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
     first = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
     assert first.key == (case.BOUNDARY_KEY, 1, START)
-    first.begun(b"a" * 32)
+    first.begun(b"a" * 32, 1)
     broken_off = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
     assert broken_off.key == (case.BOUNDARY_KEY, 2, b"a" * 32)
     first.ended(b"b" * 32)
     assert BoundarySession(store, case.BOUNDARY_KEY, aloft=False).key == (case.BOUNDARY_KEY, 2, b"b" * 32)
 
 
+def test_a_state_folder_that_was_put_back_shows_where_the_boundary_counts_itself(tmp_path: Path) -> None:
+    store = BoundaryStore(tmp_path, "quad-07")
+    store.keep(2, b"a" * 32)
+    session = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    session.begun(b"b" * 32, 8)
+    assert "counts 2 sessions of the boundary, its own process 7" in session.note
+    assert store.kept() == (8, b"b" * 32), "and goes on from there"
+    same = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    same.begun(b"c" * 32, 9)
+    assert not same.note
+
+
+def test_nothing_flies_where_a_session_was_to_begin_and_did_not(tmp_path: Path) -> None:
+    store = BoundaryStore(tmp_path, "quad-07")
+    with pytest.raises(OSError, match="cannot keep that its session begins"):
+        BoundarySession(store, case.BOUNDARY_KEY, aloft=False).begun(START, None)
+    BoundarySession(store, case.BOUNDARY_KEY, aloft=True).begun(START, None)
+
+
 def test_without_a_key_nothing_is_kept(tmp_path: Path) -> None:
     session = BoundarySession(BoundaryStore(tmp_path, "quad-07"), None, aloft=False)
-    session.begun(b"a" * 32)
+    session.begun(b"a" * 32, None)
     session.ended(b"b" * 32)
     assert (session.key, list(tmp_path.iterdir())) == (None, [])
 
@@ -90,7 +109,7 @@ def test_what_cannot_be_known_or_kept_holds_back_nothing_that_is_in_the_air(tmp_
     session = BoundarySession(store, case.BOUNDARY_KEY, aloft=True)
     assert session.key == (case.BOUNDARY_KEY, 0, START)
     assert "brought down all the same" in session.note
-    session.begun(b"a" * 32)
+    session.begun(b"a" * 32, 0)
     session.ended(b"b" * 32)
     assert store.path.read_bytes() == b"x"
     store.path.unlink()
@@ -98,5 +117,5 @@ def test_what_cannot_be_known_or_kept_holds_back_nothing_that_is_in_the_air(tmp_
     store.path.mkdir()
     with pytest.raises(OSError, match="no regular file"):
         BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
-    sound.begun(b"a" * 32)
+    sound.begun(b"a" * 32, None)
     sound.ended(b"b" * 32)

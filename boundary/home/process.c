@@ -291,8 +291,11 @@ int main(int count, char **words) {
     if (!read_writes(given.settings, &settings, &meant) || !read_writes(given.owed, &owed, &left))
         return USAGE;
     kept->restarts++;
-    if (!write_kept(given.kept, kept))
+    const int first = kept->turn == 0;
+    if (!write_kept(given.kept, kept)) {
+        if (first) (void)!ftruncate(given.kept, 0); /* half of what was never written would count as damage */
         return IO;
+    }
     if (!start_keeper(given.kept))
         return IO;
     measures |= rt_isolate(given.user, given.group);

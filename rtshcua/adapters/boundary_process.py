@@ -7,6 +7,7 @@ which is never read here. One process at a time holds that file: two runtimes ca
 import os
 import socket
 import subprocess
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from enum import IntFlag
 from pathlib import Path
@@ -21,6 +22,8 @@ from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 PATIENCE_S: Final = 20.0
 #: and any other answer: one that stands still is as good as gone, and something flies
 ANSWER_S: Final = 1.0
+#: and how long the boundary of a run that was killed may take to write what it keeps, and end
+ENDING_S: Final = 2.0
 _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
 _BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
 #: octets of the largest call and answer
@@ -58,16 +61,16 @@ MISSING: Final = {
     Measure.SECRET_MEMORY: "memfd_secret: the kernel can read its keys (`secretmem.enable=1`)",
 }
 
-_UNTRUSTED, _NO_KEY, _DAMAGED = 65, 66, 78
+_UNTRUSTED, _NO_KEY, _IO, _DAMAGED = 65, 66, 74, 78
 _ENDED: Final = {
     64: "its command line is wrong",
     _UNTRUSTED: "it does not trust the trust root",
-    74: "its file cannot be read or written",
 }
 
 
 class BoundaryError(Exception):
-    """The boundary's process does not begin: `missing`, `in-use`, `damaged`, `untrusted`, `not-begun`."""
+    """The boundary's process does not begin: `missing`, `in-use`, `damaged`, `not-kept`, `untrusted`,
+    `not-begun`."""
 
     def __init__(self, slug: str, text: str, help: str = "") -> None:
         super().__init__(text)
@@ -145,10 +148,14 @@ class BoundaryProcess:
                 words += ["--user", str(user[0]), "--group", str(user[1])]
             for end in (ours, theirs):
                 end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * _CALL)
-            self._process = subprocess.Popen(
-                [path, *words], pass_fds=files, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, env={}, cwd="/", start_new_session=True,
-            )  # fmt: skip
+            try:
+                self._process = subprocess.Popen(
+                    [path, *words], pass_fds=files, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL, env={}, cwd="/", start_new_session=True,
+                )  # fmt: skip
+            except OSError as error:
+                text = f"the boundary's program `{path}` does not start: {(error.strerror or str(error)).lower()}"
+                raise BoundaryError("not-begun", text, UNBUILT_HELP) from None
         except BaseException:
             ours.close()
             raise
@@ -205,11 +212,17 @@ class BoundaryProcess:
     ) -> Iterator[tuple[str, int]]:
         place = kept_file(state, vehicle)
         make_folder(place.parent, mode=PRIVATE_FOLDER)
-        try:
-            yield "--kept", lock(place)
-        except BlockingIOError:
-            text = f"another run's boundary holds what is kept of `{vehicle}`"
-            raise BoundaryError("in-use", text, "wait until that run is over") from None
+        until_s = time.monotonic() + ENDING_S
+        while True:
+            try:
+                kept = lock(place)
+                break
+            except BlockingIOError:
+                if time.monotonic() > until_s:
+                    text = f"another run's boundary holds what is kept of `{vehicle}`"
+                    raise BoundaryError("in-use", text, "wait until that run is over") from None
+                time.sleep(0.02)
+        yield "--kept", kept
         for name, data in given.items():
             if data is not None:
                 handle = os.memfd_create(name, os.MFD_CLOEXEC)
@@ -234,5 +247,7 @@ class BoundaryProcess:
         if code == _DAMAGED:
             text = f"`{kept}` is damaged: which bundles the boundary has opened is not known"
             raise BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
+        if code == _IO:
+            raise BoundaryError("not-kept", f"`{kept}` cannot be read or written, or its disk is full")
         text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
         raise BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text)

@@ -24,7 +24,13 @@ from rtshcua.wire.trust import MAX_ROOT, TrustRoot
 #: why nothing begins where another run has the boundary of the vehicle
 IN_USE: Final = "boundary-in-use"
 
-_CODES = {"in-use": ExitCode.REFUSED, "damaged": ExitCode.INPUT, "untrusted": ExitCode.UNTRUSTED}
+#: how a run ends, by why its boundary does not begin or take the bundle; REFUSED where none is named
+CODES: Final = {
+    "in-use": ExitCode.REFUSED,
+    "damaged": ExitCode.INPUT,
+    "not-kept": ExitCode.FULL,
+    "untrusted": ExitCode.UNTRUSTED,
+}
 
 
 class Apart:
@@ -45,7 +51,7 @@ class Apart:
                 settings=_listed({name: Owed(0, value) for name, value in settings.items()}), owed=_listed(owed),
             )  # fmt: skip
         except BoundaryError as error:
-            code = _CODES.get(error.slug, ExitCode.REFUSED)
+            code = CODES.get(error.slug, ExitCode.REFUSED)
             raise Refused(code, f"boundary-{error.slug}", str(error), error.help) from None
         self._caller = Caller(self.process.call, signs=link_key is not None)
 

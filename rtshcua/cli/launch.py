@@ -33,7 +33,7 @@ from rtshcua.cli.configured import would_set
 from rtshcua.cli.faults import code_of, say, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
-from rtshcua.cli.isolating import IN_USE, Apart
+from rtshcua.cli.isolating import CODES, IN_USE, Apart
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.log_signer import LogSigner
@@ -329,7 +329,8 @@ def _taken_over(apart: Apart | None, loaded: Loaded, bundle: bytes, clock: LinkC
     """The bundle in force where decisions are made. Raises `Refused`."""
     taken = loaded if apart is None else apart.load(bundle, clock.now())
     if isinstance(taken, Refusal):
-        raise Refused(ExitCode.REFUSED, taken.slug, taken.text, taken.help)
+        code = CODES.get(taken.slug.removeprefix("boundary-"), ExitCode.REFUSED)
+        raise Refused(code, taken.slug, taken.text, taken.help)
     return taken
 
 

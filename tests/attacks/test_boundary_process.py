@@ -9,6 +9,8 @@ nothing leaves that it had not signed ahead.
 import os
 import signal
 import struct
+import subprocess
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,9 +21,14 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, Measure, kept_file
 from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key
+from rtshcua.adapters.store.writing import lock
+from rtshcua.cli.isolating import Apart
+from rtshcua.cli.refused import Refused
 from rtshcua.codec.frames import Codec
+from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.ahead import NO_COPY
@@ -29,6 +36,7 @@ from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, LOAD, LOST, 
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS
+from rtshcua.wire.keys import Duty
 from rtshcua.wire.permit import Permit, seal
 from rtshcua.wire.request import STEP, Request, encode
 from rtshcua.wire.response import Answer, Status, decode
@@ -321,3 +329,62 @@ def test_when_it_dies_nothing_leaves_that_was_not_signed_ahead(held: Held) -> No
     assert held.ask(0) is Status.MALFORMED
     assert held.caller.lost
     assert held.caller(ENFORCE) is LOST
+
+
+# ---------------------------------------------------------------------------------------- what keeps it from beginning
+
+
+def begun(state: Path) -> Apart:
+    """As `run` begins one."""
+    root, signed = case.root(issued_us())
+    return Apart(
+        VEHICLE, root, signed, state, link_key=None, own_key=None, log_key=case.KEYS[Duty.LOG], user=None, paced=False,
+        settings={}, owed={},
+    )  # fmt: skip
+
+
+def why_not(state: Path) -> tuple[ExitCode, str]:
+    with pytest.raises(Refused) as refused:
+        begun(state)
+    return refused.value.code, refused.value.slug
+
+
+def test_each_reason_not_to_begin_has_a_slug_and_an_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(boundary_process, "ENDING_S", 0.05)
+    first = begun(tmp_path)
+    assert why_not(tmp_path) == (ExitCode.REFUSED, "boundary-in-use")
+    first.process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    path.write_bytes(bytes(path.stat().st_size))
+    assert why_not(tmp_path) == (ExitCode.INPUT, "boundary-damaged")
+    empty = tmp_path / "empty"
+    empty.write_bytes(b"")
+    empty.chmod(0o755)
+    monkeypatch.setattr(boundary_process, "program", lambda: empty)
+    assert why_not(tmp_path) == (ExitCode.REFUSED, "boundary-not-begun")
+    monkeypatch.setattr(boundary_process, "program", lambda: None)
+    assert why_not(tmp_path) == (ExitCode.REFUSED, "boundary-missing")
+
+
+def test_a_boundary_that_is_still_ending_is_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "boundary").mkdir()
+    held = lock(kept_file(tmp_path, VEHICLE))
+    ends = threading.Timer(0.3, os.close, (held,))
+    ends.start()
+    begun(tmp_path).process.close()
+    ends.join()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a disk that is small")
+def test_a_disk_that_is_full_at_the_first_start_is_no_damage(tmp_path: Path) -> None:
+    """What was half written is not there afterwards."""
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(tmp_path)]
+    if subprocess.run(mount, check=False, capture_output=True).returncode != 0:
+        pytest.skip("no file system may be mounted here")
+    try:
+        assert why_not(tmp_path) == (ExitCode.FULL, "boundary-not-kept")
+        assert kept_file(tmp_path, VEHICLE).stat().st_size == 0
+        subprocess.run(["mount", "-o", "remount,size=2m", str(tmp_path)], check=True, capture_output=True)
+        begun(tmp_path).process.close()
+    finally:
+        subprocess.run(["umount", "-l", str(tmp_path)], check=True, capture_output=True)

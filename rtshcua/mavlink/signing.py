@@ -75,8 +75,9 @@ class SignedLink:
     """One link with a key: signs what leaves as `link`, and says what of the rest may come in.
 
     `stored` is the state of the run before. `utc_us` and `monotonic_us` are the present; from here on only monotonic
-    time counts, so that setting a clock back opens nothing. `as_library`: of a stream that is known no frame is too old
-    that is newer than the one before, as in the C library that both autopilots have (`mavlink_signature_check`).
+    time counts, so that setting a clock back opens nothing. `as_library`: as in the C library that both autopilots have
+    (`mavlink_signature_check`), of a stream that is known no frame is too old that is newer than the one before, a
+    sender may sign on several links, and no stream is ever forgotten for another one.
     """
 
     def __init__(
@@ -142,7 +143,8 @@ class SignedLink:
         # 3. it is not one of ours, sent back to us, nor one that its sender sent on another link: it signs there too,
         #    and what was overheard there would be news here for a minute
         stream = stream_of(frame)
-        if stream == self._own or self._heard_by.get(stream[:2], stream[2]) != stream[2]:
+        astray = not self._as_library and self._heard_by.get(stream[:2], stream[2]) != stream[2]
+        if stream == self._own or astray:
             self.counts.strayed += 1
             return False
         # 4. "Timestamp is older than the previous packet from the same logical stream", or the same: a replay;
@@ -178,6 +180,8 @@ class SignedLink:
         many senders are remembered as streams.
         """
         streams, heard_by, sender = self._streams, self._heard_by, stream[:2]
+        if self._as_library:
+            return stream in streams or len(streams) < MOST_STREAMS
         if stream not in streams and len(streams) >= MOST_STREAMS:
             streams = self._streams = {each: last for each, last in streams.items() if last >= local - MINUTE}
         if sender not in heard_by and len(heard_by) >= MOST_STREAMS:

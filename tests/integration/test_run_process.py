@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.store.writing import lock
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.tlog import read
@@ -139,6 +140,8 @@ def test_a_boundary_that_is_killed_in_flight(flavour: str, signed: bool, ground:
     assert (verified.code, said["verdict"], said["failure"]) == (10, "incomplete", None)
     assert (said["shortfall"]["slug"], said["shortfall"]["record"]) == ("boundary/lost", lost["seq"])
     assert "boundary" in {claim["slug"] for claim in said["unproven"]}
+    (state,) = {path.parent.parent for path in Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("boundary/*.kept")}
+    assert any(BoundaryStore(state, "quad-07").kept().digest), "the next session names this one, which broke off"
 
 
 #: with a key as fast as life alone: a vehicle that is flown faster signs by the time outside, and falls behind

@@ -341,3 +341,25 @@ def test_it_is_news_to_keep() -> None:
     for now_us in (0, 0, 10_000, 20_000_000):
         ours.sign_ahead(frame(), now_us)
     assert len(news) == 2
+
+
+# ---------------------------------------------------------------- as the C library
+
+
+def test_the_library_forgets_no_stream_and_has_no_room_for_more() -> None:
+    """`mavlink_signature_check`: a table of 16, each sender on each link a stream of its own, none given up."""
+    autopilot = vehicle()
+    for number in range(MOST_STREAMS):
+        assert autopilot.accept(link(number=number).sign(frame(), 0), 0)
+    late = 600_000_000
+    assert not autopilot.accept(link(number=99).sign(frame(), late), late), "however old the others are"
+    assert autopilot.accept(link(number=3).sign(frame(), late), late)
+
+
+def test_the_library_takes_a_new_stream_at_most_a_minute_behind_and_a_known_one_however_late() -> None:
+    autopilot, known, late = vehicle(), link(number=1), 600_000_000
+    assert autopilot.accept(known.sign(frame(), 0), 0)
+    first = known.sign(frame(), 1_000)
+    assert autopilot.accept(link(number=2).sign(frame(), late), late)
+    assert not autopilot.accept(link(number=3).sign(frame(), late - 61_000_000), late)
+    assert autopilot.accept(first, late)

@@ -42,17 +42,22 @@ def boundary_key(
     return key
 
 
+class Elsewhere:
+    """In place of the boundary's key: the boundary's process has it, and nobody here."""
+
+
 class BoundarySession:
     """One flight's session of a boundary, with or without a key. `note` is what there is to tell of it."""
 
-    def __init__(self, store: BoundaryStore, key: SigningKey | None, *, aloft: bool) -> None:
+    def __init__(self, store: BoundaryStore, key: SigningKey | Elsewhere | None, *, aloft: bool) -> None:
         """Raises `Refused`, and OSError, where nobody knows which session came before; but not for a vehicle that is
         `aloft`, which comes down whatever the state folder says.
         """
         self.note = ""
         self._store = store
         self._aloft = aloft
-        self.key = None if key is None else BoundaryKey(key, *self._next())
+        held = key if isinstance(key, SigningKey) else None
+        self.key = None if key is None else BoundaryKey(held, *self._next())
         self._session = 0 if self.key is None else self.key.session
 
     def _next(self) -> tuple[int, bytes]:

@@ -28,7 +28,7 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
-from rtshcua.cli.attesting import UNNAMED, BoundarySession, boundary_key
+from rtshcua.cli.attesting import UNNAMED, BoundarySession, Elsewhere, boundary_key
 from rtshcua.cli.configured import would_set
 from rtshcua.cli.faults import code_of, say, untrusted, words_of
 from rtshcua.cli.flight import Flight
@@ -253,7 +253,7 @@ class _Begun(NamedTuple):
     bundle: bytes
     loaded: Loaded
     trust: Trusted
-    key: tuple[SigningKey | None, Refused | None]
+    key: tuple[SigningKey | Elsewhere | None, Refused | None]
     apart: Apart | None
     absent: Refused | OSError | None
     transport: Transport | None = None
@@ -269,10 +269,11 @@ def _begin(
     """
     apart: Apart | None = None
     absent: Refused | OSError | None = None
-    key = _boundary_key(order, trust.root, loaded, clock)
-    _expect_all(key[1], resumed=not order.dry_run)
+    own_key, keyless = _boundary_key(order, trust.root, loaded, clock)
+    _expect_all(keyless, resumed=not order.dry_run)
+    key: tuple[SigningKey | Elsewhere | None, Refused | None] = (own_key, keyless)
     try:
-        apart = _apart(order, loaded, trust, key[0], log_key, owed, stack)
+        apart = _apart(order, loaded, trust, own_key, log_key, owed, stack)
         if order.wait_s is None:
             loaded = _taken_over(apart, loaded, bundle, clock)
         elif apart is not None:  # it draws the id of the flight that the sockets tell of
@@ -283,6 +284,8 @@ def _begin(
         apart, absent = None, error
     if apart is not None:
         log_key.hand_over(apart.sign_log)
+        key = (None if own_key is None else Elsewhere(), keyless)
+        del own_key  # the boundary has it: it is not held here
     if order.wait_s is None:
         begun = _Begun(bundle, loaded, trust, key, apart, absent)
     else:
@@ -290,7 +293,8 @@ def _begin(
         (bundle, loaded), waited = _wait(
             order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents, apart, absent
         )
-        key = key if waited is trust else _boundary_key(order, waited.root, loaded, clock)
+        if waited is not trust and not isinstance(loaded.executor, IsolatedExecutor):
+            key = _boundary_key(order, waited.root, loaded, clock)
         begun = _Begun(bundle, loaded, waited, key, apart, absent, transport, agents)
     if isinstance(begun.loaded.preparation, PreparationIssuer):  # the one elsewhere was told when it began
         begun.loaded.preparation.owes(owed)

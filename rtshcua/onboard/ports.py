@@ -283,11 +283,11 @@ Action = Dispatch | Release | Append | Announce | Expect | Reply | End
 
 
 class BoundaryKey(NamedTuple):
-    """What a boundary signs its evidence with, the number of its session (0: it does not know), and the digest that it
-    kept of the one before; 32 zero octets where there was none.
+    """What a boundary signs its evidence with (None: it has that itself), the number of its session (0: it does not
+    know), and the digest that it kept of the one before; 32 zero octets where there was none.
     """
 
-    key: SigningKey
+    key: SigningKey | None
     session: int
     before: bytes
 

@@ -8,6 +8,7 @@ from hashlib import sha256
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire import boundary_chain
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
+from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.statement import Statement, sign
 
 
@@ -20,6 +21,7 @@ class Attestation:
         self._bundle = sha256(bundle).digest()
         self._enforced = enforced
         self._key: BoundaryKey | None = None
+        self._signs: SigningKey | None = None
 
     @property
     def digest(self) -> bytes:
@@ -32,9 +34,9 @@ class Attestation:
         """
         if self._key is not None:
             raise RuntimeError("the boundary's session has begun already")
-        if key is None:
+        if key is None or key.key is None:
             return None
-        self._key = key
+        self._key, self._signs = key, key.key
         payload = boundary_chain.begin(key.session, key.before, self._flight, self._bundle, enforced=self._enforced)
         self._chain.add(Tag.BEGIN, payload)
         return key.session
@@ -44,11 +46,11 @@ class Attestation:
         leaves that moves the vehicle: else an end could be signed before the end.
         """
         key, chain = self._key, self._chain
-        if key is None or chain.over:
+        if key is None or self._signs is None or chain.over:
             return None
         chain.over = final
         said = Statement(
             self._flight, key.session, key.before, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
             chain.repeated, chain.declined, chain.stopped, chain.aside, final,
         )  # fmt: skip
-        return sign(said, key.key)
+        return sign(said, self._signs)

@@ -9,7 +9,7 @@ from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli import app
-from rtshcua.cli.attesting import BoundarySession, boundary_key
+from rtshcua.cli.attesting import BoundarySession, Elsewhere, boundary_key
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.boundary_chain import START
@@ -84,6 +84,13 @@ def test_a_state_folder_that_was_put_back_shows_where_the_boundary_counts_itself
     same = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
     same.begun(b"c" * 32, 9)
     assert not same.note
+
+
+def test_a_key_that_the_boundary_has_is_not_held_here(tmp_path: Path) -> None:
+    session = BoundarySession(BoundaryStore(tmp_path, "quad-07"), Elsewhere(), aloft=False)
+    assert session.key == (None, 1, START)
+    session.begun(b"a" * 32, 1)
+    assert BoundaryStore(tmp_path, "quad-07").kept() == (1, b"a" * 32)
 
 
 def test_nothing_flies_where_a_session_was_to_begin_and_did_not(tmp_path: Path) -> None:

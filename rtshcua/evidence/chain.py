@@ -60,10 +60,14 @@ class Recorder:
     32 secret random bytes. The caller's clock never goes back from call to call, its UTC and monotonic time go on
     alike, and its integers stay within 2**53 - 1: a verifier refuses a log where they do not.
 
-    `attest` signs for the boundary: its statement stands before each seal and before the close.
+    `attest` signs for the boundary: its statement stands before each seal and before the close, or once that it is
+    `lost`, in words, where it is.
     """
 
-    __slots__ = ("_certify", "_draw", "_head", "_key", "_mode", "_origin", "_public", "_signed_us", "attest")
+    __slots__ = (
+        "_certify", "_draw", "_head", "_key", "_mode", "_origin", "_public", "_signed_us", "attest", "lost",
+        "told_loss",
+    )  # fmt: skip
 
     def __init__(self, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]) -> None:
         self._certify: Callable[[bytes], bytes] | None = certify
@@ -74,6 +78,9 @@ class Recorder:
         self._origin = self._mode = ""
         self._signed_us = 0  # monotonic time of the last signed record
         self.attest: Attest = nobody
+        self.lost: Callable[[], str | None] = lambda: None
+        #: whether it was recorded that the boundary is lost: nothing that it makes is recorded after that
+        self.told_loss = False
 
     @classmethod
     def resumed(
@@ -233,8 +240,16 @@ class Recorder:
         """The line of what the boundary signs now; none where it signs nothing."""
         statement = self.attest(final=final)
         if statement is None:
-            return ()
+            return self.loss(now)
         return (self.effect(now, BOUNDARY, detail=b64encode(statement).decode()),)
+
+    def loss(self, now: Now) -> tuple[bytes, ...]:
+        """The line that says that the boundary is lost, once it is; the first time alone."""
+        lost = None if self.told_loss else self.lost()
+        if lost is None:
+            return ()
+        self.told_loss = True
+        return (self.effect(now, BOUNDARY_LOST, detail=lost),)
 
     def sealing(self, now: Now) -> tuple[bytes, ...]:
         """The lines that end an epoch: what the boundary signs, and the seal."""

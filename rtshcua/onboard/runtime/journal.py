@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Final
 
-from rtshcua.evidence.chain import BOUNDARY_LOST, Recorder
+from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Action, Append, Boundary, Dispatch
+from rtshcua.onboard.ports import Action, Append, Dispatch
 from rtshcua.wire.request import NOTHING, Ref
 
 #: how often a note of the same text leaves a record, in us: those between are counted
@@ -33,11 +33,9 @@ class Journal:
     should have been sealed long ago is sealed before anything else is recorded.
     """
 
-    def __init__(self, recorder: Recorder, boundary: Boundary | None = None) -> None:
+    def __init__(self, recorder: Recorder) -> None:
         self.recorder = recorder
-        self._boundary = boundary
-        #: whether it was recorded that the boundary is lost: nothing that it makes is recorded after that
-        self.told_loss = False
+        self._alone = False  # the boundary is lost, which is recorded, or will be before anything else
         self._entries: list[Action | Telling] = []
         self._first: Action | None = None  # of what is done, and not only told
         self._noted: dict[str, int] = {}  # when a text was last recorded as a note,
@@ -75,11 +73,16 @@ class Journal:
 
     def look_at_boundary(self, now: Now) -> bool:
         """Record that the boundary is lost, once, and before what follows from that; whether it is."""
-        lost = None if self._boundary is None or self.told_loss else self._boundary.lost
-        if lost is not None:
-            self.told_loss = True
-            self.effect(now, BOUNDARY_LOST, detail=lost)
-        return self.told_loss
+        if not self._alone and self.recorder.lost() is not None:
+            self._alone = True
+            self._entries.append(partial(self._told_loss, now))
+        return self._alone
+
+    def _told_loss(self, now: Now) -> Iterable[Action]:
+        if self.recorder.overdue(now):
+            yield from self._seal(now)
+        for line in self.recorder.loss(now):  # unless a seal told of it
+            yield Append(line, WRITTEN, awaited=False)
 
     def _effect(self, now: Now, event: str, ref: Ref, token: int, detail: Detail) -> bytes:
         return self.recorder.effect(now, event, ref, token=token, detail=said(detail))

@@ -45,7 +45,8 @@ class Runtime:
     def __init__(
         self, loaded: Loaded, recorder: Recorder, *, limits: Limits | None = None, resumed: bool = False
     ) -> None:
-        self._journal = Journal(recorder, loaded.boundary)
+        recorder.lost = lambda: loaded.boundary.lost
+        self._journal = Journal(recorder)
         self._controller = MissionController(loaded, self._journal, limits or Limits(), resumed=resumed)
         self._handler = EventHandler(self._controller, self._journal, loaded.boundary)
 

@@ -104,3 +104,22 @@ def test_records_of_a_reflex_are_made_when_they_are_taken_and_not_before(journal
     assert journal.recorder.count == before
     journal.take(at(1), ended=False)
     assert journal.recorder.count == before + 1
+
+
+def test_a_seal_at_which_the_boundary_is_found_lost_comes_behind_the_record_of_that(journal: Journal) -> None:
+    """Else an epoch would end without its statement, and nothing would say why."""
+    lost: list[str] = []
+    journal.recorder.attest = lambda **_: None
+    journal.recorder.lost = lambda: lost[0] if lost else None
+    lost.append("it is gone")
+    assert [kind for kind, _ in told(journal, EPOCH_US)] == ["boundary-lost", "seal"]
+    assert journal.look_at_boundary(at(EPOCH_US + 1))
+    journal.effect(at(EPOCH_US + 1), "link-back")
+    assert [kind for kind, _ in told(journal, EPOCH_US + 1)] == ["link-back"], "it is told once"
+
+
+def test_a_seal_that_is_late_does_not_hide_that_the_boundary_was_lost_before(journal: Journal) -> None:
+    late = EPOCH_US + EPOCH_US // 5
+    journal.recorder.lost = lambda: "it is gone"
+    journal.effect(at(late), "dispatched")
+    assert [kind for kind, _ in told(journal, late)] == ["boundary-lost", "seal", "dispatched"]

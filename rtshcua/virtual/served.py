@@ -1,7 +1,7 @@
 """A boundary that answers calls in this process and in virtual time, as one of a process of its own does: it may die.
 
 It stands where `boundary/home/process.c` stands, and answers what `boundary/enforcement/calls.h` lists by the boundary
-in Python; without the link's key, for nothing is signed here.
+in Python. It has neither the link's key nor the log's: no frame is signed here, and no log begun (LOG is `malformed`).
 """
 
 from collections.abc import Mapping
@@ -57,7 +57,7 @@ class Served:
         if self.dead:
             raise ConnectionResetError
         try:
-            answer = self._answer(octets[0], octets[1:])
+            answer = self._answer(octets[0], octets[1:]) if octets else _MALFORMED
         except struct_error:
             answer = _MALFORMED
         return _REFUSED + answer.slug.encode() if isinstance(answer, Refusal) else _FINE + answer
@@ -73,6 +73,8 @@ class Served:
                 return bytes(1)
             case calls.SEAL:
                 return self.gate.seal(rest[_TIME.size :], *_TIME.unpack_from(rest))
+            case calls.FLIGHT:
+                return bytes(FLIGHT_BYTES)
             case calls.STANDS:
                 return bytes([self.gate.stands(*_TIME.unpack(rest))])
         return _NOT_LOADED if self._loaded is None else self._answer_of(self._loaded, kind, rest)

@@ -36,6 +36,7 @@ def test_a_flight_by_calls_is_the_one_without(flavour: str) -> None:
 
 def test_nonsense_is_answered() -> None:
     served, of = Served(ROOT, VEHICLE), Random(7)
+    assert served(b"") == b"\1malformed"
     for _ in range(2_000):
         assert served(of.randbytes(of.randrange(1, 60)))[0] in (0, 1)
     served(bytes([calls.PART, calls.LOAD]) + bytes(4) + b"no bundle")

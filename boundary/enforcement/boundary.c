@@ -187,8 +187,12 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
     return NULL;
 }
 
+bool rt_may_fly(const rt_boundary *boundary) {
+    return boundary->loaded && (boundary->opened || boundary->executor.used_count > 0);
+}
+
 bool rt_give_back(rt_boundary *boundary) {
-    if (!boundary->loaded || boundary->opened || boundary->executor.used_count > 0) return false;
+    if (!boundary->loaded || rt_may_fly(boundary)) return false;
     rt_forget_mission(boundary->kept, boundary->session.in_force.missions[0]);
     boundary->loaded = false;
     return true;

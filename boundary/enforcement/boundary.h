@@ -73,6 +73,9 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
 /* Take in the document that was handed over; its receipt goes into `out`, of 256 octets; how many there are. */
 uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, uint8_t *out);
 
+/* Whether something may fly: of what is in force something was sent, now or by a boundary before this one. */
+bool rt_may_fly(const rt_boundary *boundary);
+
 /* Of what is in force nothing was sent: its mission may be opened again. False where it was used, or nothing is in force. */
 bool rt_give_back(rt_boundary *boundary);
 

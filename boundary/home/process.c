@@ -267,6 +267,7 @@ int main(int count, char **words) {
     static uint8_t root[1 << 20];
     options given;
     uint32_t measures = 0;
+    const int runtime = getppid();
     if (!read_options(count, words, &given))
         return USAGE;
     rt_keys *keys = rt_key_memory(sizeof *keys, &measures);
@@ -310,6 +311,7 @@ int main(int count, char **words) {
     if (!greet(given.socket, measures, given.link_key >= 0 ? keys->link : NULL))
         return IO;
     int64_t kept_us = own_time_us(CLOCK_MONOTONIC);
+    bool flies = false;
     for (;;) {
         ssize_t size = recv(given.socket, call, sizeof call, 0);
         if (size < 0 && errno == EINTR)
@@ -330,6 +332,11 @@ int main(int count, char **words) {
                 answered = rt_take_back(&boundary, result);
             boundary.to_keep = false;
             kept_us = now_us;
+        }
+        if (!flies && rt_may_fly(&boundary)) {
+            flies = true; /* nothing is to be given back any more, and a restart must not find the vehicle held by us */
+            if (!rt_end_with(runtime))
+                return IO;
         }
         if (send(given.socket, result, answered, 0) != (ssize_t)answered)
             return IO;

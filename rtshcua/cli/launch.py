@@ -265,7 +265,8 @@ def _begin(
     owed: Mapping[str, Owed], clock: LinkClock, interrupts: Interrupts, slack: int, stack: ExitStack,
 ) -> _Begun:  # fmt: skip
     """The boundary begins, until the stack is closed, and takes the bundle, or one that is waited for. Where it does
-    not, and a vehicle may hang in the air, it is the one in this process. Raises `Refused` and OSError.
+    not, and a vehicle may hang in the air, it is the one in this process; also where the boundary of a run that is gone
+    still holds the vehicle. Raises `Refused` and OSError.
     """
     apart: Apart | None = None
     absent: Refused | OSError | None = None
@@ -279,7 +280,7 @@ def _begin(
         elif apart is not None:  # it draws the id of the flight that the sockets tell of
             loaded = apart.waiting(_load(order, bundle, trust.root, clock.now(), apart.flight()))
     except (Refused, OSError) as error:
-        if (isinstance(error, Refused) and error.slug == IN_USE) or not _may_hang(order, loaded, past):
+        if not _may_hang(order, loaded, past) or (_is_in_use(error) and not _broke_off(past)):
             raise
         apart, absent = None, error
     if apart is not None:
@@ -303,9 +304,16 @@ def _begin(
 
 def _may_hang(order: Launch, loaded: Loaded, past: Past | None) -> bool:
     """Whether a flight of this vehicle may have broken off in the air, which a restart brings down."""
-    if order.wait_s is not None:
-        return past is not None and past.broken_off is not None
-    return _may_have_flown(order, loaded)
+    return _broke_off(past) if order.wait_s is not None else _may_have_flown(order, loaded)
+
+
+def _broke_off(past: Past | None) -> bool:
+    """Whether the run before ended without the end of its log: one that goes on holds that, and did not."""
+    return past is not None and past.broken_off is not None
+
+
+def _is_in_use(error: Refused | OSError) -> bool:
+    return isinstance(error, Refused) and error.slug == IN_USE
 
 
 def _apart(

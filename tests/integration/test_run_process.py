@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +84,63 @@ def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground:
     third = ground.run(ground.bundle(name="another"), *words, speed=SPEED).end()
     assert third.code == 3, third.stderr
     assert third.events[-1]["slug"] == "boundary-damaged"
+
+
+def halted_in_flight(ground: Any, port: int, *also: str) -> tuple[str, tuple[str, ...], int]:
+    """A boundary that hangs while its flight's runtime is killed: the bundle, the words of the run, and its process."""
+    ground.vehicle(port, SPEED)
+    words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--mode", "process", *also)
+    bundle = ground.bundle()
+    first = ground.run(bundle, *words, speed=SPEED)
+    first.until("dispatched", step=1)
+    boundary = first.child("rtshcua-boundary")
+    os.kill(boundary, signal.SIGSTOP)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    return bundle, words, boundary
+
+
+def modes(ground: Any) -> list[str]:
+    """Who decided in each run, as its log says."""
+    folders = (ground.folder / "runs").iterdir()
+    return sorted(json.loads((run / "log.jsonl").read_bytes().splitlines()[0])["mode"] for run in folders)
+
+
+def test_a_boundary_that_hangs_ends_with_its_runtime(ground: Any, port: int) -> None:
+    """It would keep the restart from its file, and the vehicle in the air."""
+    bundle, words, boundary = halted_in_flight(ground, port, *AS)
+    try:
+        second = ground.run(bundle, *words, speed=SPEED).end()
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(boundary, signal.SIGKILL)
+    assert second.code == 6, second.stderr
+    assert modes(ground) == ["process", "process"]
+
+
+def test_what_is_in_the_air_comes_down_where_another_holds_the_boundarys_file(ground: Any, port: int) -> None:
+    """Whoever holds it is no run: the one before broke off, and nobody holds its log."""
+    ground.vehicle(port, SPEED)
+    words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--mode", "process")
+    bundle = ground.bundle()
+    first = ground.run(bundle, *words, speed=SPEED)
+    first.until("dispatched", step=1)
+    beside = ground.run(bundle, *words, speed=SPEED).end()
+    assert (beside.code, beside.events[-1]["slug"]) == (5, "boundary-in-use"), "a run that goes on has the vehicle"
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    (kept,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("boundary/vehicle-quad-07.kept")
+    let_go(kept)
+    held = lock(kept)
+    try:
+        second = ground.run(bundle, *words, speed=SPEED).end()
+        assert second.code == 6, second.stderr
+        assert any("another run's boundary holds" in event.get("text", "") for event in second.events)
+        assert modes(ground) == ["process", "software"]
+        third = ground.run(ground.bundle(name="another"), *words, speed=SPEED).end()
+        assert (third.code, third.events[-1]["slug"]) == (5, "boundary-in-use"), "nothing new flies"
+    finally:
+        os.close(held)
 
 
 FLIGHTS = [("px4", True), ("ardupilot", True), ("px4", False)]

@@ -54,8 +54,6 @@ app = typer.Typer(add_completion=False)
 
 _HEARTBEAT_S = 10.0
 _POLL_US = 50_000
-#: a user that is not root; which one makes no difference to what is asked
-_SOMEBODY = 65_534
 _EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
 
 
@@ -139,13 +137,13 @@ def doctor(
 
 def _boundary() -> list[VehicleFinding]:
     """Where a run on this machine decides, and which measures that keep others out of a process of its own it would be
-    without. As root that is asked as another user, as whom `--boundary-user` has it run.
+    without.
     """
     slug = "boundary/process"
     if program() is None:
         return [VehicleFinding(slug, MissionVerdict.WARN, UNBUILT, "a process of its own", UNBUILT_HELP)]
     try:
-        here = measures_here((_SOMEBODY, _SOMEBODY) if os.geteuid() == 0 else None)
+        here = measures_here(None)
     except BoundaryError as error:
         return [VehicleFinding(slug, MissionVerdict.WARN, str(error), "a process of its own", error.help)]
     found = [VehicleFinding(slug, MissionVerdict.OK, "a run decides in a process of its own (`run --mode process`)")]

@@ -385,7 +385,7 @@ class Flight:
             unconfirmed=tuple(self._teller.unconfirmed),
             folder=str(self._run.path),
             log=log,
-            next=f"rtshcua verify-log {shlex.quote(log)}",
+            next=f"rtshcua verify-log {'--audit ' if self._loaded.boundary.lost else ''}{shlex.quote(log)}",
         )
 
 

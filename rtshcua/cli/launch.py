@@ -2,8 +2,8 @@
 
 import gc
 import secrets
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import gettempdir
@@ -159,6 +159,7 @@ def launch(order: Launch) -> ExitCode:
             debts = OwedParameters(order.state, loaded.vehicle, sets=sets)
             stack.callback(debts.close)
             slack = max(1, round(order.speed / _UNHURRIED))
+            stack.enter_context(_with_the_one_before(past, loaded))
             begun = _begin(order, bundle, loaded, trust, log_key, past, debts.left, clock, interrupts, slack, stack)
             bundle, loaded, trust, (own_key, keyless), apart, absent, transport, agents = begun
             root, signed_root = trust.root, trust.signed
@@ -225,7 +226,8 @@ def launch(order: Launch) -> ExitCode:
             unsure = [UTC_NOTE] if utc.waits else []
             unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
             alone = "" if absent is None else f"{_why(absent)}; it is brought down without a boundary of its own"
-            told_before = filter(None, [alone, told, elsewhere, past.note, unsigned, inside.note])
+            hangs = "" if resumed else _hanging(past, loaded)
+            told_before = filter(None, [alone, hangs, told, elsewhere, past.note, unsigned, inside.note])
             for note in (*signing.notes, *told_before, *unsure):
                 feed.post(Note(note))
             gc.collect()
@@ -258,6 +260,24 @@ class _Begun(NamedTuple):
     absent: Refused | OSError | None
     transport: Transport | None = None
     agents: Agents | None = None
+
+
+def _hanging(past: Past | None, loaded: Loaded) -> str:
+    """What brings down what the flight before may have left in the air; nothing where it ended."""
+    if past is None or past.broken_off is None:
+        return ""
+    way = f"`rtshcua run {past.broken_off / BUNDLE}` brings down what hangs in the air"
+    return f"the flight of `{loaded.vehicle}` before broke off: {way}"
+
+
+@contextmanager
+def _with_the_one_before(past: Past | None, loaded: Loaded) -> Iterator[None]:
+    """Whoever learns that nothing begins learns what may be in the air meanwhile."""
+    try:
+        yield
+    except Refused as refused:
+        refused.help = "; ".join(filter(None, (refused.help, _hanging(past, loaded)))) or None
+        raise
 
 
 def _begin(

@@ -160,8 +160,7 @@ def qualify(
         return plan.finish(ended, as_json=as_json)
     except Refused as refused:
         if as_json:
-            said = {"event": "refused", "slug": refused.slug, "text": str(refused), "exit_code": int(refused.code)}
-            out_json(msgspec.json.encode(said).decode())
+            out_json(msgspec.json.encode(refused.event()).decode())
         return (tell if as_json else fail)(refused.code, str(refused), refused.help)
 
 

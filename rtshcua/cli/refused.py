@@ -11,3 +11,8 @@ class Refused(Exception):
         self.code = code
         self.slug = slug
         self.help = help
+
+    def event(self) -> dict[str, object]:
+        """The event that says so with `--json`."""
+        said = {"event": "refused", "slug": self.slug, "text": str(self), "exit_code": int(self.code)}
+        return said if self.help is None else said | {"help": self.help}

@@ -284,6 +284,5 @@ def _style(*, plain: bool, as_json: bool) -> str:
 def _say(refused: Refused, *, as_json: bool) -> ExitCode:
     """A flight that never began: for a person, and with `--json` for a program too."""
     if as_json:
-        said = {"event": "refused", "slug": refused.slug, "text": str(refused), "exit_code": int(refused.code)}
-        out_json(msgspec.json.encode(said).decode())
+        out_json(msgspec.json.encode(refused.event()).decode())
     return (tell if as_json else fail)(refused.code, str(refused), refused.help)

@@ -74,6 +74,10 @@ def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground:
     let_go(kept)
     kept.write_bytes(bytes(kept.stat().st_size))
 
+    other_bundle = ground.bundle(name="another")
+    refused = ground.run(other_bundle, *words, speed=SPEED).end()
+    assert refused.code == 3, refused.stderr
+    assert f"run {killed / 'mission.bundle'}` brings down" in refused.events[-1]["help"]
     second = ground.run(bundle, *words, speed=SPEED).end()
     assert second.code == 6, second.stderr
     (told,) = [event["text"] for event in second.events if "is damaged" in event.get("text", "")]
@@ -81,9 +85,10 @@ def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground:
     (other,) = set((ground.folder / "runs").iterdir()) - {killed}
     modes = [json.loads((run / "log.jsonl").read_bytes().splitlines()[0])["mode"] for run in (killed, other)]
     assert modes == ["process", "software"], "who decided stands in the log"
-    third = ground.run(ground.bundle(name="another"), *words, speed=SPEED).end()
+    third = ground.run(other_bundle, *words, speed=SPEED).end()
     assert third.code == 3, third.stderr
     assert third.events[-1]["slug"] == "boundary-damaged"
+    assert "broke off" not in third.events[-1]["help"]
 
 
 def halted_in_flight(ground: Any, port: int, *also: str) -> tuple[str, tuple[str, ...], int]:
@@ -180,6 +185,7 @@ def test_a_boundary_that_is_killed_in_flight(flavour: str, signed: bool, ground:
     kill_boundary(run)
     run.end()
     assert run.code == 6, run.stderr
+    assert "verify-log --audit" in run.events[-1]["next"]
     records = run.log()
     (lost,) = [record for record in records if record.get("event") == "boundary-lost"]
     after = records[lost["seq"] :]

@@ -60,7 +60,8 @@ static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, u
     rt_heard heard = RT_ACCEPTED;
     if (gate->signs) {
         heard = rt_accept_frame(&gate->signer, frame, now_us);
-        if (heard == RT_ACCEPTED && frame.size <= sizeof bare && frame.size == RT_HEADER + (uint32_t)frame.at[1] + RT_CHECKSUM + RT_SIGNATURE) {
+        const bool whole = frame.size == RT_HEADER + (uint32_t)frame.at[1] + RT_CHECKSUM + RT_SIGNATURE;
+        if (heard == RT_ACCEPTED && frame.size <= sizeof bare && whole) {
             memcpy(bare, frame.at, frame.size);
             rt_set_flags(bare, 0);
             frame = (rt_bytes){bare, frame.size - RT_SIGNATURE};

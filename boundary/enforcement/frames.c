@@ -189,14 +189,14 @@ static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, r
 rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes frame, int64_t now_us, uint8_t *out) {
     uint8_t octets[RT_LARGEST_FRAME] = {0};
     rt_refusal refused = refuse_ahead(gate, command, frame);
-    if (refused != NULL) {
-        rt_chain_stop(gate->chain, frame);
+    if (refused != NULL)
         return refused;
-    }
     const uint32_t whole = (uint32_t)rt_min(frame.size, RT_LARGEST_FRAME - RT_SIGNATURE); /* which no frame exceeds */
     if (gate->signs) {
         memcpy(octets, frame.at, whole);
         uint32_t size = rt_sign_ahead(&gate->signer, octets, whole, now_us);
+        if (size == 0)
+            return "frame/too-many-ahead";
         memcpy(out, octets + size - RT_SIGNATURE, RT_SIGNATURE);
     }
     return NULL;

@@ -7,6 +7,7 @@
 #define SECOND 100000LL
 #define LAST ((1LL << 48) - 366LL * 24 * 60 * MINUTE) /* what claims the last year of the 48 bits is believed no more */
 #define LEADS_EVERY_US 1000000LL /* who is given what is signed ahead makes time run this much faster at most: RT_LEAD in a second */
+#define MOST_AHEAD SECOND /* how far what is signed ahead may reach above RT_LEAD, in timestamps: a batch needs some hundreds */
 #define STAMP 6
 #define TAG 6
 
@@ -71,8 +72,10 @@ uint32_t rt_sign_frame(rt_signed_link *link, uint8_t *frame, uint32_t size, int6
 }
 
 uint32_t rt_sign_ahead(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t now_us) {
+    const int64_t begins = local_time(link, now_us) + RT_LEAD;
+    if (link->promised >= begins + MOST_AHEAD)
+        return 0;
     if (link->promised == 0 || now_us - link->promised_us >= LEADS_EVERY_US) {
-        int64_t begins = local_time(link, now_us) + RT_LEAD;
         if (begins > link->promised)
             link->promised = begins;
         link->promised_us = now_us;

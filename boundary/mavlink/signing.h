@@ -40,7 +40,8 @@ void rt_signed_link_begin(rt_signed_link *link, const uint8_t key[RT_KEY_BYTES],
 uint32_t rt_sign_frame(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t now_us);
 
 /* The same for a frame that is to be sent only when nothing more is signed: its timestamp is above all that were promised before,
-   and about RT_LEAD above what is signed now. Whatever leaves once that time has come voids it. */
+   and RT_LEAD to RT_LEAD + 1 s above what is signed now. Whatever leaves once that time has come voids it. 0 where too many were
+   signed so. */
 uint32_t rt_sign_ahead(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t now_us);
 
 /* The timestamp above which nothing was signed: what is kept. */

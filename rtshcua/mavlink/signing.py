@@ -26,6 +26,8 @@ _SECOND: Final = 100_000
 LEAD: Final = 3_000_000
 #: It begins anew no more often than this, in us: who is given it makes time run no faster than `LEAD` in a second.
 _LEADS_EVERY_US: Final = 1_000_000
+#: How far it may reach above `LEAD`, in timestamps: one each frame. A batch needs some hundreds.
+MOST_AHEAD: Final = _SECOND
 #: as many as the C library keeps (MAVLINK_MAX_SIGNING_STREAMS)
 MOST_STREAMS: Final = 16
 #: Timestamps have 48 bits, until 2104; what claims the last year is believed no more, so that ours never run out.
@@ -113,13 +115,16 @@ class SignedLink:
         self._ahead = max(self._ahead + 1, self._clock(now_us))
         return self._signed_at(frame, self._ahead)
 
-    def sign_ahead(self, frame: bytes, now_us: int) -> bytes:
+    def sign_ahead(self, frame: bytes, now_us: int) -> bytes | None:
         """The same for a frame that is to be sent only when nothing more is signed: its timestamp is above all that
-        were promised before, and about `LEAD` above what is signed now. Whatever leaves once that time has come
-        voids it.
+        were promised before, and `LEAD` to `LEAD + MOST_AHEAD` above what is signed now. Whatever leaves once that time
+        has come voids it. None where too many were signed so.
         """
+        begins = max(self._ahead, self._clock(now_us)) + LEAD
+        if self._promised >= begins + MOST_AHEAD:
+            return None
         if not self._promised or now_us - self._promised_us >= _LEADS_EVERY_US:
-            self._promised = max(self._promised, max(self._ahead, self._clock(now_us)) + LEAD)
+            self._promised = max(self._promised, begins)
             self._promised_us = now_us
             self.on_news()
         self._promised += 1

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import unsigned
-from rtshcua.mavlink.signing import EPOCH_US, MINUTE, SignedLink, State
+from rtshcua.mavlink.signing import EPOCH_US, MINUTE, MOST_AHEAD, SignedLink, State
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import SHIFT, Projection, unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -216,6 +216,7 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
             buffer = ctypes.create_string_buffer(frame, 300)
             sign = boundary.rt_test_link_sign_ahead if ahead else boundary.rt_test_link_sign
             size = sign(buffer, len(frame), ctypes.c_int64(now_us))
+            assert signed is not None
             assert buffer.raw[:size] == signed
             assert unsigned(signed) == frame
             seen.append(signed)
@@ -237,6 +238,22 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
             believed += accepted
         assert boundary.rt_test_link_signed_up_to() == here.state.timestamp
     return believed
+
+
+def test_both_refuse_a_flood_of_frames_to_sign_ahead_at_the_same_frame(boundary: ctypes.CDLL) -> None:
+    here = SignedLink(bytes(32), State(0, {}), EPOCH_US, 0)
+    boundary.rt_test_link_begin(
+        bytes(32), ctypes.c_int64(0), (ctypes.c_int64 * 1)(), 0, ctypes.c_int64(EPOCH_US), ctypes.c_int64(0), 0
+    )
+    frame = pack(long(512, 148))
+    answers = []
+    for now_us in [0] * (MOST_AHEAD + 2) + [500] * 60:
+        signed = here.sign_ahead(frame, now_us)
+        buffer = ctypes.create_string_buffer(frame, 300)
+        size = boundary.rt_test_link_sign_ahead(buffer, len(frame), ctypes.c_int64(now_us))
+        assert (buffer.raw[:size] or None) == signed
+        answers.append(signed is None)
+    assert answers == [False] * MOST_AHEAD + [True] * 2 + [False] * 50 + [True] * 10
 
 
 @pytest.mark.parametrize("compare", [compare_gates, compare_links])

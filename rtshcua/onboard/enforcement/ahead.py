@@ -80,6 +80,7 @@ class FramesAhead:
         self._standing: tuple[bytes, int] | None = None  # the permit of the step, and its number
         self._links: list[_Link] = []
         self._due_us = 0
+        self._tried_us = 0  # when it was last tried to sign
         self._begins = False  # nothing was signed yet of what stands behind the step
         self._latest = 0  # timestamp of what was signed last for now
         self._next = 0  # the first link that may be begun,
@@ -113,9 +114,10 @@ class FramesAhead:
         """
         if self._standing is None or (begins and not self._begins):
             return ()
-        if now_us < self._due_us and not self._is_short():
+        is_short = self._is_short() and now_us >= self._tried_us + _AGAIN_US
+        if now_us < self._due_us and not is_short:
             return ()
-        self._begins = False
+        self._begins, self._tried_us = False, now_us
         sealed, step = self._standing
         links: list[_Link] = []
         notes: list[str] = []
@@ -126,6 +128,9 @@ class FramesAhead:
             frames = encode(command)
             if not frames:
                 notes.append(f"`{command.skill}` cannot be signed ahead: how it is flown is not known")
+                continue
+            if len(frames) > MOST:
+                notes.append(f"`{command.skill}` cannot be signed ahead: {len(frames)} frames, {MOST} at most")
                 continue
             if (kind, number) == of_step[-1]:
                 frames = [*frames] * min(LAST, MOST // len(frames))

@@ -65,6 +65,7 @@ NOT_COVERED: Final = Refusal("frame/not-covered", "it is no part of the command 
 OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "it is to a point of the path before its turn")
 #: not sent, and nothing failed by that
 UNSIGNED: Final = Refusal("frame/unsigned", "it moves nothing, and nobody is there any more to sign it")
+TOO_MANY_AHEAD: Final = Refusal("frame/too-many-ahead", "more frames were signed ahead than any link needs")
 LATE: Final = Refusal("frame/late", "it is the command's first frame, after its permit's time")
 
 
@@ -75,8 +76,8 @@ class Signer(Protocol):
         """The signed frame for an unsigned one. `now_us` is monotonic."""
         ...
 
-    def sign_ahead(self, frame: bytes, now_us: int) -> bytes:
-        """The same, for a frame that is sent only when nothing more is signed."""
+    def sign_ahead(self, frame: bytes, now_us: int) -> bytes | None:
+        """The same, for a frame that is sent only when nothing more is signed; None where there are too many."""
         ...
 
 
@@ -217,9 +218,11 @@ class FrameSession:
         """
         refused = self._refuse_ahead(frame, command)
         if refused is not None:
-            self.chain.stop(frame)
             return refused
-        return b"" if self._signer is None else self._signer.sign_ahead(frame, now_us)[-SIGNATURE:]
+        if self._signer is None:
+            return b""
+        signed = self._signer.sign_ahead(frame, now_us)
+        return TOO_MANY_AHEAD if signed is None else signed[-SIGNATURE:]
 
     def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
         """Why a frame does not leave, or else whether it carries out a command."""

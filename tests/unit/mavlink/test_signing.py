@@ -11,7 +11,16 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import signing, tlog
 from rtshcua.mavlink.framing import FLAG_SIGNED, checksum, unsigned, with_flags
-from rtshcua.mavlink.signing import EPOCH_US, LEAD, MINUTE, MOST_STREAMS, SignedLink, State, stream_of, timestamp_of
+from rtshcua.mavlink.signing import (
+    EPOCH_US,
+    LEAD,
+    MINUTE,
+    MOST_STREAMS,
+    SignedLink,
+    State,
+    stream_of,
+    timestamp_of,
+)  # fmt: skip
 
 KEY = bytes(range(32))
 UTC = EPOCH_US + 11 * 366 * 86_400_000_000
@@ -283,6 +292,12 @@ def stamp(signed: bytes) -> int:
     return int.from_bytes(signed[-12:-6], "little")
 
 
+def signed_ahead(ours: SignedLink, octets: bytes, now_us: int) -> bytes:
+    signed = ours.sign_ahead(octets, now_us)
+    assert signed is not None
+    return signed
+
+
 def vehicle() -> SignedLink:
     """An autopilot with the C library, which has heard us."""
     return SignedLink(KEY, NEW, UTC, 0, as_library=True)
@@ -290,7 +305,7 @@ def vehicle() -> SignedLink:
 
 def test_what_is_signed_ahead_is_above_all_that_is_signed_for_a_while() -> None:
     ours = link()
-    ahead = [ours.sign_ahead(frame(mode), 0) for mode in range(3)]
+    ahead = [signed_ahead(ours, frame(mode), 0) for mode in range(3)]
     assert [stamp(each) - timestamp_of(UTC) for each in ahead] == [LEAD + 1, LEAD + 2, LEAD + 3]
     assert stamp(ours.sign(frame(), 20_000_000)) < stamp(ahead[0]) < stamp(ours.sign(frame(), 31_000_000))
 
@@ -298,7 +313,7 @@ def test_what_is_signed_ahead_is_above_all_that_is_signed_for_a_while() -> None:
 def test_a_vehicle_takes_it_once_nothing_more_is_signed_however_late() -> None:
     """The last frame that was signed, then what was signed ahead, minutes later, in its order; none of it twice."""
     ours, autopilot = link(), vehicle()
-    ahead = [ours.sign_ahead(frame(mode), 0) for mode in range(3)]
+    ahead = [signed_ahead(ours, frame(mode), 0) for mode in range(3)]
     assert autopilot.accept(ours.sign(frame(), 20_000_000), 20_000_000)
     late = 600_000_000
     assert [autopilot.accept(each, late) for each in (ahead[0], ahead[2], ahead[1], ahead[2])] == [
@@ -309,8 +324,8 @@ def test_a_vehicle_takes_it_once_nothing_more_is_signed_however_late() -> None:
 def test_what_is_signed_later_voids_it() -> None:
     """Who holds it back while the flight goes on holds nothing soon: not for the next step, nor for the next flight."""
     ours, autopilot = link(), vehicle()
-    held_back = ours.sign_ahead(frame(1), 0)
-    again = ours.sign_ahead(frame(2), 20_000_000)
+    held_back = signed_ahead(ours, frame(1), 0)
+    again = signed_ahead(ours, frame(2), 20_000_000)
     assert autopilot.accept(ours.sign(frame(), 31_000_000), 31_000_000)
     assert not autopilot.accept(held_back, 31_000_000)
     assert autopilot.accept(again, 31_000_000)
@@ -318,7 +333,7 @@ def test_what_is_signed_later_voids_it() -> None:
 
 def test_no_timestamp_is_promised_twice() -> None:
     ours = link()
-    promised = [stamp(ours.sign_ahead(frame(), now_us)) for now_us in (0, 0, 500_000, 1_000_000, 1_000_000, 900_000)]
+    promised = [stamp(signed_ahead(ours, frame(), now_us)) for now_us in (0, 0, 500_000, 1_000_000, 1_000_000, 900_000)]
     assert promised == sorted(set(promised))
     assert ours.state.timestamp == promised[-1]
     after = link(stored=ours.state)
@@ -330,16 +345,37 @@ def test_who_is_given_it_all_the_time_cannot_use_up_the_timestamps() -> None:
     """Whoever has it signed, sends it, and shows the vehicle's answer, as fast as can be."""
     ours, autopilot = link(), vehicle()
     for now_us in range(0, 10_000_000, 10_000):
-        assert autopilot.accept(ours.sign_ahead(frame(), now_us), now_us)
+        assert autopilot.accept(signed_ahead(ours, frame(), now_us), now_us)
         assert ours.accept(autopilot.sign(frame(component=2), now_us), now_us)
     assert ours.state.timestamp - timestamp_of(UTC) < 11 * LEAD
+
+
+def test_a_flood_of_frames_to_sign_ahead_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each raises the timestamp by one: without a limit, a flood is good for hours."""
+    ours = link()
+    monkeypatch.setattr(signing, "MOST_AHEAD", 50)
+    signed = [ours.sign_ahead(frame(), 0) for _ in range(52)]
+    assert signed[-3] is not None
+    assert signed[-2:] == [None, None]
+    assert ours.state.timestamp == timestamp_of(UTC) + LEAD + 50
+    assert stamp(ours.sign(frame(), 31_000_000)) > stamp(signed[-3])
+    assert ours.sign_ahead(frame(), 31_000_000) is not None, "they are void, and there is room again"
+
+
+def test_a_flood_that_goes_on_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(signing, "MOST_AHEAD", 50)
+    ours = link()
+    for second in range(5):
+        for _ in range(100):
+            ours.sign_ahead(frame(), second * 1_000_000)
+        assert ours.state.timestamp <= stamp(ours.sign(frame(), second * 1_000_000)) + LEAD + 50
 
 
 def test_it_is_news_to_keep() -> None:
     ours, news = link(), []
     ours.on_news = lambda: news.append(ours.state.timestamp)
     for now_us in (0, 0, 10_000, 20_000_000):
-        ours.sign_ahead(frame(), now_us)
+        signed_ahead(ours, frame(), now_us)
     assert len(news) == 2
 
 

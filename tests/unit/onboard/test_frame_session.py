@@ -11,8 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink import signing
 from rtshcua.mavlink.layouts import LAYOUTS
 from rtshcua.mavlink.parameters import bits_of
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import (
     AFTER_START,
@@ -27,10 +29,12 @@ from rtshcua.onboard.enforcement.frames import (
     NOT_OURS,
     OUT_OF_ORDER,
     STANDS_US,
+    TOO_MANY_AHEAD,
     WRONG_TARGET,
     FrameSession,
 )
 from rtshcua.onboard.ports import Command
+from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.preparation import ParameterWrite
 from virtual.rows import rows
 
@@ -531,6 +535,25 @@ def test_what_passes_is_signed_and_nothing_else() -> None:
 
 
 # ---------------------------------------------------------------- parameters that a preparation lists
+
+
+def test_a_frame_that_is_not_signed_ahead_does_not_count_as_refused() -> None:
+    """Nobody tried to send it."""
+    gate, of = session(PX4), command(K.LAND)
+    assert gate.sign_ahead(b"no frame", of, NOW) is NOT_ONE_FRAME
+    assert gate.sign_ahead(pack(m.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)), of, NOW) is NOT_COVERED
+    assert gate.chain.stopped == 0
+    assert gate.chain.aside == START
+
+
+def test_a_flood_to_sign_ahead_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(signing, "MOST_AHEAD", 50)
+    gate, of = session(PX4), command(K.LAND)
+    gate.sign_with(SignedLink(bytes(32), State(0, {}), EPOCH_US, NOW))
+    land = pack(long(176, 1, 4, 6))
+    found = [gate.sign_ahead(land, of, NOW) for _ in range(51)]
+    assert isinstance(found[-2], bytes)
+    assert found[-1] is TOO_MANY_AHEAD
 
 
 def bits(value: float) -> int:

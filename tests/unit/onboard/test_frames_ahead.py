@@ -45,8 +45,8 @@ class Boundary:
         self.asked.append((kind, link))
         if (kind, link) in self.refused:
             return Refusal(self.refused[kind, link], "")
-        signatures = (self.link.sign_ahead(each, now_us)[-13:] if self.signs else b"" for each in frames)
-        return Ahead(100 * kind + 20 * link, tuple(signatures))
+        signed = [self.link.sign_ahead(each, now_us) if self.signs else b"" for each in frames]
+        return Ahead(100 * kind + 20 * link, tuple(each[-13:] for each in signed if each is not None))
 
 
 def pack(message: Any) -> bytes:
@@ -288,6 +288,35 @@ def test_where_nothing_is_signed_what_was_signed_before_stays_and_it_is_tried_ag
     of.renew(encode, EVERY_US + 1_000_000)
     assert len(boundary.asked) > asked
     assert of.begin(*CHAIN[0]) is not None
+
+
+def test_a_failed_attempt_is_repeated_once_a_second_where_timestamps_run_fast() -> None:
+    boundary = Boundary()
+    of = made(boundary)
+    of.sent(boundary.link.sign(pack(messages.heartbeat()), 25_000_000))
+    boundary.refused = dict.fromkeys([*CHAIN, *CONTINGENCY], "frame/not-covered")
+    asked = len(boundary.asked)
+    notes = [note for turn in range(100) for note in of.renew(encode, 25_000_000 + turn * 10_000)]
+    assert len(notes) == len(boundary.asked) - asked == len([*CHAIN, *CONTINGENCY])
+    of.renew(encode, 26_000_000)
+    assert len(boundary.asked) - asked == 2 * len([*CHAIN, *CONTINGENCY])
+
+
+@pytest.mark.parametrize("longest", ["hover", "return_home", "emergency_land"])
+def test_a_link_with_more_frames_than_a_call_takes_is_left_out_with_a_note(longest: str) -> None:
+    boundary = Boundary()
+    of = FramesAhead(Commands(POLICY, MISSION), boundary.sign)
+    of.stands(PERMIT, STEP)
+
+    def many(command: Command) -> list[bytes]:
+        frames = encode(command)
+        return [frames[0]] * (ahead.MOST + 1) if command.skill == longest else frames
+
+    note = f"`{longest}` cannot be signed ahead: {ahead.MOST + 1} frames, {ahead.MOST} at most"
+    assert of.renew(many, 0) == [note] * 2
+    left = [number for number, skill in enumerate(MODES) if skill != longest]
+    assert boundary.asked == [(kind, number) for kind in (FALLBACK_LINK, CONTINGENCY_LINK) for number in left]
+    assert of.renew(many, 1) == ()
 
 
 def test_a_link_without_a_key_has_the_same_rules() -> None:

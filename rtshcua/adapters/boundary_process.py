@@ -22,6 +22,8 @@ from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 PATIENCE_S: Final = 20.0
 #: and any other answer: one that stands still is as good as gone, and something flies
 ANSWER_S: Final = 1.0
+#: and then so much longer: where the whole machine stood still, the time of both is over, and one of them goes on first
+AGAIN_S: Final = 0.2
 #: and how long the boundary of a run that was killed may take to write what it keeps, and end
 ENDING_S: Final = 2.0
 _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
@@ -192,11 +194,20 @@ class BoundaryProcess:
                 self._socket.settimeout(PATIENCE_S)
             return self._socket.recv(_ANSWER)
         except TimeoutError:
-            self._process.kill()
-            raise
+            return self._once_more()
         finally:
             if loads:
                 self._socket.settimeout(ANSWER_S)
+
+    def _once_more(self) -> bytes:
+        self._socket.settimeout(AGAIN_S)
+        try:
+            return self._socket.recv(_ANSWER)
+        except TimeoutError:
+            self._process.kill()
+            raise
+        finally:
+            self._socket.settimeout(ANSWER_S)
 
     def close(self) -> None:
         """Let it end: it does so when its socket is closed."""

@@ -22,7 +22,7 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from rtshcua.adapters import boundary_process
-from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, Measure, kept_file
+from rtshcua.adapters.boundary_process import AGAIN_S, ANSWER_S, BoundaryError, BoundaryProcess, Measure, kept_file
 from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.adapters.store.writing import lock
 from rtshcua.cli.isolating import Apart
@@ -319,6 +319,17 @@ def test_one_that_stands_still_is_as_good_as_gone(held: Held) -> None:
     assert time.monotonic() - begun_s < 2
     os.kill(held.process.pid, signal.SIGCONT)
     assert held.caller(ENFORCE, b"anything") is LOST, "an answer that comes late is not taken for another's"
+
+
+def test_a_machine_that_stands_still_as_a_whole_loses_nothing(held: Held) -> None:
+    """The runtime goes on first, and its patience is over; the answer comes right after."""
+    os.kill(held.process.pid, signal.SIGSTOP)
+    goes_on = threading.Timer(ANSWER_S + AGAIN_S / 2, os.kill, (held.process.pid, signal.SIGCONT))
+    goes_on.start()
+    assert held.ask(0) is not Status.MALFORMED
+    goes_on.join()
+    assert not held.caller.lost
+    assert held.ask(0) is not Status.MALFORMED, "answers belong to their calls"
 
 
 def test_when_it_dies_nothing_leaves_that_was_not_signed_ahead(held: Held) -> None:

@@ -198,6 +198,7 @@ rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes
         if (size == 0)
             return "frame/too-many-ahead";
         memcpy(out, octets + size - RT_SIGNATURE, RT_SIGNATURE);
+        rt_chain_sign_ahead(gate->chain, frame);
     }
     return NULL;
 }

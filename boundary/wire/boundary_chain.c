@@ -51,6 +51,12 @@ void rt_chain_stop(rt_chain *chain, rt_bytes frame) {
     follow((rt_bytes){ASIDE, sizeof ASIDE}, chain->aside, RT_TAG_STOPPED, digest_of(frame, digest), NOTHING);
 }
 
+void rt_chain_sign_ahead(rt_chain *chain, rt_bytes frame) {
+    uint8_t digest[RT_DIGEST_BYTES];
+    chain->ahead++;
+    follow((rt_bytes){ASIDE, sizeof ASIDE}, chain->aside, RT_TAG_AHEAD, digest_of(frame, digest), NOTHING);
+}
+
 void rt_chain_leave(rt_chain *chain, rt_bytes frame) {
     chain->frames++;
     follow((rt_bytes){FRAMES, sizeof FRAMES}, chain->left, RT_TAG_FRAME, frame, NOTHING);
@@ -61,7 +67,7 @@ uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], co
     static uint8_t payload[RT_MAX_STATEMENT]; /* the marks make most of it */
     uint8_t protected[64], public[RT_KEY_BYTES], kid[RT_KID_BYTES], signature[RT_SIGNATURE_BYTES];
     uint32_t at = rt_wrap(payload, &RT_STATEMENT);
-    at += rt_cbor_head(payload + at, RT_MAJOR_ARRAY, 13);
+    at += rt_cbor_head(payload + at, RT_MAJOR_ARRAY, 14);
     at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){flight, RT_FLIGHT_BYTES});
     at += rt_cbor_int(payload + at, session);
     at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){before, RT_DIGEST_BYTES});
@@ -73,6 +79,7 @@ uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], co
     at += rt_cbor_int(payload + at, chain->repeated);
     at += rt_cbor_int(payload + at, chain->declined);
     at += rt_cbor_int(payload + at, chain->stopped);
+    at += rt_cbor_int(payload + at, chain->ahead);
     at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->aside, RT_DIGEST_BYTES});
     payload[at++] = final ? 0xF5 : 0xF4;
     chain->marked = 0;

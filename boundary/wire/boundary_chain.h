@@ -11,13 +11,13 @@
 /* what an entry is about */
 enum {
     RT_TAG_BEGIN = 1, RT_TAG_DECIDED = 2, RT_TAG_UNDECIDED = 3, RT_TAG_DOCUMENT = 4, RT_TAG_DECLINED = 5, RT_TAG_SENT = 6,
-    RT_TAG_REFUSED = 7, RT_TAG_PREPARED = 8, RT_TAG_UNPREPARED = 9, RT_TAG_FRAME = 10, RT_TAG_STOPPED = 11
+    RT_TAG_REFUSED = 7, RT_TAG_PREPARED = 8, RT_TAG_UNPREPARED = 9, RT_TAG_FRAME = 10, RT_TAG_STOPPED = 11, RT_TAG_AHEAD = 12
 };
 
 /* The digest after `count` entries, that of so many `frames`, and the one `aside`, of what is only counted. */
 typedef struct {
     uint8_t digest[RT_DIGEST_BYTES], left[RT_DIGEST_BYTES], aside[RT_DIGEST_BYTES];
-    int64_t count, frames, repeated, declined, stopped;
+    int64_t count, frames, repeated, declined, stopped, ahead;
     uint8_t marks[RT_MARK_BYTES * RT_MOST_MARKS];
     uint32_t marked;
     bool over; /* its end was signed: whoever has it lets nothing happen any more */
@@ -29,6 +29,8 @@ void rt_chain_add(rt_chain *chain, uint8_t tag, rt_bytes first, rt_bytes second)
 void rt_chain_repeat(rt_chain *chain, rt_bytes first, rt_bytes second);
 void rt_chain_decline(rt_chain *chain, rt_bytes document);
 void rt_chain_stop(rt_chain *chain, rt_bytes frame);
+/* A frame was signed ahead: whether it is sent the boundary does not see, so the digest stays. */
+void rt_chain_sign_ahead(rt_chain *chain, rt_bytes frame);
 /* A frame that carries out a command passed, as these octets. */
 void rt_chain_leave(rt_chain *chain, rt_bytes frame);
 

@@ -238,19 +238,27 @@ class BoundaryEvidence:
             return (), (Claim("boundary", "what the boundary itself saw: the log breaks off before it signed"),)
         text = (
             f"session {last.session} of the boundary signed for {last.count - 1} decisions, documents and dispatches: "
-            f"they are those that stand here, in this order; besides, {last.frames} frames left and {last.stopped} "
-            f"were refused, {last.repeated} answers repeated one and {last.declined} documents were refused"
+            f"they are those that stand here, in this order; besides, {last.frames} frames passed it and "
+            f"{last.stopped} were refused, {last.repeated} answers repeated one and {last.declined} documents were "
+            "refused"
         )
         proven = (Claim("boundary", text),)
+        ahead = _ahead(last.ahead)
         if last.final and self._lost is None:
-            return proven, ()
+            return proven, ahead
         if self._lost is not None:
             text = (
                 f"what the boundary made after its last signature, and that it was lost at record {self._lost[0]}: "
                 "that links flew from there on as it had signed them ahead says the runtime alone"
             )
-            return proven, (Claim("boundary", text),)
-        return proven, (Claim("boundary", "what the boundary made after its last signature: it broke off"),)
+            return proven, (Claim("boundary", text), *ahead)
+        return proven, (Claim("boundary", "what the boundary made after its last signature: it broke off"), *ahead)
+
+
+def _ahead(count: int) -> tuple[Claim, ...]:
+    """What is not proven where frames were signed ahead."""
+    text = f"whether any of the {count} frames were sent that the boundary signed ahead: it does not see that"
+    return (Claim("boundary", text),) if count else ()
 
 
 def _is_made(record: AnyRecord) -> bool:

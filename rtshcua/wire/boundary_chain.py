@@ -7,8 +7,8 @@ An entry is a tag and a payload; the digest after it is
 numbers big-endian, beginning with 32 zero octets. A payload holds what the log's records say, and nothing else: so
 whoever has the log works out the same digests. Two more digests are made in the same way, with other labels: of the
 frames that carry out a command, without their signature, as they lie beside the log (`rtshcua/boundary-frames`); and of
-what is only counted, answers that repeat the one before, documents and frames that were refused
-(`rtshcua/boundary-aside`).
+what is only counted, answers that repeat the one before, documents and frames that were refused, and frames that were
+signed ahead (`rtshcua/boundary-aside`).
 
 Fixed tags, fixed layouts and one hash: a boundary without a heap keeps the same chain.
 """
@@ -56,16 +56,17 @@ class Tag(IntEnum):
     UNPREPARED = 9  # one was not
     FRAME = 10  # a frame passed that carries out a command
     STOPPED = 11  # a frame was refused; counted only
+    AHEAD = 12  # a frame was signed ahead; counted only
 
 
 class BoundaryChain:
     """The digest after `count` entries, that of so many `frames`, and the one `aside`, of what is only counted:
-    `repeated` answers, `declined` documents and `stopped` frames. Once it is `over`, its end was signed: whoever has it
-    lets nothing happen any more.
+    `repeated` answers, `declined` documents, `stopped` frames, and frames that were signed `ahead`. Once it is `over`,
+    its end was signed: whoever has it lets nothing happen any more.
     """
 
     __slots__ = (
-        "_marks", "aside", "count", "declined", "digest", "frames", "left", "over", "repeated", "stopped",
+        "_marks", "ahead", "aside", "count", "declined", "digest", "frames", "left", "over", "repeated", "stopped",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -74,7 +75,7 @@ class BoundaryChain:
         self.left = START
         self.frames = 0
         self.aside = START
-        self.repeated = self.declined = self.stopped = 0
+        self.repeated = self.declined = self.stopped = self.ahead = 0
         self.over = False
         self._marks: list[bytes] = []
 
@@ -107,6 +108,11 @@ class BoundaryChain:
         """A frame was refused."""
         self.stopped += 1
         self.aside = _next(_ASIDE, self.aside, Tag.STOPPED, sha256(frame).digest())
+
+    def sign_ahead(self, frame: bytes) -> None:
+        """A frame was signed ahead: whether it is sent the boundary does not see."""
+        self.ahead += 1
+        self.aside = _next(_ASIDE, self.aside, Tag.AHEAD, sha256(frame).digest())
 
     def marks(self) -> bytes:
         """The marks of the entries since the last call, of `MOST_MARKS` at most."""

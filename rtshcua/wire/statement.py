@@ -30,7 +30,7 @@ class Statement(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fie
     one before, 32 zero octets where there is none. `digest` is the one after `count` entries, and `marks` the first
     octets of the digests after each entry since the statement before, of the first `MOST_MARKS` of them. `left` is the
     digest of so many `frames` that carry out commands, `aside` that of what is only counted: `repeated` answers,
-    `declined` documents and `stopped` frames. After a `final` one there is no more.
+    `declined` documents, `stopped` frames, and frames that were signed `ahead`. After a `final` one there is no more.
     """
 
     flight: bytes
@@ -44,13 +44,14 @@ class Statement(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fie
     repeated: int
     declined: int
     stopped: int
+    ahead: int
     aside: bytes
     final: bool
 
 
-def counted(said: Statement) -> tuple[int, int, int, int]:
+def counted(said: Statement) -> tuple[int, int, int, int, int]:
     """What of a statement only ever grows, besides its entries."""
-    return said.frames, said.repeated, said.declined, said.stopped
+    return said.frames, said.repeated, said.declined, said.stopped, said.ahead
 
 
 def sign(statement: Statement, key: SigningKey) -> bytes:

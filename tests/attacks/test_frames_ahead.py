@@ -25,9 +25,11 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, with_flags
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.mavlink.signing import EPOCH_US, UNIT_US, SignedLink, State, timestamp_in
 from rtshcua.model.faults import Mode
-from rtshcua.onboard.enforcement.isolated import AHEAD, DISPATCH, SEAL
+from rtshcua.onboard.enforcement.isolated import AHEAD, DISPATCH, SEAL, STATEMENT
 from rtshcua.onboard.ports import Ending
+from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
+from rtshcua.wire.statement import Statement, claimed
 
 Make = Callable[..., Apart]
 
@@ -74,6 +76,10 @@ class Thief:
             if since is None and view.step == step and view.stage.name == "RUNNING":
                 since = self.of.flight.clock.elapsed_us
         return self
+
+    def stated(self) -> Statement:
+        """What the boundary signs of its own evidence."""
+        return claimed(self.of._answer(bytes([STATEMENT, 0]))[1:])
 
     def send(self, frame: bytes) -> None:
         self.of.vehicle.simulation.receive(frame, self.of.flight.clock.elapsed_us)
@@ -175,6 +181,29 @@ def test_a_frame_may_be_sent_while_the_boundary_lives_and_then_nothing_that_was_
         bytes([SEAL]) + struct.pack(">q", thief.of.flight.clock.monotonic_us) + pack(messages.heartbeat())
     )
     assert timestamp_in(normal[1:]) < timestamp_in(home), "nor does the vehicle take what the boundary signs now"
+
+
+def test_links_that_are_flown_while_the_boundary_lives_leave_no_trace_but_a_count(thief: Thief) -> None:
+    """No entry tells of them. Its statement says how many frames it signed ahead, and has a digest over them."""
+    thief.until(2)
+    permit, frames = thief.permits[-1], [pack(RETURN), pack(messages.set_mode(1, Px4Mode.LAND))]
+    before = thief.stated()
+    for link, frame in enumerate(frames, 1):
+        thief.send(thief.signed(permit, CONTINGENCY_LINK, link, frame))
+    assert thief.mode is Mode.LAND
+    after, expected = thief.stated(), BoundaryChain()
+    expected.aside = before.aside
+    for frame in frames:
+        expected.sign_ahead(frame)
+    assert (after.count, after.digest, after.frames) == (before.count, before.digest, before.frames)
+    assert (after.ahead, after.aside) == (before.ahead + len(frames), expected.aside)
+
+
+def test_a_frame_that_is_refused_is_no_frame_that_was_stopped(thief: Thief) -> None:
+    thief.until(2)
+    before = thief.stated()
+    assert thief.ask(thief.permits[-1], CONTINGENCY_LINK, 2, b"no frame") == "frame/not-one-frame"
+    assert (thief.stated().stopped, thief.stated().aside) == (before.stopped, before.aside)
 
 
 def test_after_a_landing_nothing_is_signed(apart: Make) -> None:

@@ -52,7 +52,18 @@ _ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
     Admission: ("_last", "_repeated", "recent"),
     EventHandler: ("_gap", "_refused_us", "_unrecorded"),
     SoftwareBoundary: ("_now_us", "_last"),
-    BoundaryChain: ("_marks", "aside", "count", "declined", "digest", "frames", "left", "repeated", "stopped"),
+    BoundaryChain: (
+        "_marks",
+        "ahead",
+        "aside",
+        "count",
+        "declined",
+        "digest",
+        "frames",
+        "left",
+        "repeated",
+        "stopped",
+    ),
     StateMonitor: ("_state", "_held"),
 }
 #: attributes that are read in these stages only, and are set anew whenever a run comes into them

@@ -164,7 +164,7 @@ class Boundary:
             raise Disputed("not a statement of the boundary") from error
         numbers = [session, count, *(each for each in counted if type(each) is int)]
         octets = [before, digest, *(each for each in counted if type(each) is bytes)]
-        shape = [type(each) for each in counted] == [int, bytes, int, int, int, bytes] and type(marks) is bytes
+        shape = [type(each) for each in counted] == [int, bytes, int, int, int, int, bytes] and type(marks) is bytes
         if (name, version) != ("rtshcua/statement", 1) or not shape or type(final) is not bool:
             raise Disputed("not a statement of version 1")
         if any(type(each) is not int or not 0 <= each < 1 << 63 for each in numbers):

@@ -51,6 +51,6 @@ class Attestation:
         chain.over = final
         said = Statement(
             self._flight, key.session, key.before, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
-            chain.repeated, chain.declined, chain.stopped, chain.aside, final,
+            chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside, final,
         )  # fmt: skip
         return sign(said, self._signs)

@@ -222,7 +222,10 @@ class FrameSession:
         if self._signer is None:
             return b""
         signed = self._signer.sign_ahead(frame, now_us)
-        return TOO_MANY_AHEAD if signed is None else signed[-SIGNATURE:]
+        if signed is None:
+            return TOO_MANY_AHEAD
+        self.chain.sign_ahead(frame)
+        return signed[-SIGNATURE:]
 
     def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
         """Why a frame does not leave, or else whether it carries out a command."""

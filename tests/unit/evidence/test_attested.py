@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from reference.attested_flight import attested
 from reference.verifiers import ROOT_KEY
 from rtshcua.evidence.attested import BoundaryEvidence, entry_of
-from rtshcua.evidence.finding import Finding, Flaw
+from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.rooted import rooted
@@ -63,7 +63,7 @@ class Log:
         chain = self.chain
         said = Statement(
             bytes.fromhex(GENESIS.boot), 1, START, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
-            chain.repeated, chain.declined, chain.stopped, chain.aside, final=False,
+            chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside, final=False,
         )  # fmt: skip
         return replace(said, **fields)
 
@@ -228,6 +228,7 @@ def test_a_log_that_was_recovered(log: Log) -> None:
         ({"repeated": 0}, "replayed"),
         ({"declined": 0}, "replayed"),
         ({"stopped": 0}, "replayed"),
+        ({"ahead": 0}, "replayed"),
         ({"digest": NEVER}, "differs"),
         ({"marks": b"m" * 8}, "missing"),
         ({"session": -1}, "malformed"),
@@ -239,8 +240,20 @@ def test_a_statement_that_does_not_follow(fields: dict[str, object], slug: str) 
     log.chain.repeat(b"")
     log.chain.decline(b"")
     log.chain.stop(b"")
+    log.chain.sign_ahead(b"")
     assert log.state() is None
     assert log.state(**fields) == (f"boundary/{slug}", 2)
+
+
+def test_that_frames_were_signed_ahead_is_told_and_not_that_they_were_sent() -> None:
+    log = Log()
+    for _ in range(3):
+        log.chain.sign_ahead(b"a frame")
+    assert log.state(final=True) is None
+    proven, unproven = log.evidence.claims()
+    assert "0 frames passed it" in proven[0].text
+    text = "whether any of the 3 frames were sent that the boundary signed ahead: it does not see that"
+    assert unproven == (Claim("boundary", text),)
 
 
 def test_another_beginning() -> None:

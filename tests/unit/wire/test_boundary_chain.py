@@ -67,6 +67,7 @@ CHANGES: dict[str, tuple[Callable[[BoundaryChain], object], str]] = {
     "repeated": (lambda chain: chain.repeat(b"x"), "aside"),
     "declined": (lambda chain: chain.decline(b"x"), "aside"),
     "stopped": (lambda chain: chain.stop(b"x"), "aside"),
+    "ahead": (lambda chain: chain.sign_ahead(b"x"), "aside"),
     "frames": (lambda chain: chain.leave(b"x"), "left"),
 }
 

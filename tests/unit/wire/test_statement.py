@@ -12,7 +12,7 @@ from virtual.rows import rows
 KEY = SigningKey.from_seed(b"b" * 32, duty=Duty.BOUNDARY)
 KEYS = {KEY.kid: KEY.verification()}
 SAID = Statement(
-    b"f" * 16, 1, bytes(32), 2, b"d" * 32, b"m" * 16, 3, b"l" * 32, 4, 5, 6, b"a" * 32, final=False
+    b"f" * 16, 1, bytes(32), 2, b"d" * 32, b"m" * 16, 3, b"l" * 32, 4, 5, 6, 7, b"a" * 32, final=False
 )  # fmt: skip
 
 
@@ -39,7 +39,7 @@ def test_no_key_of_another_duty_signs_one() -> None:
     [
         {"flight": b"f" * 15}, {"before": b""}, {"digest": b"d" * 31}, {"left": b""}, {"aside": b"a" * 33},
         {"marks": b"m" * 7}, {"marks": b"m" * 1032}, {"session": -1}, {"count": -1}, {"frames": -1},
-        {"repeated": -1}, {"declined": -1}, {"stopped": -1},
+        {"repeated": -1}, {"declined": -1}, {"stopped": -1}, {"ahead": -1},
     ],
 )  # fmt: skip
 def test_what_is_out_of_range_is_malformed(fields: dict[str, object]) -> None:

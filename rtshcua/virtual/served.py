@@ -45,7 +45,7 @@ class Served:
         settings: Mapping[str, int] = MappingProxyType({}), owed: Mapping[str, Owed] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         self._root, self._vehicle, self._key = root, vehicle, key
-        self._settings, self._owed = settings, owed
+        self._settings, self._owed = dict(settings), dict(owed)
         self._staged = {calls.LOAD: b"", calls.PRESENT: b""}
         self._loaded: Loaded | None = None
         #: what frames leave by, whatever bundle is in force

@@ -170,3 +170,13 @@ def test_what_the_boundary_signs_stands_before_each_seal_and_the_close(
     assert (statement["event"], statement["detail"], seal["type"]) == ("boundary", "c28gZmFy", "seal")
     statement, close = map(json.loads, recorder.closing(now(3), ending="completed", tlog=None))
     assert (statement["event"], statement["detail"], close["type"]) == ("boundary", "bGFzdA==", "close")
+
+
+def test_the_loss_of_the_boundary_is_told_once_before_the_seal_that_it_does_not_sign_for(
+    recorder: Recorder, begin: Callable[[], bytes], now: Callable[[int], Now]
+) -> None:
+    begin()
+    recorder.lost = lambda: "nobody decides"
+    lost, seal = map(json.loads, recorder.sealing(now(1)))
+    assert (lost["event"], lost["detail"], seal["type"]) == ("boundary-lost", "nobody decides", "seal")
+    assert [json.loads(line)["type"] for line in recorder.closing(now(2), ending="aborted", tlog=None)] == ["close"]

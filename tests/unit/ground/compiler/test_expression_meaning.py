@@ -151,8 +151,10 @@ def lowered(node: Condition) -> Lowered | None:
     )
     cells = {cell: CHOICE if name == "look" else QUANTITY for name, cell in cells_of(symbols.skills["probe"]).items()}
     condition = built(clause.code, code_scope._replace(cells=(cells,)))
-    limits = (Limit(10**9, MAX_VALUE),) * slots.count
-    policy = SimpleNamespace(policy=flat, monitors=prepared, limits=limits, seen=None)
+    limit = Limit(10**9, MAX_VALUE)
+    limits = (limit,) * slots.count
+    bounds = tuple((each,) * slots.count for each in (limit.stale_us, -limit.most, limit.most))
+    policy = SimpleNamespace(policy=flat, monitors=prepared, limits=limits, bounds=bounds, seen=None)
     return Lowered(policy, condition, clause.code)
 
 

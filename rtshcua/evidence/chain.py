@@ -238,7 +238,9 @@ class Recorder:
 
     def attested(self, now: Now, *, final: bool = False) -> tuple[bytes, ...]:
         """The line of what the boundary signs now; none where it signs nothing."""
-        statement = self.attest(final=final)
+        return self._stated(now, self.attest(final=final))
+
+    def _stated(self, now: Now, statement: bytes | None) -> tuple[bytes, ...]:
         if statement is None:
             return self.loss(now)
         return (self.effect(now, BOUNDARY, detail=b64encode(statement).decode()),)
@@ -251,9 +253,14 @@ class Recorder:
         self.told_loss = True
         return (self.effect(now, BOUNDARY_LOST, detail=lost),)
 
-    def sealing(self, now: Now) -> tuple[bytes, ...]:
-        """The lines that end an epoch: what the boundary signs, and the seal."""
-        return (*self.attested(now), self.seal(now))
+    def sealing(self, now: Now, *, tells_loss: bool = True) -> tuple[bytes, ...]:
+        """The lines that end an epoch: what the boundary signs, and the seal. Without `tells_loss` there are none where
+        it is lost and that is not recorded yet: records of what it made before come first.
+        """
+        statement = self.attest(final=False)
+        if statement is None and not tells_loss and not self.told_loss and self.lost() is not None:
+            return ()
+        return (*self._stated(now, statement), self.seal(now))
 
     def closing(self, now: Now, *, ending: str, tlog: bytes | None) -> tuple[bytes, ...]:
         """The lines that end the log: what the boundary signs at last, and the close."""

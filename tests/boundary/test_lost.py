@@ -7,9 +7,11 @@ from typing import Any
 import pytest
 
 from boundary.losing import KEY, Apart, S, to_and_fro
+from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.mavlink.framing import message_id
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT
+from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, STATEMENT
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
@@ -183,3 +185,24 @@ def test_it_is_signed_anew_all_the_way_and_told_of_nothing(apart: Make) -> None:
     assert flown.audit().report.verdict is Verdict.VERIFIED
     noted = [record["detail"] for record in flown.records if record.get("event") == "noted"]
     assert not [text for text in noted if "ahead" in text]
+
+
+@pytest.mark.parametrize("call", [DISPATCH, STATEMENT], ids=["at a dispatch", "at a seal"])
+def test_a_decision_before_the_loss_is_recorded_before_it_though_a_seal_is_late(
+    call: int, apart: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It dies by the call that comes after its decision about a leg, in the same step."""
+    of = apart("px4", legs=4)
+    answer, calls = of._answer, []
+
+    def dies(octets: bytes) -> bytes:
+        calls.append(octets[0])
+        if octets[0] == call and calls.count(ENFORCE) == 4 and ENFORCE in calls[-3:]:
+            of.lose()
+            raise BrokenPipeError
+        return answer(octets)
+
+    of._answer = dies
+    monkeypatch.setattr(Recorder, "overdue", lambda self, now: calls.count(ENFORCE) == 4)
+    came_down(of.fly(lambda _: False))
+    assert of.dead

@@ -30,7 +30,8 @@ class Journal:
     """Collects the actions of one `Runtime.step`, in order. All lines carry the moment of that step.
 
     What only tells of something is made when the actions are taken: a fallback is sent before (`reflex`). An epoch that
-    should have been sealed long ago is sealed before anything else is recorded.
+    should have been sealed long ago is sealed before anything else is recorded, unless the boundary is found lost: then
+    records of what it made come first.
     """
 
     def __init__(self, recorder: Recorder) -> None:
@@ -62,7 +63,7 @@ class Journal:
     def record(self, line: Callable[[], bytes], now: Now, durability: int, *, awaited: bool) -> Iterable[Action]:
         """One record, in the telling of something; `line` asks the recorder for it."""
         if self.recorder.overdue(now):
-            yield from self._seal(now)
+            yield from self._seal(now, tells_loss=False)
         yield Append(line(), durability, awaited)
 
     def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: Detail = "") -> None:
@@ -120,9 +121,10 @@ class Journal:
             actions += self._seal(now)
         return actions
 
-    def _seal(self, now: Now) -> Iterable[Append]:
+    def _seal(self, now: Now, *, tells_loss: bool = True) -> Iterable[Append]:
         """End an epoch. Nothing waits for a seal, but it is on the disk soon: its checkpoint may be shown around."""
-        *statements, seal = self.recorder.sealing(now)
-        for line in statements:
+        lines = self.recorder.sealing(now, tells_loss=tells_loss)
+        for line in lines[:-1]:
             yield Append(line, WRITTEN, awaited=False)
-        yield Append(seal, SYNCED_FIRST, awaited=False)
+        for seal in lines[-1:]:
+            yield Append(seal, SYNCED_FIRST, awaited=False)

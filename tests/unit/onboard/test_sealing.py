@@ -1,6 +1,7 @@
 """When the runtime seals: an epoch that is over when nothing is sent, one that is long over before anything else."""
 
 import json
+from functools import partial
 from typing import Any
 
 import pytest
@@ -123,3 +124,27 @@ def test_a_seal_that_is_late_does_not_hide_that_the_boundary_was_lost_before(jou
     journal.recorder.lost = lambda: "it is gone"
     journal.effect(at(late), "dispatched")
     assert [kind for kind, _ in told(journal, late)] == ["boundary-lost", "seal", "dispatched"]
+
+
+def test_what_the_boundary_made_before_it_was_lost_is_recorded_before_the_loss(journal: Journal) -> None:
+    """The seal is late in the very step in which the loss is found: it waits for what was told before."""
+    late = EPOCH_US + EPOCH_US // 5
+    decision = partial(journal.recorder.effect, at(late), "approval")
+    journal.tell(lambda: journal.record(decision, at(late), SYNCED, awaited=True))
+    journal.recorder.lost = lambda: "it is gone"
+    journal.effect(at(late), "refused")
+    assert [kind for kind, _ in told(journal, late)] == ["approval", "boundary-lost", "seal", "refused"]
+
+
+def test_a_late_seal_that_finds_the_boundary_lost_waits_for_what_was_told_before(journal: Journal) -> None:
+    lost: list[str] = []
+
+    def attest(*, final: bool) -> None:
+        lost.append("it is gone")
+
+    late = EPOCH_US + EPOCH_US // 5
+    journal.recorder.attest, journal.recorder.lost = attest, lambda: lost[0] if lost else None
+    journal.effect(at(late), "approval")
+    assert [kind for kind, _ in told(journal, late)] == ["approval", "boundary-lost", "seal"]
+    journal.effect(at(late + 1), "link-back")
+    assert [kind for kind, _ in told(journal, late + 1)] == ["link-back"]

@@ -1,41 +1,25 @@
 #include "calls.h"
 
+#include "wire/octets.h"
+
 /* What of a call is still to be read. */
 typedef struct {
-    const uint8_t *at;
-    uint32_t left;
+    const uint8_t *at, *end;
     bool short_; /* more was asked for than came */
 } reader;
 
+static rt_bytes rest_of(const reader *call) { return (rt_bytes){call->at, (uint32_t)(call->end - call->at)}; }
+
 static int64_t take(reader *call, uint32_t octets) {
-    uint64_t value = 0, half = 1ULL << (8 * octets - 1);
-    if (call->left < octets) {
-        call->short_ = true;
-        return 0;
-    }
-    for (uint32_t octet = 0; octet < octets; octet++)
-        value = value << 8 | *call->at++;
-    call->left -= octets;
-    return value < half ? (int64_t)value : -(int64_t)(half - (value - half));
-}
-
-static rt_bytes rest_of(reader *call) {
-    rt_bytes rest = {call->at, call->left};
-    call->left = 0;
-    return rest;
-}
-
-static void put(uint8_t **out, int64_t value, uint32_t octets) {
-    while (octets-- > 0)
-        *(*out)++ = (uint8_t)((uint64_t)value >> 8 * octets & 0xFF);
+    call->short_ = call->short_ || octets > rest_of(call).size;
+    return call->short_ ? 0 : rt_take_signed(&call->at, octets);
 }
 
 static uint32_t refuse(rt_refusal slug, uint8_t *out) {
-    uint32_t size = 0;
-    out[size++] = 1;
-    for (; slug[size - 1] != 0 && size < RT_MAX_RESULT; size++)
-        out[size] = (uint8_t)slug[size - 1];
-    return size;
+    const rt_bytes words = rt_words(slug);
+    out[0] = 1;
+    memcpy(out + 1, words.at, words.size);
+    return 1 + words.size;
 }
 
 /* A time that a request may have: what is computed from it stays within 64 bits. */
@@ -45,12 +29,12 @@ static uint32_t permitted(rt_refusal refused, const rt_permit *permit, uint8_t *
     if (refused != NULL)
         return refuse(refused, out);
     uint8_t *at = out;
-    put(&at, 0, 1);
-    put(&at, permit->kind, 1);
-    put(&at, permit->step, 2);
-    put(&at, permit->link, 2);
-    put(&at, (int64_t)permit->serial, 8);
-    put(&at, permit->not_after_us, 8);
+    rt_put(&at, 0, 1);
+    rt_put(&at, (uint64_t)permit->kind, 1);
+    rt_put(&at, (uint64_t)permit->step, 2);
+    rt_put(&at, (uint64_t)permit->link, 2);
+    rt_put(&at, permit->serial, 8);
+    rt_put(&at, (uint64_t)permit->not_after_us, 8);
     return (uint32_t)(at - out);
 }
 
@@ -89,7 +73,7 @@ static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_byte
     if (at != *size) return "malformed";
     if (part.size > most - *size) return "too-large";
     uint8_t *into = document ? boundary->documents[boundary->document_count] : boundary->bundle;
-    memcpy(into + *size, part.at, part.size);
+    if (part.size > 0) memcpy(into + *size, part.at, part.size);
     *size += part.size;
     return NULL;
 }
@@ -123,7 +107,7 @@ static uint32_t answer_staged(rt_boundary *boundary, int64_t kind, reader *left,
     now.utc_error_us = take(left, 8);
     int64_t released = kind == RT_CALL_PRESENT ? take(left, 4) : 0;
     int64_t size = take(left, 4);
-    bool sound = !left->short_ && left->left == 0 && released >= 0;
+    bool sound = !left->short_ && left->at == left->end && released >= 0;
     if (!sound || !is_time(now.monotonic_us) || !is_time(now.utc_us) || !is_time(now.utc_error_us)) return refuse("malformed", out);
     if (size != (kind == RT_CALL_LOAD ? boundary->bundle_size : boundary->document_size)) return refuse("malformed", out);
     if (rt_is_apart(now.monotonic_us, own_us)) return refuse("time-apart", out);
@@ -153,7 +137,7 @@ static uint32_t answer_preparation(rt_boundary *boundary, int64_t kind, reader *
 static uint32_t answer_executor(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
     rt_executor *executor = &boundary->executor;
     rt_permit permit;
-    if (kind == RT_CALL_ENDED && left->left == 0) rt_ended(executor);
+    if (kind == RT_CALL_ENDED && left->at == left->end) rt_ended(executor);
     else if (kind == RT_CALL_ENDED) rt_ended_command(executor, (uint64_t)take(left, 8));
     else if (kind == RT_CALL_LANDED) rt_landed(executor);
     else if (kind == RT_CALL_RELEASE) rt_release(executor);
@@ -176,29 +160,28 @@ static uint32_t answer_ahead(rt_boundary *boundary, reader *left, int64_t own_us
     rt_command command;
     uint8_t *at = out;
     int64_t now_us = take(left, 8), kind = take(left, 1), link = take(left, 1);
-    if (left->short_ || left->left < RT_PERMIT_BYTES || !is_time(now_us)) return refuse("malformed", out);
+    if (left->short_ || rest_of(left).size < RT_PERMIT_BYTES || !is_time(now_us)) return refuse("malformed", out);
     if (rt_is_apart(now_us, own_us)) return refuse("time-apart", out);
     const rt_bytes sealed = {left->at, RT_PERMIT_BYTES};
     left->at += RT_PERMIT_BYTES;
-    left->left -= RT_PERMIT_BYTES;
     rt_refusal refused = rt_may_stand_in(executor, sealed, kind, link, now_us, &permit, &command);
     if (refused != NULL) return refuse(refused, out);
-    put(&at, 0, 1);
-    put(&at, (int64_t)permit.serial, 8);
-    for (uint32_t count = 0; left->left > 0; count++) {
+    rt_put(&at, 0, 1);
+    rt_put(&at, permit.serial, 8);
+    for (uint32_t count = 0; left->at < left->end; count++) {
         int64_t size = take(left, 2);
-        if (left->short_ || size < 0 || size > left->left || count == RT_MOST_AHEAD) return refuse("malformed", out);
+        if (left->short_ || size < 0 || size > left->end - left->at || count == RT_MOST_AHEAD) return refuse("malformed", out);
+        //@ split size;
         refused = rt_gate_sign_ahead(&executor->gate, &command, (rt_bytes){left->at, (uint32_t)size}, now_us, at);
         if (refused != NULL) return refuse(refused, out);
         left->at += size;
-        left->left -= (uint32_t)size;
         at += executor->gate.signs ? RT_SIGNATURE : 0;
     }
     return (uint32_t)(at - out);
 }
 
 uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t *out) {
-    reader left = {call.at, call.size, false};
+    reader left = {call.at, call.at + call.size, false};
     int64_t kind = take(&left, 1), now_us;
     rt_refusal refused = "malformed";
     uint32_t size = 0;
@@ -245,7 +228,7 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
         refused = rt_gate_seal(&boundary->executor.gate, rest_of(&left), now_us, out + 1, &size);
         break;
     case RT_CALL_BEGIN:
-        if (!boundary->loaded || left.left != 8 + RT_DIGEST_BYTES) break;
+        if (!boundary->loaded || left.end - left.at != 8 + RT_DIGEST_BYTES) break;
         now_us = take(&left, 8);
         if (!is_time(now_us)) break; /* a number within the same bounds */
         refused = rt_attest(boundary, now_us, left.at) ? NULL : "no-boundary-key";

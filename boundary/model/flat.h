@@ -199,7 +199,8 @@ typedef struct {
 } rt_plan;
 
 typedef struct {
-    rt_bytes raw; /* the whole invocation as it was signed: its binding is worked out over it */
+    rt_bytes raw;     /* the whole invocation as it was signed, */
+    rt_bytes content; /* and what of it stands between its id and its binding */
     rt_bytes invocation_id;
     int64_t step, phase, skill, source, role;
     rt_list arguments; /* integers */
@@ -213,7 +214,7 @@ typedef struct {
 
 typedef struct {
     rt_bytes payload;
-    rt_bytes body; /* the mission within the payload, which for a replacement holds more */
+    rt_bytes before, behind; /* what of the mission stands before its invocations, and behind them */
     rt_bytes name, intent, proposer, vehicle, policy;
     int64_t policy_version;
     rt_bytes policy_digest;

@@ -11,4 +11,11 @@
 #define SIZE(most) ((uint32_t)Frama_C_unsigned_int_interval(0, most))
 #define EITHER() (Frama_C_interval(0, 1) != 0)
 
+/* The first item of a table, as all of it. */
+static void fill(void *table, size_t size, size_t whole) {
+    //@ loop unroll 20;
+    for (; 2 * size <= whole; size *= 2) memcpy((char *)table + size, table, size);
+}
+#define FILL(table) fill(table, sizeof *(table), sizeof(table))
+
 #endif

@@ -109,13 +109,6 @@ static void rule_of(rt_rule *rule) {
     rule->source = WITHIN(INT64_MIN, INT64_MAX), rule->start = WITHIN(INT64_MIN, INT64_MAX), rule->end = WITHIN(INT64_MIN, INT64_MAX);
 }
 
-/* The first item of a table, as all of it. */
-static void fill(void *table, size_t size, size_t whole) {
-    //@ loop unroll 20;
-    for (; 2 * size <= whole; size *= 2) memcpy((char *)table + size, table, size);
-}
-#define FILL(table) fill(table, sizeof *(table), sizeof(table))
-
 static void policy_of(void) {
     policy.slots = RT_MAX_SLOTS;
     policy.monitor_count = RT_MAX_MONITORS;

@@ -44,4 +44,11 @@ bool rt_take_bool(rt_cursor *cursor, bool *value) {
     return taken(cursor);
 }
 
+uint32_t rt_cbor_head(uint8_t out[RT_HEAD_BYTES], uint8_t major, uint64_t argument) {
+    Frama_C_make_unknown((char *)out, RT_HEAD_BYTES);
+    return 1 + SIZE(RT_HEAD_BYTES - 1);
+}
+
+uint32_t rt_cbor_int(uint8_t out[RT_HEAD_BYTES], int64_t value) { return rt_cbor_head(out, RT_MAJOR_INT, 0); }
+
 #endif

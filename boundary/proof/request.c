@@ -11,6 +11,7 @@ int main(void) {
     int number = Frama_C_interval(0, 2);
     //@ split number;
     Frama_C_make_unknown((char *)input, sizeof input);
-    rt_bytes data = {input, Frama_C_unsigned_int_interval(0, sizeof input)};
-    return rt_read_request(data, slots[number], monitors[number], &request);
+    uint32_t size = Frama_C_unsigned_int_interval(0, sizeof input);
+    //@ split size;
+    return rt_read_request((rt_bytes){input + sizeof input - size, size}, slots[number], monitors[number], &request);
 }

@@ -107,10 +107,10 @@ rt_refusal rt_add_answer(rt_approvals *approvals, const rt_answered *answered, c
 void rt_keep_answers(rt_approvals *approvals, const rt_mission *mission) {
     uint32_t kept = 0;
     for (uint32_t at = 0; at < approvals->count; at++) {
-        const rt_answered *held = &approvals->held[at];
+        const rt_answered held = approvals->held[at];
         rt_invocation invocation;
-        if (!held->granted || find(mission->invocations, mission->invocation_count, (rt_bytes){held->subject, RT_ID_BYTES}, &invocation))
-            approvals->held[kept++] = *held;
+        if (!held.granted || find(mission->invocations, mission->invocation_count, (rt_bytes){held.subject, RT_ID_BYTES}, &invocation))
+            RT_AT(approvals->held, kept++) = held;
     }
     approvals->count = kept;
 }
@@ -122,7 +122,7 @@ uint32_t rt_answers_about(const rt_approvals *approvals, const rt_invocation *in
     for (uint32_t at = 0; at < approvals->count; at++) {
         const rt_answered *held = &approvals->held[at];
         if (memcmp(held->subject, subjects[held->granted], RT_DIGEST_BYTES) != 0 || !counts(held, now)) continue;
-        out[count++] = (rt_approval){RT_EVERY_RULE, held->role, held->granted, held->monotonic_us, held->person};
+        out[count++ % RT_MAX_ANSWERS] = (rt_approval){RT_EVERY_RULE, held->role, held->granted, held->monotonic_us, held->person};
     }
     return count;
 }

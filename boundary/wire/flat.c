@@ -178,32 +178,39 @@ rt_refusal rt_read_policy(rt_bytes payload, rt_policy *into) {
 static bool invocation(rt_cursor *cursor, rt_invocation *into) {
     const uint8_t *start = cursor->at;
     rt_plan *plan = &into->plan;
-    bool whole = STRUCT(17) && OCTETS(into->invocation_id) && INT(into->step) && INT(into->phase) && INT(into->skill) && INT(into->source) &&
-                 INT(into->role) && rt_take_ints(cursor, &into->arguments) && INT(into->issued_at_us) && INT(into->phases) &&
-                 INT(into->on_inadmissible) && contract(cursor, &into->contract) && STRUCT(4) && INT(plan->kind) &&
-                 rt_take_ints(cursor, &plan->path) && INT(plan->altitude) && INT(plan->speed) && TEXT(into->text) && INT(into->file) &&
-                 INT(into->start) && INT(into->end) && OCTETS(into->binding);
+    if (!STRUCT(17) || !OCTETS(into->invocation_id)) return false;
+    const uint8_t *content = cursor->at;
+    if (!INT(into->step) || !INT(into->phase) || !INT(into->skill) || !INT(into->source) || !INT(into->role) ||
+        !rt_take_ints(cursor, &into->arguments) || !INT(into->issued_at_us) || !INT(into->phases) || !INT(into->on_inadmissible) ||
+        !contract(cursor, &into->contract) || !STRUCT(4) || !INT(plan->kind) || !rt_take_ints(cursor, &plan->path) || !INT(plan->altitude) ||
+        !INT(plan->speed) || !TEXT(into->text) || !INT(into->file) || !INT(into->start) || !INT(into->end))
+        return false;
+    into->content = (rt_bytes){content, (uint32_t)(cursor->at - content)};
+    if (!OCTETS(into->binding)) return false;
     into->raw = (rt_bytes){start, (uint32_t)(cursor->at - start)};
-    return whole;
+    return true;
 }
 
 static bool invocation_bytes(rt_cursor *cursor, rt_bytes *raw) {
     rt_invocation read;
-    bool whole = invocation(cursor, &read);
+    if (!invocation(cursor, &read)) return false;
     *raw = read.raw;
-    return whole;
+    return true;
 }
 
 TABLE(invocations, rt_bytes, RT_MAX_INVOCATIONS, invocation_bytes)
 
 bool rt_take_mission(rt_cursor *cursor, rt_bytes payload, rt_mission *into) {
     const uint8_t *start = cursor->at;
-    bool whole = STRUCT(12) && TEXT(into->name) && TEXT(into->intent) && TEXT(into->proposer) && TEXT(into->vehicle) && TEXT(into->policy) &&
-                 INT(into->policy_version) && OCTETS(into->policy_digest) && INT(into->issued_at_us) && rt_take_texts(cursor, &into->phases) &&
-                 invocations(cursor, into->invocations, &into->invocation_count) && rt_take_texts(cursor, &into->sources) &&
-                 rt_take_octet_strings(cursor, &into->source_digests);
+    if (!STRUCT(12) || !TEXT(into->name) || !TEXT(into->intent) || !TEXT(into->proposer) || !TEXT(into->vehicle) || !TEXT(into->policy) ||
+        !INT(into->policy_version) || !OCTETS(into->policy_digest) || !INT(into->issued_at_us) || !rt_take_texts(cursor, &into->phases))
+        return false;
+    into->before = (rt_bytes){start, (uint32_t)(cursor->at - start)};
+    if (!invocations(cursor, into->invocations, &into->invocation_count)) return false;
+    const uint8_t *behind = cursor->at;
+    bool whole = rt_take_texts(cursor, &into->sources) && rt_take_octet_strings(cursor, &into->source_digests);
     into->payload = payload;
-    into->body = (rt_bytes){start, (uint32_t)(cursor->at - start)};
+    into->behind = (rt_bytes){behind, (uint32_t)(cursor->at - behind)};
     return whole;
 }
 

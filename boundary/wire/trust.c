@@ -107,7 +107,7 @@ static rt_refusal check_revoked(const rt_root *root) {
 }
 
 static rt_refusal check_thresholds(const rt_root *root) {
-    int64_t witnesses = 0;
+    uint32_t witnesses = 0;
     for (uint32_t i = 0; i < root->key_count; i++) witnesses += root->keys[i].duty == RT_DUTY_WITNESS;
     for (int64_t duty = 0; duty < RT_DUTY_BOUNDARY; duty++) { /* one boundary speaks for itself */
         int64_t threshold = root->thresholds[duty];
@@ -191,7 +191,7 @@ rt_refusal rt_open_envelope(rt_bytes envelope, const rt_root *root, int64_t duty
 
 uint32_t rt_person(const rt_root *root, const rt_key *key) {
     uint32_t number = 0;
-    while (!rt_same(root->keys[number].person, key->person)) number++; /* at the latest it is the key itself */
+    while (number < root->key_count && !rt_same(root->keys[number].person, key->person)) number++; /* it is found: at the latest it is the key itself */
     return number;
 }
 

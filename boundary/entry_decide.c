@@ -14,6 +14,7 @@ EXPORT void rt_test_prepare_step(uint32_t step);
 EXPORT void rt_test_decide(const int64_t *asked, uint32_t count, int64_t *answers);
 EXPORT uint32_t rt_test_candidates(void);
 EXPORT uint32_t rt_test_along(uint32_t zone, const uint8_t *path, uint32_t size, uint32_t count, int64_t error);
+EXPORT uint32_t rt_test_compared(uint32_t zone, int64_t y0, int64_t y1, int64_t error);
 EXPORT uint32_t rt_test_exists(uint32_t zone, int64_t low, int64_t high, int64_t error);
 EXPORT uint32_t rt_test_time_of_day(int64_t start, int64_t end, int64_t low, int64_t high, int64_t error);
 EXPORT bool rt_test_home(const int64_t *numbers);
@@ -112,6 +113,8 @@ void rt_test_again(const int64_t *asked, uint32_t times) {
 uint32_t rt_test_along(uint32_t zone, const uint8_t *path, uint32_t size, uint32_t count, int64_t error) {
     return rt_zone_along(&prepared, zone, (rt_list){path, path + size, count}, error);
 }
+
+uint32_t rt_test_compared(uint32_t zone, int64_t y0, int64_t y1, int64_t error) { return rt_zone_compared(&prepared, zone, y0, y1, error); }
 
 uint32_t rt_test_exists(uint32_t zone, int64_t low, int64_t high, int64_t error) {
     return rt_zone_exists(&policy.vehicle, &policy.zones[zone], low, high, error);

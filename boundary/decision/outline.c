@@ -75,6 +75,14 @@ static bool parted(int64_t x, int64_t y, const rt_edge *edge, int64_t x0, int64_
     return rt_max(a, b) < rt_min(c, d) - reach || rt_min(a, b) > rt_max(c, d) + reach;
 }
 
+uint32_t rt_zone_compared(const rt_prepared_policy *policy, uint32_t number, int64_t y0, int64_t y1, int64_t error) {
+    const rt_prepared_zone *zone = &RT_AT(policy->zones, number);
+    if (zone->count == 0) return 0;
+    int64_t first = rt_max(band_of(zone, rt_min(y0, y1) - error), 0), last = rt_min(band_of(zone, rt_max(y0, y1) + error), zone->bands - 1);
+    if (first > last) return 0;
+    return RT_AT(policy->starts, zone->starts + (uint32_t)last + 1) - RT_AT(policy->starts, zone->starts + (uint32_t)first);
+}
+
 static bool clear_of_rings(const rt_prepared_policy *policy, const rt_prepared_zone *zone, int64_t x0, int64_t y0, int64_t x1,
                            int64_t y1, int64_t error) {
     int64_t west = rt_min(x0, x1) - error, east = rt_max(x0, x1) + error, south = rt_min(y0, y1) - error,

@@ -71,6 +71,8 @@ bool rt_zone_contains(const rt_prepared_policy *policy, uint32_t zone, int64_t x
 /* Whether a leg, widened by an error on all sides, is wholly inside or wholly outside, by a margin of at most 3 mm. */
 bool rt_zone_clear(const rt_prepared_policy *policy, uint32_t zone, int64_t x0, int64_t y0, int64_t x1, int64_t y1,
                    int64_t error);
+/* How many edges are compared with a leg between these heights at most. */
+uint32_t rt_zone_compared(const rt_prepared_policy *policy, uint32_t zone, int64_t y0, int64_t y1, int64_t error);
 /* Whether the places along a path are inside a zone, whatever their height; there is at least one. */
 rt_truth rt_zone_along(const rt_prepared_policy *policy, uint32_t zone, rt_list path, int64_t error);
 /* Whether a volume is inside a zone, at any moment from now to `through_us` from now. */

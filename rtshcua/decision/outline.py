@@ -20,7 +20,7 @@ than `REPEATS` times the number of edges.
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from math import isqrt
 from typing import TypeAlias
 
@@ -61,7 +61,7 @@ REPEATS = 4
 class Bands:
     """Edges, by where they are."""
 
-    __slots__ = ("_bands", "_height", "_south")
+    __slots__ = ("_bands", "_before", "_height", "_south")
 
     def __init__(self, edges: Iterable[Leg]) -> None:
         kept = [_edge(*edge) for edge in edges]
@@ -77,6 +77,7 @@ class Bands:
             for band in range(self._band(edge[6]), self._band(edge[7]) + 1):
                 bands[band].append(edge)
         self._bands = tuple(tuple(band) for band in bands)
+        self._before = tuple(accumulate(map(len, bands), initial=0))
 
     def _band(self, y: int) -> int:
         return (y - self._south) // self._height
@@ -99,9 +100,15 @@ class Bands:
                     return False
         return True
 
+    def compared(self, y0: int, y1: int, box: Box) -> int:
+        """How many edges `clear` compares with a leg between these heights at most."""
+        first = max(self._band(min(y0, y1) + box[1]), 0)
+        last = min(self._band(max(y0, y1) + box[3]), len(self._bands) - 1)
+        return self._before[last + 1] - self._before[first] if first <= last else 0
+
     def entries(self) -> int:
         """How many edges are kept, each counted once for each band."""
-        return sum(map(len, self._bands))
+        return self._before[-1]
 
 
 def _edge(x0: int, y0: int, x1: int, y1: int) -> Edge:

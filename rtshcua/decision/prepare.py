@@ -6,6 +6,7 @@ malformed is refused with a value that names it. Signatures, digests and binding
 
 from collections import defaultdict
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import msgspec
@@ -23,7 +24,7 @@ from rtshcua.decision.zones import Place, PreparedZone, WellKnown
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind, Parameter
-from rtshcua.model.flat.limits import MAX_DURATION, MAX_GAP, MAX_VALUE
+from rtshcua.model.flat.limits import MAX_COMPARED, MAX_DURATION, MAX_GAP, MAX_VALUE
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, Monitor, Policy, Rule, RuleKind
 from rtshcua.model.flat.signal import POSITION
@@ -329,6 +330,9 @@ def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedI
     problem = next(mission_checks.mission(mission, policy.policy), None)
     if problem is not None:
         return Refusal("malformed", problem)
+    refused = paths_fit(mission, policy)
+    if refused is not None:
+        return refused
     prepared: list[PreparedInvocation] = []
     slowest = 0
     for step, invocation in enumerate(mission.invocations):
@@ -338,6 +342,19 @@ def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedI
         prepared.append(at_slowest(found, slowest))
         slowest = slower(slowest, invocation.plan.speed)
     return tuple(prepared)
+
+
+def paths_fit(mission: Mission, policy: PreparedPolicy) -> Refusal | None:
+    """Whether deciding about the mission's paths takes no longer than a request may: what is wrong if it does."""
+    error = policy.policy.vehicle.position_error
+    box, compared = (-error, -error, error, error), 0
+    for step, invocation in enumerate(mission.invocations):
+        for y0, y1 in pairwise(invocation.plan.path[1::2]):
+            compared += sum(1 + zone.shape.compared(y0, y1, box) for zone in policy.tables.zones)
+            if compared > MAX_COMPARED:
+                text = f"the legs of its paths would be compared with more than {MAX_COMPARED:,} edges of zones"
+                return Refusal("malformed", f"step {step}: {text}", "fewer points of its paths, or of the zones there")
+    return None
 
 
 def at_slowest(prepared: PreparedInvocation, slowest: int) -> PreparedInvocation:

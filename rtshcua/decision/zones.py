@@ -36,6 +36,10 @@ class Circle:
         dx, dy = x - self._x, y - self._y
         return dx * dx + dy * dy < self._square
 
+    def compared(self, y0: int, y1: int, box: Box) -> int:
+        """How many edges are compared with a leg: none."""
+        return 0
+
     def clear(self, x0: int, y0: int, x1: int, y1: int, box: Box) -> bool:
         """Whether the widened leg is wholly inside, or wholly outside by a margin of at most 3 mm."""
         west, south, east, north = box
@@ -67,12 +71,13 @@ class Circle:
 class Area:
     """The inside of the rings of a polygon, or of areas with holes."""
 
-    __slots__ = ("clear", "contains")
+    __slots__ = ("clear", "compared", "contains")
 
     def __init__(self, zone: Zone) -> None:
         legs = tuple(edges(zone))
         self.contains = Slabs(legs).contains
-        self.clear = Bands(legs).clear
+        bands = Bands(legs)
+        self.clear, self.compared = bands.clear, bands.compared
 
 
 class PreparedZone:

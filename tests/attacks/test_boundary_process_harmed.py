@@ -20,8 +20,13 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from msgspec.structs import replace
 
 from boundary.together import PIN, SIGNED_ROOT
+from reference import flat_case as flat
+from reference import outlines
+from reference.documents import presented, replacement
+from reference.flat_case import M, S
 from reference.world import (
     ROOT,
     START,
@@ -33,6 +38,9 @@ from reference.world import (
 )
 from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, kept_file, program
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import FORGED, OUT_OF_TURN, USED
 from rtshcua.onboard.enforcement.isolated import BEGIN, ENFORCE, LOAD, MAX_PART, PART, PRESENT, STATEMENT, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
@@ -59,9 +67,9 @@ class Held:
         assert isinstance(answer, bytes)
         return int.from_bytes(answer[:8], "big"), answer[8:]
 
-    def load(self) -> Loaded | Refusal:
+    def load(self, bundle: bytes | None = None) -> Loaded | Refusal:
         return load(
-            sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=bytes(32),
+            bundle or sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=bytes(32),
             flight=bytes(16), peer_is_own_simulator=False, caller=self.caller,
         )  # fmt: skip
 
@@ -170,6 +178,44 @@ def test_parts_of_two_things_do_not_mix(held: Held) -> None:
     whole = struct.pack(">qqqI", AT_US, START.utc_us, START.utc_error_us, len(bundle))
     answer = held.caller(LOAD, whole)
     assert isinstance(answer, bytes), answer
+
+
+def long_ways(legs: int) -> tuple[Policy, Mission]:
+    """A survey of so many legs beside an area whose edges all run through nearly all heights."""
+    band = outlines.polygon(tuple((x + 300 * M, y) for x, y in outlines.zig_zag(2_000)))
+    airspace = flat.POLICY.airspace
+    assert airspace is not None
+    closed = replace(airspace, outside=(*airspace.outside, len(flat.ZONES)))
+    policy = replace(flat.POLICY, zones=(*flat.ZONES, band), airspace=closed)
+    path = tuple(part for at in range(legs + 1) for part in (110 * M + 20 * at, -20 * M * (-1) ** at))
+    steps = list(flat.MISSION.invocations)
+    inspection = steps[flat.INSPECTION_STEP]
+    steps[flat.INSPECTION_STEP] = replace(inspection, plan=replace(inspection.plan, path=path))
+    return policy, replace(flat.MISSION, invocations=tuple(steps))
+
+
+def test_no_path_keeps_an_answer_from_coming_in_time(tmp_path: Path) -> None:
+    """What a path answers about each zone is found when its step is asked for, in the air: there a boundary that takes
+    longer than a second is given up. A mission with such a path is refused, and so is a replacement.
+    """
+    held = Held(tmp_path)
+    refused = held.load(sealed(*long_ways(2_000)))
+    assert isinstance(refused, Refusal)
+    assert refused.slug == "malformed"
+    policy, mission = long_ways(500)
+    flown = held.load(sealed(policy, mission))
+    assert isinstance(flown, Loaded), flown
+    worse = replace(long_ways(2_000)[1], issued_at_us=mission.issued_at_us + S)
+    for step in range(3):
+        if step == flat.INSPECTION_STEP:
+            assert presented(flown, replacement(flown, step, worse)).slug == "malformed"
+        answer = answer_to(flown, request_for(flown, step=step))
+        assert isinstance(answer, Answer), answer
+        assert answer.outcome is Outcome.ALLOW
+        assert isinstance(flown.executor.dispatch(answer.permit, AT_US), Dispatch)
+        flown.executor.ended()
+    assert not held.caller.lost
+    held.process.close()
 
 
 # ---------------------------------------------------------------------------------------------------- kill -9

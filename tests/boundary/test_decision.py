@@ -5,7 +5,7 @@ same links that may fly, and the same policies and missions that are refused.
 import ctypes
 import json
 from contextlib import suppress
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from random import Random
 
@@ -26,7 +26,7 @@ from rtshcua.decision.zones import PreparedZone
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import QUANTITY, MotionKind, Parameter, SourceKind, TimingClass
-from rtshcua.model.flat.limits import DAY, MAX_GAP, MAX_TOTAL_VERTICES, MAX_VALUE
+from rtshcua.model.flat.limits import DAY, MAX_COMPARED, MAX_GAP, MAX_TOTAL_VERTICES, MAX_VALUE
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy, RuleKind
 from rtshcua.model.flat.situation import Approval
@@ -219,6 +219,10 @@ def test_places_and_ways_are_inside_of_areas_alike(native: Native) -> None:
                 error = of.choice([0, 0, 1, reach // 5])
                 truth = prepared.along(path, (-error, -error, error, error))
                 assert native.along(number, path, error) == truth, (zone, path, error)
+                for y0, y1 in pairwise(path[1::2]):
+                    assert native.compared(number, y0, y1, error) == prepared.shape.compared(
+                        y0, y1, (-error, -error, error, error)
+                    )
 
 
 def test_rings_are_refused_alike(native: Native) -> None:
@@ -378,6 +382,23 @@ def test_a_long_survey_is_remembered_with_its_step(native: Native) -> None:
         {flat.POSITION_X: of.randrange(-600, 600) * M, flat.POSITION_Y: of.randrange(-600, 600) * M} for _ in range(60)
     ]
     agree(native, invocations[0], [Question(flat.state(dict(place)), context, flat.NOW) for place in places])
+
+
+def test_paths_that_are_compared_with_too_many_edges_are_refused_alike(native: Native) -> None:
+    """A request waits for what its step's path answers about each zone, and in flight none may take long."""
+    band = outlines.polygon(tuple((x + 300 * M, y) for x, y in outlines.zig_zag(2_000)))
+    policy = replace(flat.POLICY, zones=(*flat.ZONES, band))
+    prepared = prepare(policy)
+    assert isinstance(prepared, PreparedPolicy), prepared
+    south, north, error = -20 * M, 20 * M, policy.vehicle.position_error
+    each = sum(1 + zone.shape.compared(south, north, (-error, -error, error, error)) for zone in prepared.tables.zones)
+    assert each > 2 * len(band.data) // 2, "an edge is looked at in each band that it runs through"
+    legs = MAX_COMPARED // each
+    step = flat.INVOCATIONS[flat.INSPECTION_STEP]
+    for more in (0, 1):
+        path = tuple(part for at in range(legs + 1 + more) for part in (110 * M + 20 * at, north if at % 2 else south))
+        of = rich_worlds.mission(replace(step, plan=replace(step.plan, path=path)))
+        assert (load(native, policy, of) is None) is bool(more)
 
 
 def test_the_last_phase_that_a_step_can_be_valid_in(native: Native) -> None:

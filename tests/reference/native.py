@@ -102,6 +102,10 @@ class Native:
         items = b"".join(cbor.encode(each) for each in path)
         return int(self._library.rt_test_along(zone, items, len(items), len(path), ctypes.c_int64(error)))
 
+    def compared(self, zone: int, y0: int, y1: int, error: int) -> int:
+        """How many edges of a zone are compared with a leg between these heights at most."""
+        return int(self._library.rt_test_compared(zone, *map(ctypes.c_int64, (y0, y1, error))))
+
     def exists(self, zone: int, low: int, high: int, error: int) -> int:
         """The truth of a zone's existing at the moments from one to another, which are known to within an error."""
         return int(self._library.rt_test_exists(zone, *map(ctypes.c_int64, (low, high, error))))

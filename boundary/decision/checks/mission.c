@@ -90,8 +90,21 @@ static bool leads_right(const rt_invocation *one, const rt_prepared_policy *poli
     }
 }
 
+/* Whether the legs of a path are compared with no more edges than `*left`, of which they are taken. */
+static bool few_compared(const rt_prepared_policy *prepared, rt_list path, int64_t *left) {
+    const rt_policy *policy = prepared->policy;
+    int64_t x, y0, y1;
+    if (!rt_next_int(&path, &x) || !rt_next_int(&path, &y0)) return true;
+    for (; rt_next_int(&path, &x) && rt_next_int(&path, &y1); y0 = y1) {
+        for (uint32_t zone = 0; zone < policy->zone_count; zone++)
+            *left -= 1 + (int64_t)rt_zone_compared(prepared, zone, y0, y1, policy->vehicle.position_error);
+        if (*left < 0) return false;
+    }
+    return true;
+}
+
 /* Arguments out of range are for the decision to refuse, so that it is recorded. */
-static bool check_invocation(const rt_invocation *one, const rt_prepared_policy *prepared) {
+static bool check_invocation(const rt_invocation *one, const rt_prepared_policy *prepared, int64_t *compared) {
     const rt_policy *policy = prepared->policy;
     rt_list left = one->arguments;
     uint8_t cells[RT_MAX_CELLS];
@@ -107,7 +120,8 @@ static bool check_invocation(const rt_invocation *one, const rt_prepared_policy 
     if (left.count != rt_cells(&one->contract)) return false;
     while (rt_next_int(&left, &argument))
         if (!rt_within(argument, -RT_MAX_VALUE, RT_MAX_VALUE)) return false;
-    return check_plan(&one->plan, &one->contract.motion, one->arguments, &policy->projection) && leads_right(one, prepared);
+    return check_plan(&one->plan, &one->contract.motion, one->arguments, &policy->projection) &&
+           few_compared(prepared, one->plan.path, compared) && leads_right(one, prepared);
 }
 
 static bool id_after(const void *of, uint16_t one, uint16_t other) {
@@ -118,6 +132,7 @@ static bool id_after(const void *of, uint16_t one, uint16_t other) {
 bool rt_check_mission(const rt_mission *mission, rt_prepared_policy *prepared) {
     const rt_policy *policy = prepared->policy;
     rt_scratch *scratch = &prepared->scratch;
+    int64_t compared = RT_MAX_COMPARED;
     rt_invocation one;
     if (!rt_same(mission->policy, policy->name) || mission->policy_version != policy->version ||
         !rt_same(mission->vehicle, policy->vehicle.identity))
@@ -130,7 +145,7 @@ bool rt_check_mission(const rt_mission *mission, rt_prepared_policy *prepared) {
         if (!none_worded(prepared, one.contract.require) || !none_worded(prepared, one.contract.assume) ||
             !none_worded(prepared, one.contract.maintain))
             return false;
-        if (!check_invocation(&one, prepared)) return false;
+        if (!check_invocation(&one, prepared, &compared)) return false;
         scratch->ids[step] = one.invocation_id;
         scratch->order[step] = (uint16_t)step;
     }

@@ -34,6 +34,9 @@ MAX_RULE_KEYS = 1 << 18  # entries of the rule index: skills times roles, summed
 MAX_INVOCATIONS = 16_384
 MAX_PHASES = 64
 MAX_PATH = 8_192  # points
+#: edges of zones that the legs of a mission's paths are compared with, and one for each leg and zone: a request waits
+#: for those of its step, and in flight the boundary has a second for an answer
+MAX_COMPARED = 1 << 23
 MAX_MONITORS = 32
 MAX_WINDOW = 600_000_000  # us: how far back a temporal monitor looks
 MAX_GAP = 1_000_000  # us: when more time passes between two observations, what was in between is not known

@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 from rtshcua.decision.flying import slower
-from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, at_slowest, prepare
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, at_slowest, paths_fit, prepare
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
@@ -58,6 +58,11 @@ def _asked(policy: Policy) -> tuple[PreparedPolicy, Questions] | Refusal:
 
 def prove_mission(ground: Ground, declared: MissionDecl, mission: Mission) -> tuple[StepBound, ...]:
     """The proofs of a mission under a policy; what each step takes at most, as far as the mission can be flown."""
+    too_long = paths_fit(mission, ground.prepared)
+    if too_long is not None:
+        text = f"`{declared.name.text}` does not fit on board: {too_long.text}"
+        ground.context.report.add(codes.TOO_MANY, declared.name.span, text, help=too_long.help)
+        return ()
     prepared: list[PreparedInvocation] = []
     slowest = 0
     for invocation in mission.invocations:

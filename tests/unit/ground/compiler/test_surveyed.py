@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from rtshcua.decision import prepare
+from rtshcua.diagnostics import codes
 from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.compiler.surveyed import Planned, planned_otherwise
 from rtshcua.ground.language.load import load
@@ -136,3 +138,12 @@ def test_where_nothing_can_be_planned_any_path_is_another(pattern: int) -> None:
 def test_a_step_that_covers_nothing_has_no_path_to_choose() -> None:
     policy, one = compiled(CALLS[3])
     assert planned_otherwise(policy, replace(one, plan=replace(one.plan, kind=4, path=(0, 0)))) is None
+
+
+def test_a_survey_that_is_compared_with_too_many_edges_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What would be refused on board is a finding of the compiler."""
+    monkeypatch.setattr(prepare, "MAX_COMPARED", 3)
+    program = load([str(CHECKOUT / "missions" / "standard.rts")], lambda name: Path(name).read_bytes(), str(CHECKOUT))
+    found = compile_program(program, dialect.load(), mission=None, issued_at_us=0)
+    (told,) = [each.message for each in found.diagnostics if each.code is codes.TOO_MANY]
+    assert told.endswith("the legs of its paths would be compared with more than 3 edges of zones")

@@ -27,8 +27,8 @@ enum {
     RT_CALL_PREPARE = 16,   /* now (8), a preparation permit */
     RT_CALL_PREPARED = 17,  /* nothing more is set */
     RT_CALL_STANDS = 18,    /* now (8) -> whether the vehicle is known to stand on the ground (1) */
-    RT_CALL_AHEAD = 19, /* now (8), kind (1), link (1), the standing permit (56), then each frame of the link: size (2), octets -> the
-                           serial of the link's permit (8), then the signature of each frame (13), if the link has a key */
+    RT_CALL_AHEAD = 19, /* now (8), kind (1), link (1), the standing permit (56), then each frame of the link: size (2), octets
+                           -> the serial of the link's permit (8), then the signature of each frame (13) if the link has a key */
     RT_CALL_FLIGHT = 20, /* -> the id of the flight that the next bundle begins (16) */
     RT_CALL_LOG = 21     /* the checkpoint that begins the log of the flight -> its signature by the log's key (64) */
 };

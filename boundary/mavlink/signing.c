@@ -6,7 +6,7 @@
 #define MINUTE 6000000LL
 #define SECOND 100000LL
 #define LAST ((1LL << 48) - 366LL * 24 * 60 * MINUTE) /* what claims the last year of the 48 bits is believed no more */
-#define LEADS_EVERY_US 1000000LL /* who is given what is signed ahead makes time run this much faster at most: RT_LEAD in a second */
+#define LEADS_EVERY_US 1000000LL /* so an attacker who sends what is signed ahead raises time by RT_LEAD + MOST_AHEAD a second */
 #define MOST_AHEAD SECOND /* how far what is signed ahead may reach above RT_LEAD, in timestamps: a batch needs some hundreds */
 #define STAMP 6
 #define TAG 6

@@ -24,7 +24,7 @@ _SECOND: Final = 100_000
 #: What is signed ahead begins so far, in timestamps, above what is signed now: as long as normal frames go on, it is
 #: good for that long.
 LEAD: Final = 3_000_000
-#: It begins anew no more often than this, in us: who is given it makes time run no faster than `LEAD` in a second.
+#: It begins anew no more often than this, in us: an attacker who sends it raises time by `LEAD + MOST_AHEAD` a second.
 _LEADS_EVERY_US: Final = 1_000_000
 #: How far it may reach above `LEAD`, in timestamps: one each frame. A batch needs some hundreds.
 MOST_AHEAD: Final = _SECOND

@@ -21,10 +21,11 @@ from boundary.test_lost import apart as apart
 from rtshcua.adapters.vehicle import messages
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.framing import FLAG_SIGNED, with_flags
+from rtshcua.mavlink.framing import FLAG_SIGNED, SIGNATURE, with_flags
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
-from rtshcua.mavlink.signing import EPOCH_US, UNIT_US, SignedLink, State, timestamp_in
+from rtshcua.mavlink.signing import EPOCH_US, LEAD, MOST_AHEAD, UNIT_US, SignedLink, State, timestamp_in
 from rtshcua.model.faults import Mode
+from rtshcua.onboard.enforcement.ahead import MOST
 from rtshcua.onboard.enforcement.isolated import AHEAD, DISPATCH, SEAL, STATEMENT
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire.boundary_chain import BoundaryChain
@@ -197,6 +198,22 @@ def test_links_that_are_flown_while_the_boundary_lives_leave_no_trace_but_a_coun
         expected.sign_ahead(frame)
     assert (after.count, after.digest, after.frames) == (before.count, before.digest, before.frames)
     assert (after.ahead, after.aside) == (before.ahead + len(frames), expected.aside)
+
+
+def test_a_flood_does_not_make_frames_good_for_longer(thief: Thief) -> None:
+    thief.until(2)
+    permit, land = thief.permits[-1], pack(messages.set_mode(1, Px4Mode.LAND))
+    call, kept = [land] * MOST, b""
+    for _ in range(2 * MOST_AHEAD // MOST):
+        answer = thief.ask(permit, CONTINGENCY_LINK, 2, *call)
+        if isinstance(answer, str):
+            break
+        kept = with_flags(land, FLAG_SIGNED) + answer[-SIGNATURE:]
+    assert answer == "frame/too-many-ahead"
+    normal = thief.of._answer(
+        bytes([SEAL]) + struct.pack(">q", thief.of.flight.clock.monotonic_us) + pack(messages.heartbeat())
+    )
+    assert LEAD < timestamp_in(kept) - timestamp_in(normal[1:]) <= LEAD + MOST_AHEAD
 
 
 def test_a_frame_that_is_refused_is_no_frame_that_was_stopped(thief: Thief) -> None:

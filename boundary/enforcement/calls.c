@@ -44,7 +44,7 @@ static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, u
     rt_heard heard = RT_ACCEPTED;
     if (gate->signs) {
         heard = rt_accept_frame(&gate->signer, frame, now_us);
-        const bool whole = frame.size == RT_HEADER + (uint32_t)frame.at[1] + RT_CHECKSUM + RT_SIGNATURE;
+        const bool whole = frame.size > RT_HEADER && frame.size == RT_HEADER + (uint32_t)frame.at[1] + RT_CHECKSUM + RT_SIGNATURE;
         if (heard == RT_ACCEPTED && frame.size <= sizeof bare && whole) {
             memcpy(bare, frame.at, frame.size);
             rt_set_flags(bare, 0);

@@ -63,7 +63,7 @@ def every_character() -> None:
 
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
-COVERING = ("unit/decision", "unit/wire", "unit/evidence", "attacks/test_log_boundary.py", "boundary/test_full.py")
+COVERING = ("unit/decision", "unit/wire", "unit/evidence", "attacks/test_log_boundary.py")
 #: what they cover (`pyproject.toml` names it too)
 COVERED = ("rtshcua.decision", "rtshcua.evidence", "rtshcua.wire")
 

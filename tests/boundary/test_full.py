@@ -62,6 +62,7 @@ def both(shadow: Shadow, policy: Policy = flat.POLICY, mission: Mission = flat.M
     return loaded
 
 
+@pytest.mark.soak
 def test_as_many_answers_as_one_flight_keeps(shadow: Shadow) -> None:
     """People may answer more than is kept: what is kept stays, and the next one is told so."""
     first, *_, last = flat.MISSION.invocations
@@ -96,6 +97,7 @@ def test_more_rules_than_answers_are_kept_ask_about_one_step(granted: int, shado
     assert (answer_.outcome, answer_.reason) == expected
 
 
+@pytest.mark.soak
 def test_as_many_permits_as_one_session_dispatches(shadow: Shadow) -> None:
     of = both(shadow)
     at_us = START.monotonic_us

@@ -39,6 +39,7 @@ lint: setup ## check style, format, types and layers, of our sources too
 soak: setup ## run the long campaigns, and every property test with many examples; flights go on where they stopped
 	$(BIN)/pytest -n $(JOBS) --most 0 -m "soak or hypothesis" --hypothesis-profile soak
 	RTSHCUA_BOUNDARY=build/boundary/librtshcua.so $(BIN)/pytest -p reference.shadow
+	@if command -v frama-c >/dev/null; then make -C boundary proof; else echo "soak: no frama-c, so nothing was proved"; fi
 	$(BIN)/rtshcua campaign missions/short.rts --at 2026-06-01T08:00:00Z --flights $(or $(FLIGHTS),100000) -o build/soak-campaign
 
 fuzz: setup ## look for inputs that break parser, checker, compiler or boundary: MINUTES=10, TARGETS=... for some

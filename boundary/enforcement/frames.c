@@ -194,10 +194,9 @@ rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes
     const uint32_t whole = (uint32_t)rt_min(frame.size, RT_LARGEST_FRAME - RT_SIGNATURE); /* which no frame exceeds */
     if (gate->signs) {
         memcpy(octets, frame.at, whole);
-        uint32_t size = rt_sign_ahead(&gate->signer, octets, whole, now_us);
-        if (size == 0)
+        if (rt_sign_ahead(&gate->signer, octets, whole, now_us) == 0)
             return "frame/too-many-ahead";
-        memcpy(out, octets + size - RT_SIGNATURE, RT_SIGNATURE);
+        memcpy(out, octets + whole, RT_SIGNATURE);
         rt_chain_sign_ahead(gate->chain, frame);
     }
     return NULL;

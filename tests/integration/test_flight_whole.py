@@ -181,7 +181,9 @@ def test_bundle_flies_once(watched: Flown) -> None:
     again = watched.ground.run(watched.bundle).end()
     assert again.code == ExitCode.REFUSED
     assert "a bundle flies once" in again.stderr
-    assert again.events == [{"event": "refused", "slug": "replayed", "text": again.events[0]["text"], "exit_code": 5}]
+    (said,) = again.events
+    assert (said["event"], said["slug"], said["exit_code"]) == ("refused", "replayed", 5)
+    assert said["help"] == "compile the mission again, which issues it anew"
     assert len(list((watched.ground.folder / "runs").iterdir())) == 1
 
 

@@ -506,3 +506,13 @@ def test_kinds_of_parameters_are_those_of_the_model() -> None:
     assert (QUANTITY, CHOICE, ZONE, PLACE) == (0, 1, 2, 3)
     assert (MotionKind.COVER, POLYGON) == (3, 1)
     assert isinstance(P.zones[0], Zone)
+
+
+def test_paths_that_take_long_to_decide_about_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    policy = prepare(flat.POLICY)
+    assert isinstance(policy, PreparedPolicy)
+    assert not isinstance(prepare_mission(flat.MISSION, policy), Refusal)
+    monkeypatch.setattr("rtshcua.decision.prepare.MAX_COMPARED", 3)
+    refused = prepare_mission(flat.MISSION, policy)
+    assert isinstance(refused, Refusal)
+    assert refused.text.endswith("compared with more than 3 edges of zones")

@@ -33,6 +33,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.evidence.report import Verdict
 from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.model.faults import Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
@@ -324,6 +325,12 @@ _MM: Final = 11.132  # in 1e-7 degree
 _SAME_MM: Final = 2_000
 _ASKS: Final = frozenset({401, 511, 512})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
+_SET_MODE: Final = 176
+#: the modes of `_MODES` in which no target is reported
+_NO_TARGET: Final[Mapping[str, Mapping[tuple[int, int], Mode]]] = {
+    "px4": {(4, 5): Mode.RETURN, (4, 6): Mode.LAND},
+    "ardupilot": {(17, 0): Mode.BRAKE, (6, 0): Mode.RETURN, (9, 0): Mode.LAND},
+}
 #: what DO_SET_MODE is a part of, by its parameters 2 and 3
 _MODES: Final[Mapping[str, Mapping[tuple[int, int], frozenset[MotionKind]]]] = {
     "px4": {
@@ -391,7 +398,8 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     """Frames that left later than W after a takeover took effect.
 
     One that was on its way then undoes the takeover. Where nothing of that shows, ours counts (docs/adr/0034): what
-    follows is an exception. So it is where a pilot stops what stands already, told so by us.
+    follows is an exception. So it is where a pilot stops what stands already, told so by us, and as long as it flies in
+    the mode that the last frame before asked for, which was lost: the report looks as if that frame had arrived.
     """
     times = [sample.at_us for sample in flown.samples]
     found, latest, crossed = list[Failure](), None, False
@@ -414,7 +422,9 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
         then = flown.samples[bisect_left(times, since_us)]
         stood = excuses.paused_at(since_us) and then.in_air and _is_still(then) and _ends_at(last, then)
-        cause = "crossed" if crossed else "unseen" if stood else "ground" if lands else None
+        as_lost = _flies_as_lost(flown, motion, times, since_us, max(since_us, frame.sent_us - within_us))
+        cause = "crossed" if crossed else "unseen" if stood or as_lost else "ground" if lands else None
+        crossed = crossed or (as_lost and frame.heard_us is not None)
         found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us, cause))
     return found, latest
 
@@ -431,6 +441,29 @@ def _ends_at(last: tuple[Frame, frozenset[MotionKind]] | None, sample: Sample) -
         return False
     north, east = (message.x - sample.latitude) * _MM, (message.y - sample.longitude) * _MM
     return hypot(north, east * cos(radians(sample.latitude / 1e7))) <= _SAME_MM
+
+
+def _flies_as_lost(flown: ScenarioFlown, motion: Motion, times: Sequence[int], from_us: int, to_us: int) -> bool:
+    """Whether each mode between two moments is the one that our last frame before it asked for, which was lost."""
+    mode, before_us = None, from_us
+    for sample in flown.samples[bisect_left(times, from_us) : bisect_left(times, to_us) + 1]:
+        if sample.mode is not mode:
+            mode = sample.mode
+            sent = bisect_left(motion, before_us, key=lambda each: each[0].sent_us)
+            if sent == 0 or _lost_mode(motion[sent - 1][0], flown.flavour) is not mode:
+                return False
+        before_us = sample.at_us
+    return True
+
+
+def _lost_mode(frame: Frame, flavour: str) -> Mode | None:
+    """The mode that a lost frame asked for, where that mode reports no target, which would tell who chose it."""
+    if frame.heard_us is not None:
+        return None
+    message = dialect.MAVLink(None).decode(bytearray(frame.octets))
+    if getattr(message, "command", None) != _SET_MODE:
+        return None
+    return _NO_TARGET[flavour].get((int(message.param2), int(message.param3)))
 
 
 def _name(frame: Frame) -> str:

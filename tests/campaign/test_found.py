@@ -8,6 +8,7 @@ from campaign.flying import flown
 from campaign.test_wrong import at, of, slugs
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.scenario import Incident
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
 
@@ -150,3 +151,15 @@ def test_a_target_that_is_told_late_is_waited_for_before_a_restart_takes_the_fli
     mute = at(15.5, faults.MessageSilence(0, "POSITION_TARGET_GLOBAL_INT", 2_300_000))
     was = flown(of("px4", at(13, faults.RuntimeKilled(0, 3 * S)), at(14, GOTO), mute))
     assert (was.ending, slugs(was)) == ("stood-down", set())
+
+
+@pytest.mark.parametrize(
+    "taken",
+    [at(468, faults.BatteryLevel(0, 900)), at(513.5, faults.PilotMode(0, Mode.LAND))],
+    ids=["failsafe", "pilot"],
+)
+def test_a_landing_that_is_sent_again_to_a_vehicle_that_was_landed_by_others_is_excused(taken: Incident) -> None:
+    """The link to it was dead, so ours had not arrived; its mode was the one that ours asks for."""
+    was = flown(of("ardupilot", at(35, faults.LinkSilence(0, None, Way.UP)), taken))
+    assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
+    assert {each.cause for each in judge(was).exceptions} == {"unseen"}

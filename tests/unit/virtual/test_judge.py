@@ -381,6 +381,31 @@ def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
     assert causes(taken(2 * S, more=[at_once])) == [("motion-after-takeover", "crossed")]
 
 
+def test_a_takeover_by_the_mode_that_a_lost_frame_asked_for(good: ScenarioFlown) -> None:
+    """It looks as if that frame had arrived. Another mode, or a frame that did arrive, excuses nothing."""
+    land, hold = long(176, 1, 9), long(176, 1, 17)
+    since_us, again_us = 30 * S, 33 * S
+
+    def sent_again(before: Frame, *modes: tuple[float, Mode], heard_us: int | None = None) -> Judgement:
+        samples = [
+            sample(at_us / S, mode=next((mode for to_s, mode in modes if at_us < to_s * S), Mode.LAND))._replace(
+                taken_over_us=since_us if at_us >= since_us else None, taken_over_by="failsafe"
+            )
+            for at_us in range(0, 40 * S, S // 10)
+        ]
+        return judged(good, samples, frames=(before, Frame(again_us, heard_us, land)), flavour="ardupilot")
+
+    def taken(found: Judgement) -> list[tuple[str, str | None]]:
+        return [each for each in causes(found) if each[0] == "motion-after-takeover"]
+
+    lost = Frame(20 * S, None, land)
+    assert taken(sent_again(lost)) == [("motion-after-takeover", "unseen")]
+    assert "motion-after-takeover" in slugs(sent_again(Frame(20 * S, 20 * S, land)))
+    assert "motion-after-takeover" in slugs(sent_again(Frame(20 * S, None, hold)))
+    assert "motion-after-takeover" in slugs(sent_again(lost, (60, Mode.POSITION)))
+    assert "motion-after-takeover" in slugs(sent_again(lost, (31, Mode.LAND), (60, Mode.POSITION)))
+
+
 def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 

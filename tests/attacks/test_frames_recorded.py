@@ -236,3 +236,14 @@ def test_a_parameter_that_no_record_lists(kind: str, name: str) -> None:
 def test_a_fence_is_switched_on_before_the_flight_alone(kind: str) -> None:
     assert beside(kind, FENCE_ON, before_takeoff) is None
     assert beside(kind, FENCE_ON, on_the_way) == "frames/unlisted-parameter"
+
+
+def test_what_may_be_sent_before_the_flight_may_be_until_the_very_moment_of_its_first_command() -> None:
+    """A simulated vehicle's clock stood still from the one to the other."""
+
+    def at(after_us: int) -> Callable[[tuple[bytes, ...]], int]:
+        return lambda lines: moment(lines, "dispatched", 0) + after_us
+
+    for frame, late in ((FENCE_ON, "unlisted-parameter"), (COMMANDS["a fence in flight"], "other-command")):
+        assert beside("ardupilot", frame, at(0)) is None
+        assert beside("ardupilot", frame, at(1)) == f"frames/{late}"

@@ -81,6 +81,11 @@ def test_a_write_that_is_sent_again_when_it_is_done() -> None:
         assert beside(first, at_us) == "frames/unlisted-parameter"
 
 
+def test_a_write_at_the_very_moment_at_which_it_is_done() -> None:
+    (_, first), *_ = writes()
+    assert beside(first, moment("prepared")) is None
+
+
 @rows(("octets"), [setting(81.0), setting(80.0, b"FENCE_RADIUS"), setting(15.0), setting(0.0, b"ARMING_CHECK")])
 def test_a_write_of_something_else_than_the_record_lists(octets: bytes) -> None:
     assert beside(octets, moment("preparation") + 1) == "frames/unlisted-parameter"

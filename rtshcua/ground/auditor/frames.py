@@ -67,6 +67,21 @@ class _Running(NamedTuple):
     record: int
 
 
+class _Allowed(NamedTuple):
+    """What may be sent besides what is harmless: frames that do any of `targets`, parameters that are `listed`, and
+    those of the `fence`.
+    """
+
+    targets: tuple[Target, ...] = ()
+    listed: tuple[Listed, ...] = ()
+    fence: bool = False
+
+    def or_as(self, other: "_Allowed") -> "_Allowed":
+        """What either allows, each once."""
+        targets, listed = {*self.targets, *other.targets}, {*self.listed, *other.listed}
+        return _Allowed(tuple(targets), tuple(listed), self.fence or other.fence)
+
+
 class _Stated(NamedTuple):
     """How many frames had passed the gate, their digest, and the record that says so."""
 
@@ -149,8 +164,9 @@ class Frames:
         self._types: dict[int, float] = {}  # FENCE_TYPE
         self._listed: tuple[Listed, ...] = ()  # the parameters that may be written
         self._running: _Running | None = None
-        self._ended: tuple[_Running, int] | None = None  # what ended last, and when
         self.begun = False
+        self._changed_us = -1  # when the last record was made,
+        self._before = _Allowed()  # and what was allowed until that moment, or since then until a later record of it
         self._record = 0
         self._suspect: _Suspect | None = None
         self._finding: Finding | None = None
@@ -167,12 +183,15 @@ class Frames:
         if self._finding is not None:
             return
         self._until(record.utc_us)
+        before = self._allowed()
+        self._before = before.or_as(self._before) if record.utc_us == self._changed_us else before
+        self._changed_us = record.utc_us
         self._listed = listed
         running = self._running
         if record.event == DISPATCHED:
             self._dispatched(record)
         elif running is not None and record.token == running.token:
-            self._running, self._ended = None, (running, record.utc_us)
+            self._running = None
         self._record = record.seq
 
     def stated(self, count: int, digest: bytes, record: Effect, *, final: bool) -> None:
@@ -189,6 +208,11 @@ class Frames:
         if self._finding is None:
             self._finding = self._passed.over()
         return self._finding
+
+    def _allowed(self, at_us: int | None = None) -> _Allowed:
+        """What may be sent now; with the moment of a frame, also what might be until that very moment."""
+        now = _Allowed(() if self._running is None else self._running.targets, self._listed, not self.begun)
+        return now.or_as(self._before) if at_us == self._changed_us else now
 
     def _dispatched(self, record: Effect) -> None:
         targets = self._targets(record)
@@ -243,29 +267,30 @@ class Frames:
         if frame.component != OURS or (self._autopilots and frame.system not in self._autopilots):
             return
         what = nature(frame)
-        if what is Nature.HARMLESS or (what is Nature.FENCE and not self.begun):
+        if what is Nature.HARMLESS:
+            return
+        allowed = self._allowed(entry.at_us)
+        if what is Nature.FENCE and allowed.fence:
             return
         if what is Nature.SETTING:
-            self._set(frame, entry)
+            self._set(frame, entry, allowed)
             return
         self.count += 1
         self._finding = self._finding or self._passed.frame(entry.octets)
         if self._suspect is not None or self._finding is not None:
             return
-        running, ended = self._running, self._ended
-        if ended is not None and entry.at_us == ended[1] and self._any(frame, ended[0].targets):
-            return
+        running = self._running
         suspect = _Suspect(frame, entry.number, entry.at_us, self._record, running is not None)
-        if running is None or not self._any(frame, running.targets):
+        if not self._any(frame, allowed.targets):
             self._suspect = suspect
-        elif entry.at_us < running.since_us:  # frames do not stand in the order of their times
+        elif running is not None and entry.at_us < running.since_us:  # frames do not stand in the order of their times
             self._finding = _early(suspect, running.since_us, running.record)
 
-    def _set(self, frame: Frame, entry: _Entry) -> None:
+    def _set(self, frame: Frame, entry: _Entry, allowed: _Allowed) -> None:
         """Judges a write of a parameter: it is listed, and the vehicle stands; or it switches a fence on, before."""
         parameter, value = setting(frame, self._autopilots.get(frame.system, 0))
-        is_listed = any((each.name, bits_of(each.value)) == (parameter, bits_of(value)) for each in self._listed)
-        if not is_listed and not self.begun and switches_fence_on(parameter, value, self._types.get(frame.system)):
+        is_listed = any((each.name, bits_of(each.value)) == (parameter, bits_of(value)) for each in allowed.listed)
+        if not is_listed and allowed.fence and switches_fence_on(parameter, value, self._types.get(frame.system)):
             return
         self.count += 1
         if self._suspect is not None or self._finding is not None:

@@ -4,6 +4,7 @@ from bisect import insort
 from functools import cache
 from typing import NamedTuple
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
@@ -109,3 +110,15 @@ def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:
         assert (found is None) == covered(of, octets, at_us, autopilot)
     if found is not None:
         assert str(at_us) in found.found
+
+
+@pytest.mark.parametrize("kind", AUTOPILOTS)
+@given(bits=some.integers(0, 40))
+def test_a_clock_that_stands_still_for_a_while_makes_no_sound_flight_unsound(kind: str, bits: int) -> None:
+    """A paced clock does, so that records and frames that follow one another are of one microsecond."""
+    of = flown(kind)
+    frames = Frames((at_us >> bits << bits, octets) for at_us, octets in of.entries)
+    frames.begin(of.basis)
+    for effect in of.effects:
+        frames.happened(msgspec.structs.replace(effect, utc_us=effect.utc_us >> bits << bits))
+    assert frames.over() is None

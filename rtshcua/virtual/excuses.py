@@ -8,7 +8,7 @@
 | `battery` | a collision, coming down too hard | the battery was made empty, and is |
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | ArduCopter's pause, sticks that nudge; PX4's where it stands, or ends a climb |
+| `unseen` | motion after a takeover | ArduCopter's pause, sticks that nudge; PX4's in a stop, or a climb's end |
 | `unseen` | motion after a takeover | the mode is the one that our last frame asked for, which was lost |
 | `report` | standing down in the air | the mode in a stuck HEARTBEAT, as if somebody had chosen it again |
 | `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |

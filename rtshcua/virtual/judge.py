@@ -398,8 +398,9 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     """Frames that left later than W after a takeover took effect.
 
     One that was on its way then undoes the takeover. Where nothing of that shows, ours counts (docs/adr/0034): what
-    follows is an exception. So it is where a pilot stops what stands already, told so by us, and as long as it flies in
-    the mode that the last frame before asked for, which was lost: the report looks as if that frame had arrived.
+    follows is an exception. So it is where a pilot stops what stands already or stops, told so by us, and as long as it
+    flies in the mode that the last frame before asked for, which was lost: the report looks as if that frame had
+    arrived.
     """
     times = [sample.at_us for sample in flown.samples]
     found, latest, crossed = list[Failure](), None, False
@@ -421,7 +422,10 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
         lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
         then = flown.samples[bisect_left(times, since_us)]
-        stood = excuses.paused_at(since_us) and then.in_air and _is_still(then) and _ends_at(last, then)
+        stands = then.in_air and (
+            (_is_still(then) and _ends_at(last, then)) or _stops(last, then, flown.samples, times)
+        )
+        stood = excuses.paused_at(since_us) and stands
         as_lost = _flies_as_lost(flown, motion, times, since_us, max(since_us, frame.sent_us - within_us))
         cause = "crossed" if crossed else "unseen" if stood or as_lost else "ground" if lands else None
         crossed = crossed or (as_lost and frame.heard_us is not None)
@@ -441,6 +445,20 @@ def _ends_at(last: tuple[Frame, frozenset[MotionKind]] | None, sample: Sample) -
         return False
     north, east = (message.x - sample.latitude) * _MM, (message.y - sample.longitude) * _MM
     return hypot(north, east * cos(radians(sample.latitude / 1e7))) <= _SAME_MM
+
+
+def _stops(
+    last: tuple[Frame, frozenset[MotionKind]] | None, then: Sample, samples: Sequence[Sample], times: Sequence[int]
+) -> bool:
+    """Whether it slows down then, since we told it to stop."""
+    if last is None or last[1] != {MotionKind.HOLD} or last[0].heard_us is None:
+        return False
+    told = samples[bisect_left(times, last[0].heard_us)]
+    return then is told or _fast_mm_s(then) < _fast_mm_s(told)
+
+
+def _fast_mm_s(sample: Sample) -> float:
+    return hypot(sample.speed_mm_s, sample.climb_mm_s)
 
 
 def _flies_as_lost(flown: ScenarioFlown, motion: Motion, times: Sequence[int], from_us: int, to_us: int) -> bool:

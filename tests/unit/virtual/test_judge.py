@@ -427,6 +427,22 @@ def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
     ]  # before the pause
 
 
+@pytest.mark.parametrize(("climb_mm_s", "cause"), [(600, "unseen"), (700, None), (800, None)])
+def test_a_pause_of_what_stops_already(good: ScenarioFlown, climb_mm_s: int, cause: str | None) -> None:
+    """Told to stop, it still climbs when a pilot tells it the same: nothing shows that, while it slows down."""
+    frame = motion(good)[-1]
+    since_us = frame.sent_us - 5 * S
+    stop = Frame(since_us - S // 10, since_us - S // 10, reposition(0x7FFFFFFF, 0x7FFFFFFF))
+    told = sample(stop.sent_us / S, up_m=2, mode=Mode.TAKEOFF, climb_mm_s=700)
+    paused = sample(since_us / S, up_m=2, mode=Mode.LOITER, climb_mm_s=climb_mm_s)
+    after = [each for each in good.samples if each.at_us > since_us]
+    samples = [told, *(each._replace(taken_over_us=since_us, taken_over_by="pilot") for each in (paused, *after))]
+    found = judged(good, samples, faults.PilotPause(since_us), frames=(stop, frame), flavour="px4")
+    assert [each.cause for each in (*found.failures, *found.exceptions) if each.slug == "motion-after-takeover"] == [
+        cause
+    ]
+
+
 @pytest.mark.parametrize("left", ["replayed", "no-vehicle"])
 def test_a_flight_that_no_run_began_to_watch(good: ScenarioFlown, left: str) -> None:
     """A run that refused to begin, for the vehicle was on the ground, excuses nothing: it was about to take off."""

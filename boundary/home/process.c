@@ -194,6 +194,7 @@ static int64_t own_time_us(clockid_t clock) {
 /* The link's timestamps, so many ahead of what was used. */
 static void gather(rt_kept *kept, int64_t ahead) {
     rt_signed_link *link = &boundary.executor.gate.signer;
+    if (!boundary.executor.gate.signs) return; /* what was kept of the link stays, for a start that has its key */
     kept->link_timestamp = rt_signed_up_to(link) + ahead;
     kept->stream_count = link->stream_count;
     memcpy(kept->streams, link->streams, sizeof kept->streams);

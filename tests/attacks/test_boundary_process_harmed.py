@@ -22,6 +22,7 @@ from random import Random
 import pytest
 from msgspec.structs import replace
 
+from boundary.kept import HEAD, LAYOUT, MOST_OPENED, OPENED
 from boundary.together import PIN, SIGNED_ROOT
 from reference import flat_case as flat
 from reference import outlines
@@ -49,8 +50,6 @@ from rtshcua.wire.response import Answer, Status
 
 pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
 AT_US = START.monotonic_us
-#: of `rt_kept`: its layout, its head, and how many missions it has room for
-LAYOUT, HEAD, MOST_OPENED, OPENED = 0x7274736863756102, struct.Struct("<QQQqQQQ"), 4_095, struct.Struct("<32sq")
 
 
 class Held:

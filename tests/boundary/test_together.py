@@ -1,5 +1,6 @@
 """The boundary's process and the one in Python answer the same, whatever they are asked in turn: in the soak a million
-requests, among documents, dispatches, links by standing permits, frames, reports and statements.
+requests, among documents, dispatches, links by standing permits and links that are signed ahead, frames, reports,
+parameters that are set and put back, statements and logs, over several starts of the process and several bundles.
 """
 
 import json
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from boundary import together
 from boundary.shadow import Differs
 from boundary.together import ask_both, decided
 from rtshcua.adapters.boundary_process import program
@@ -19,19 +21,38 @@ CHUNKS, CHUNK = 100, 10_000
 
 
 def test_both_answer_the_same(tmp_path: Path) -> None:
-    counts = ask_both(0, 1_000, tmp_path)
-    assert decided(counts) >= 1_000
+    counts = ask_both(0, 2_000, tmp_path)
+    assert decided(counts) >= 2_000
     wanted = {
         *("requests ALLOW", "requests DENY", "requests DEFER", "requests FALLBACK", "dispatches", "refused permits"),
-        *("documents accepted", "documents refused", "frames", "refused frames", "believed", "statements"),
+        *("documents accepted", "documents refused", "frames", "refused frames", "believed", "statements", "logs"),
+        *("bundles", "bundles opened again", "bundles refused", "sessions", "ended", "killed"),
+        *("settings", "refused settings", "preparations", "restorations", "refused preparations", "parameters set"),
+        *("ahead", "ahead permit/forged", "ahead permit/lapsed", "ahead permit/backwards", "ahead frame/not-covered"),
     }
-    assert wanted <= counts.keys(), counts
+    assert wanted <= counts.keys(), wanted - counts.keys()
 
 
-def test_an_answer_that_differs_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import rtshcua.onboard.enforcement.executor as here
+def test_both_stop_signing_ahead_at_the_same_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A link that is signed ahead again and again, until no more is."""
+    monkeypatch.setattr(together, "FLOODS", 0.2)
+    assert {"floods", "ahead frame/too-many-ahead"} <= ask_both(0, 1_000, tmp_path).keys()
 
-    monkeypatch.setattr(here, "_HOMEWARD", ())
+
+@pytest.mark.parametrize(
+    ("where", "changed"),
+    [
+        ("onboard.enforcement.executor._HOMEWARD", ()),
+        ("onboard.enforcement.preparation.VALID_US", 1),
+        ("mavlink.signing.LEAD", 3_000_001),
+        ("wire.boundary_chain.START", bytes(31) + b"\1"),
+        ("adapters.files.replay.FileReplayStore.give_back", lambda *_: None),
+    ],
+)
+def test_an_answer_that_differs_is_noticed(
+    where: str, changed: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"rtshcua.{where}", changed)
     with pytest.raises(Differs):
         ask_both(0, 1_000, tmp_path)
 

@@ -88,7 +88,9 @@ class Vehicle:
         self.sent = False
         """Whether somebody named that place: no stopping point, no takeoff."""
         self.takeoff_up: float | None = None
-        """The height that the next takeoff climbs to; kept while disarmed, for arming in TAKEOFF starts it."""
+        """The height that the takeoff climbs to; kept while disarmed, for arming in TAKEOFF starts it, until that mode
+        is left (PX4: `Takeoff::set_takeoff_position` takes what NAV_TAKEOFF named once).
+        """
         self.events: list[Event] = []
         self.blind = False  # flies level, for it has no position to hold
         self.crashed = False
@@ -201,6 +203,8 @@ class Vehicle:
             return
         if self.handling.forgets_speed:
             self._speed = None
+        if self.mode is Mode.TAKEOFF:
+            self.takeoff_up = None
         self.mode = mode
         self._nose = None
         self.blind = self.sent = self.paused = False

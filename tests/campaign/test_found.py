@@ -4,11 +4,12 @@ import json
 
 import pytest
 
-from campaign.flying import flown
+from campaign.flying import SKILLS, flown
 from campaign.test_wrong import at, of, slugs
+from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode, Way
-from rtshcua.model.scenario import Incident
+from rtshcua.model.scenario import AtTime, Incident
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
 
@@ -77,26 +78,35 @@ FLIES = {
     ("ardupilot", "climb"): 5, ("ardupilot", "leg"): 13, ("ardupilot", "cover"): 30, ("ardupilot", "hold"): 40,
     ("ardupilot", "home"): 46,
 }  # fmt: skip
-PAUSE, GOTO, HOME = (
+PAUSE, GOTO, HOME, TAKEOFF = (
     faults.PilotPause(0),
-    faults.PilotGoto(0, -20_000, -20_000, 10_000),
+    faults.PilotGoto(0, -20_000, 20_000, 10_000),
     faults.PilotMode(0, Mode.RETURN),
+    faults.PilotMode(0, Mode.TAKEOFF),
 )
 #: of which so many are flown at each `make test`
-_OFTEN = {("px4", "climb", PAUSE), ("px4", "leg", PAUSE), ("ardupilot", "leg", GOTO), ("ardupilot", "cover", HOME)}
+_OFTEN = {
+    ("px4", "climb", PAUSE),
+    ("px4", "leg", PAUSE),
+    ("ardupilot", "leg", GOTO),
+    ("ardupilot", "cover", HOME),
+    ("px4", "hold", TAKEOFF),
+}
 
 
 @pytest.mark.parametrize(
     ("flavour", "kind", "does"),
     [
         pytest.param(
-            flavour, kind, does, id=f"{flavour} {kind} {type(does).__name__}",
+            flavour, kind, does, id=f"{flavour} {kind} {incident_text(AtTime(0, 0), does, SKILLS)}",
             marks=[] if (flavour, kind, does) in _OFTEN else [pytest.mark.soak],
         )
         for flavour, kind in FLIES
-        for does in (PAUSE, GOTO, HOME)
-        # ArduCopter reports no pause, PX4 none of what stands already, and nobody notices a mode that it is in
+        for does in (PAUSE, GOTO, HOME, TAKEOFF)
+        # ArduCopter reports no pause, and has no mode to take off; PX4 reports none of what stands already, and nobody
+        # notices a mode that it is in
         if not (does is PAUSE and (flavour == "ardupilot" or kind == "hold")) and not (does is HOME and kind == "home")
+        if not (does is TAKEOFF and (flavour == "ardupilot" or kind == "climb"))
     ],
 )  # fmt: skip
 def test_who_takes_it_over_while_the_runtime_is_dead_is_not_flown_over(flavour: str, kind: str, does: Fault) -> None:
@@ -105,6 +115,16 @@ def test_who_takes_it_over_while_the_runtime_is_dead_is_not_flown_over(flavour: 
     was = flown(of(flavour, at(at_s, faults.RuntimeKilled(0, 3 * S)), at(at_s + 1, does)))
     assert was.samples[-1].taken_over_by == "pilot"
     assert (was.ending, slugs(was), judge(was).exceptions) == ("stood-down", set(), ())
+
+
+@pytest.mark.parametrize(("killed_s", "taken_s", "dead_s"), [(9, 11, 6), (43, 44, 10)], ids=["climb", "hold"])
+def test_a_takeoff_that_a_pilot_chose_in_the_air_shows_once_it_is_over(
+    killed_s: int, taken_s: int, dead_s: int
+) -> None:
+    """It is in Hold again, 2.5 m above where ours had been."""
+    was = flown(of("px4", at(killed_s, faults.RuntimeKilled(0, dead_s * S)), at(taken_s, TAKEOFF)))
+    assert next(each.mode for each in was.samples if each.at_us >= (killed_s + dead_s) * S) is Mode.LOITER
+    assert (was.ending, slugs(was), was.samples[-1].taken_over_by) == ("stood-down", set(), "pilot")
 
 
 def test_a_return_that_is_paused_as_it_begins_is_not_taken_for_the_hold_before_it() -> None:

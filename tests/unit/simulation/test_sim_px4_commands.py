@@ -110,6 +110,20 @@ def test_takeoff_without_altitude_takes_the_parameter(px4: Any) -> None:
     assert abs(px4.truth.up_mm - 2_500) < 200
 
 
+def test_a_takeoff_that_is_chosen_in_the_air_climbs_from_there(flying: Any) -> None:
+    """`Takeoff::set_takeoff_position`: what NAV_TAKEOFF named counts once, also where it was interrupted."""
+    before_mm = flying.truth.up_mm
+    assert flying.long(22, -1, 0, 0, nan, nan, nan, AMSL + before_mm // 1_000 + 20) == [0]
+    flying.wait(1)
+    flying.mode(Mode.LOITER)
+    flying.wait(3)
+    held_mm = flying.truth.up_mm
+    flying.mode(Mode.TAKEOFF)
+    flying.until(lambda: flying.truth.mode is Mode.LOITER)
+    flying.wait(3)
+    assert abs(flying.truth.up_mm - held_mm - 2_500) < 200
+
+
 def test_armed_on_the_ground_disarms_by_itself(px4: Any) -> None:
     px4.arm()
     px4.wait(9)

@@ -22,6 +22,9 @@ void *rt_key_memory(uint32_t size, uint32_t *measures);
 /* Take every measure that can be taken; 0 for a user keeps the present one. Call it with everything open. */
 uint32_t rt_isolate(uint32_t user, uint32_t group);
 
+/* Whether another user than ours connected this socket. */
+int rt_is_anothers(int connection);
+
 /* From now on the kernel kills this process when the thread that started it ends, also one that hangs or is stopped. Call it after
    rt_isolate: a change of user undoes it. False where `parent`, its parent at its start, is gone already. */
 int rt_end_with(int parent);

@@ -3,16 +3,24 @@
 
        rtshcua-boundary --socket FD --root FD --pin HEX --vehicle IDENTITY --kept FD [--link-key FD] [--boundary-key FD] [--log-key FD]
                         [--user UID --group GID] [--settings FD] [--owed FD] [--paced]
+       rtshcua-boundary --socket FD --folder PATH [--keys PATH] [--paced]
        rtshcua-boundary --socket FD --measures [--user UID --group GID]
 
    SETTINGS are the parameters that are set of the vehicle before a flight, OWED those that an earlier run set and did not put back,
    each as the body of a preparation (wire/preparation.h).
 
+   With `--folder` somebody else listened, as systemd does, and another user connected. The address of the socket ends in the identity
+   of the vehicle, and PATH/IDENTITY, which nobody else may look into, holds what the other options say: `root.trust`, `root.pin`,
+   `kept`, and, there or in the folder of `--keys`, `log.seed`, `boundary.seed` and `link.key`; the last two may be missing.
+
    With `--measures` it takes the measures of isolation.h, sends its first message, and ends.
 
-   Every file is opened by who starts it, so that it needs no path and, once it began, no right to open one. It first sends one
-   message: the measures that are in force (4 octets, isolation.h), and the name of the link's key (8 octets, 0 without one). It ends with 0 when the socket is closed, 64 for a wrong command
-   line, 65 where the root is not to be trusted, 66 where the link's key is none, 74 where its file cannot be read or written, 78 where that file is damaged. */
+   Every other file is opened by who starts it, so that it needs no path. Once it began, it has no right to open one. It first sends
+   one message: the measures that are in force (4 octets, isolation.h), the name of the link's key (8), and the public halves of the
+   log's key and of its own (32 each), zeros for keys that it does not have, and whether it decides by a clock of its own (1). Where it
+   does not begin, that message is the octet that it ends with: 64 for a wrong command line, 65 where the root is not to be trusted, 66
+   where the link's key is none, 72 where a file is missing or others may look into its folder, 74 where its file cannot be read or
+   written, 75 where another boundary holds that file, 78 where it is damaged. It ends with 0 when the socket is closed. */
 #define _GNU_SOURCE
 #include "isolation.h"
 
@@ -20,18 +28,29 @@
 #include "crypto/crypto.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdlib.h>
+#include <sys/file.h>
 #include <sys/random.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/types.h>
+#include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 
-enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, NO_KEY = 66, IO = 74, DAMAGED = 78 };
+enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, NO_KEY = 66, MISSING = 72, IO = 74, IN_USE = 75, DAMAGED = 78 };
 /* how far ahead of what was used the link's timestamp is kept, in its units of 10 us, and how often: signing.py */
 #define RESERVE 300000LL
 #define EVERY_US 1000000LL
+/* how long a call may take, and the beginning or loading a bundle, in s: the runtime waits for 1.2 s and 20 s (boundary_process.py);
+   how often one that waits for a call says that it is well, and after how long it is not */
+#define CALL_S 2
+#define BEGINNING_S 20
+#define WAKING_S 1
+#define WAITING_S 3
 
 static rt_boundary boundary;
 static rt_kept slots[2];
@@ -39,7 +58,7 @@ static uint8_t call[RT_MAX_CALL], result[RT_MAX_RESULT];
 
 typedef struct {
     int socket, root, kept, link_key, boundary_key, log_key, settings, owed;
-    const char *vehicle, *pin;
+    const char *vehicle, *pin, *folder, *keys;
     uint32_t user, group;
     int paced, measures;
 } options;
@@ -52,7 +71,7 @@ static int number(const char *text, uint32_t *value) {
 }
 
 static int read_options(int count, char **words, options *given) {
-    *given = (options){-1, -1, -1, -1, -1, -1, -1, -1, NULL, NULL, 0, 0, 0, 0};
+    *given = (options){-1, -1, -1, -1, -1, -1, -1, -1, NULL, NULL, NULL, NULL, 0, 0, 0, 0};
     struct { const char *name; int *file; } files[] = {
         {"--socket", &given->socket}, {"--root", &given->root}, {"--kept", &given->kept},
         {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key}, {"--log-key", &given->log_key},
@@ -81,6 +100,10 @@ static int read_options(int count, char **words, options *given) {
             known = 1, given->vehicle = said;
         else if (strcmp(name, "--pin") == 0)
             known = 1, given->pin = said;
+        else if (strcmp(name, "--folder") == 0)
+            known = 1, given->folder = said;
+        else if (strcmp(name, "--keys") == 0)
+            known = 1, given->keys = said;
         else if (strcmp(name, "--user") == 0)
             known = number(said, &given->user);
         else if (strcmp(name, "--group") == 0)
@@ -88,7 +111,19 @@ static int read_options(int count, char **words, options *given) {
         if (!known)
             return 0;
     }
-    return given->socket >= 0 && (given->measures || (given->root >= 0 && given->kept >= 0 && given->vehicle != NULL));
+    const int handed = given->root >= 0 && given->kept >= 0 && given->vehicle != NULL;
+    return given->socket >= 0 && (given->measures || given->folder != NULL || handed);
+}
+
+/* A regular file of a folder, to be read; -1 where there is none. */
+static int open_file(int folder, const char *name) {
+    struct stat found;
+    int file = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (file >= 0 && (fstat(file, &found) != 0 || !S_ISREG(found.st_mode))) {
+        close(file);
+        return -1;
+    }
+    return file;
 }
 
 static size_t read_all(int file, void *into, size_t most) {
@@ -98,6 +133,52 @@ static size_t read_all(int file, void *into, size_t most) {
         done += (size_t)got;
     close(file);
     return got < 0 ? 0 : done;
+}
+
+/* What the folder of the vehicle holds; the socket is named after the vehicle. Whoever connected chose nothing of it. */
+static int open_folder(options *given) {
+    static struct sockaddr_un address;
+    static char pin[2 * RT_KEY_BYTES + 2];
+    socklen_t size = sizeof address - 1;
+    if (getsockname(given->socket, (struct sockaddr *)&address, &size) != 0 || address.sun_family != AF_UNIX) return USAGE;
+    const char *end = strrchr(address.sun_path, '/');
+    if (end == NULL || end[1] == 0) return USAGE;
+    given->vehicle = end + 1;
+    struct stat found;
+    int all = open(given->folder, O_PATH | O_DIRECTORY | O_CLOEXEC);
+    int folder = openat(all, given->vehicle, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    int keys = given->keys == NULL ? folder : open(given->keys, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0 || keys < 0 || fstat(folder, &found) != 0 || found.st_uid != geteuid() || (found.st_mode & 077) != 0) return MISSING;
+    given->root = open_file(folder, "root.trust");
+    given->log_key = open_file(keys, "log.seed");
+    given->boundary_key = open_file(keys, "boundary.seed");
+    given->link_key = open_file(keys, "link.key");
+    int pinned = open_file(folder, "root.pin");
+    if (given->root < 0 || given->log_key < 0 || pinned < 0) return MISSING;
+    (void)read_all(pinned, pin, sizeof pin - 1);
+    given->pin = pin;
+    given->kept = openat(folder, "kept", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
+    if (given->kept < 0 || fstat(given->kept, &found) != 0 || !S_ISREG(found.st_mode)) return IO;
+    return flock(given->kept, LOCK_EX | LOCK_NB) == 0 ? FINE : errno == EWOULDBLOCK ? IN_USE : IO;
+}
+
+/* Where another user connected, nobody puts an end to what hangs: the kernel does, also to what is stopped, once so many seconds
+   have passed that were not given anew. */
+static timer_t patience;
+static int is_timed;
+
+static int give_time(int seconds) {
+    const struct itimerspec from_now = {{0, 0}, {seconds, 0}};
+    return !is_timed || timer_settime(patience, 0, &from_now, NULL) == 0;
+}
+
+static int start_timer(int socket) {
+    const struct timeval waking = {WAKING_S, 0};
+    struct sigevent event = {0};
+    event.sigev_notify = SIGEV_SIGNAL;
+    event.sigev_signo = SIGKILL;
+    is_timed = timer_create(CLOCK_MONOTONIC, &event, &patience) == 0;
+    return is_timed && give_time(BEGINNING_S) && setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &waking, sizeof waking) == 0;
 }
 
 static int write_kept(int file, rt_kept *kept) {
@@ -256,16 +337,61 @@ static void name_link(const uint8_t key[RT_KEY_BYTES], uint8_t *name) {
     memcpy(name, digest, LINK_NAME);
 }
 
-/* The first message: the measures in force, and the name of the link's key where there is one. */
-static int greet(int socket, uint32_t measures, const uint8_t *link) {
-    uint8_t greeting[4 + LINK_NAME] = {0};
+/* The first message: the measures in force, the name of the link's key, the public halves of the two that sign, whose clock counts. */
+static int greet(const options *given, uint32_t measures, const rt_keys *keys) {
+    uint8_t greeting[4 + LINK_NAME + 2 * RT_KEY_BYTES + 1] = {0};
     for (int octet = 0; octet < 4; octet++) greeting[octet] = (uint8_t)(measures >> 8 * octet & 0xFF);
-    if (link != NULL) name_link(link, greeting + 4);
-    return send(socket, greeting, sizeof greeting, 0) == sizeof greeting;
+    if (given->link_key >= 0) name_link(keys->link, greeting + 4);
+    if (given->log_key >= 0) rt_ed25519_public(keys->log, greeting + 4 + LINK_NAME);
+    if (given->boundary_key >= 0) rt_ed25519_public(keys->boundary, greeting + 4 + LINK_NAME + RT_KEY_BYTES);
+    greeting[sizeof greeting - 1] = !given->paced;
+    return send(given->socket, greeting, sizeof greeting, MSG_NOSIGNAL) == sizeof greeting;
+}
+
+/* Everything before the first message. */
+static int begin(options *given, rt_keys *keys, uint32_t *measures) {
+    static uint8_t root[1 << 20];
+    if (given->folder != NULL) {
+        int code = start_timer(given->socket) ? open_folder(given) : IO;
+        if (code != FINE) return code;
+    }
+    rt_kept *kept = read_kept(given->kept);
+    if (keys == NULL || getrandom(keys->session, sizeof keys->session, 0) != sizeof keys->session)
+        return IO;
+    if (kept == NULL)
+        return DAMAGED;
+    rt_bytes root_bytes = {root, (uint32_t)read_all(given->root, root, sizeof root)};
+    if (given->link_key >= 0 && !read_key(given->link_key, keys->link))
+        return NO_KEY;
+    if (given->boundary_key >= 0 && !read_key(given->boundary_key, keys->boundary))
+        return USAGE;
+    if (given->log_key >= 0 && !read_key(given->log_key, keys->log))
+        return USAGE;
+    static rt_preparation settings, owed;
+    const rt_preparation *meant, *left;
+    if (!read_writes(given->settings, &settings, &meant) || !read_writes(given->owed, &owed, &left))
+        return USAGE;
+    kept->restarts++;
+    const int first = kept->turn == 0;
+    if (!write_kept(given->kept, kept)) {
+        if (first) (void)!ftruncate(given->kept, 0); /* half of what was never written would count as damage */
+        return IO;
+    }
+    if (!start_keeper(given->kept))
+        return IO;
+    if (given->folder != NULL && rt_is_anothers(given->socket))
+        *measures |= RT_OWN_USER;
+    *measures |= rt_isolate(given->user, given->group);
+    static uint8_t pin[RT_KEY_BYTES];
+    const rt_setup setup = {
+        keys, kept, root_bytes, {pin, given->pin == NULL ? 0 : from_hex((const uint8_t *)given->pin, strlen(given->pin), pin, sizeof pin)},
+        {(const uint8_t *)given->vehicle, (uint32_t)strlen(given->vehicle)}, given->link_key >= 0, given->boundary_key >= 0,
+        given->log_key >= 0, meant, left,
+        {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
+    return rt_boundary_begin(&boundary, &setup) == NULL ? FINE : UNTRUSTED;
 }
 
 int main(int count, char **words) {
-    static uint8_t root[1 << 20];
     options given;
     uint32_t measures = 0;
     const int runtime = getppid();
@@ -274,48 +400,24 @@ int main(int count, char **words) {
     rt_keys *keys = rt_key_memory(sizeof *keys, &measures);
     if (given.measures) {
         measures |= rt_isolate(given.user, given.group);
-        return greet(given.socket, measures, NULL) ? FINE : IO;
+        return greet(&given, measures, keys) ? FINE : IO;
     }
-    rt_kept *kept = read_kept(given.kept);
-    if (keys == NULL || getrandom(keys->session, sizeof keys->session, 0) != sizeof keys->session)
-        return IO;
-    if (kept == NULL)
-        return DAMAGED;
-    rt_bytes root_bytes = {root, (uint32_t)read_all(given.root, root, sizeof root)};
-    if (given.link_key >= 0 && !read_key(given.link_key, keys->link))
-        return NO_KEY;
-    if (given.boundary_key >= 0 && !read_key(given.boundary_key, keys->boundary))
-        return USAGE;
-    if (given.log_key >= 0 && !read_key(given.log_key, keys->log))
-        return USAGE;
-    static rt_preparation settings, owed;
-    const rt_preparation *meant, *left;
-    if (!read_writes(given.settings, &settings, &meant) || !read_writes(given.owed, &owed, &left))
-        return USAGE;
-    kept->restarts++;
-    const int first = kept->turn == 0;
-    if (!write_kept(given.kept, kept)) {
-        if (first) (void)!ftruncate(given.kept, 0); /* half of what was never written would count as damage */
-        return IO;
+    int code = begin(&given, keys, &measures);
+    if (code != FINE) {
+        const uint8_t why = (uint8_t)code;
+        (void)!send(given.socket, &why, sizeof why, MSG_NOSIGNAL);
+        return code;
     }
-    if (!start_keeper(given.kept))
+    if (!give_time(WAITING_S) || !greet(&given, measures, keys))
         return IO;
-    measures |= rt_isolate(given.user, given.group);
-    static uint8_t pin[RT_KEY_BYTES];
-    const rt_setup setup = {
-        keys, kept, root_bytes, {pin, given.pin == NULL ? 0 : from_hex((const uint8_t *)given.pin, strlen(given.pin), pin, sizeof pin)},
-        {(const uint8_t *)given.vehicle, (uint32_t)strlen(given.vehicle)}, given.link_key >= 0, given.boundary_key >= 0,
-        given.log_key >= 0, meant, left,
-        {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
-    if (rt_boundary_begin(&boundary, &setup) != NULL)
-        return UNTRUSTED;
-    if (!greet(given.socket, measures, given.link_key >= 0 ? keys->link : NULL))
-        return IO;
+    rt_kept *kept = boundary.kept;
     int64_t kept_us = own_time_us(CLOCK_MONOTONIC);
     bool flies = false;
     for (;;) {
         ssize_t size = recv(given.socket, call, sizeof call, 0);
-        if (size < 0 && errno == EINTR)
+        if (!give_time(size <= 0 ? WAITING_S : call[0] == RT_CALL_LOAD ? BEGINNING_S : CALL_S))
+            return IO;
+        if (size < 0 && (errno == EINTR || errno == EAGAIN))
             continue;
         if (size <= 0) {
             gather(kept, 0); /* an orderly end keeps the exact figures */
@@ -334,12 +436,12 @@ int main(int count, char **words) {
             boundary.to_keep = false;
             kept_us = now_us;
         }
-        if (!flies && rt_may_fly(&boundary)) {
+        if (given.folder == NULL && !flies && rt_may_fly(&boundary)) {
             flies = true; /* nothing is to be given back any more, and a restart must not find the vehicle held by us */
             if (!rt_end_with(runtime))
                 return IO;
         }
-        if (send(given.socket, result, answered, 0) != (ssize_t)answered)
+        if (!give_time(WAITING_S) || send(given.socket, result, answered, 0) != (ssize_t)answered)
             return IO;
     }
 }

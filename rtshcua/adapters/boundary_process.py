@@ -1,7 +1,9 @@
-"""The boundary as a process of its own (boundary/home/process.c): started with what it needs, called over a socket.
+"""The boundary as a process of its own (boundary/home/process.c), called over a socket.
 
-It gets open files and no path: the trust root, one file in which it keeps what must outlive it, and the link's key,
-which is never read here. One process at a time holds that file: two runtimes cannot share what is kept of a vehicle.
+A run starts it (`BoundaryProcess`): it gets open files and no path: the trust root, one file in which it keeps what
+must outlive it, and the link's key, which is never read here. Or somebody else starts it, as systemd does, for whoever
+connects to its socket (`ListeningBoundary`): then its keys and its root are its own, and a run has none of them. One
+process at a time holds the file of a vehicle: two runtimes cannot share what is kept of it.
 """
 
 import os
@@ -9,14 +11,17 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from enum import IntFlag
 from pathlib import Path
+from struct import Struct
 from typing import Final
 from urllib.parse import quote
 
 from rtshcua.adapters.files.signing import no_link_key, open_link_key
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, lock, make_folder
 from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
+from rtshcua.wire.keys import PUBLIC_BYTES
 
 #: how long it may take to begin, and to load a bundle, whose mission is looked at as a whole, in s;
 PATIENCE_S: Final = 20.0
@@ -30,8 +35,9 @@ _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-b
 _BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
 #: octets of the largest call and answer
 _CALL, _ANSWER = MAX_PART + 64, 2_112
-_GREETING: Final = 12
-
+#: after the measures, as `process.c` has it: the name of the link's key, two public halves, whether its clock counts
+_SAID: Final = Struct(f"8s{PUBLIC_BYTES}s{PUBLIC_BYTES}s?")
+_GREETING: Final = 4 + _SAID.size
 
 #: what is told where there is no program, and nobody asked for one
 UNBUILT: Final = (
@@ -63,11 +69,14 @@ MISSING: Final = {
     Measure.SECRET_MEMORY: "memfd_secret: the kernel can read its keys (`secretmem.enable=1`)",
 }
 
-_UNTRUSTED, _NO_KEY, _IO, _DAMAGED = 65, 66, 74, 78
+_UNTRUSTED, _NO_KEY, _MISSING, _IO, _IN_USE, _DAMAGED = 65, 66, 72, 74, 75, 78
 _ENDED: Final = {
-    64: "its command line is wrong",
+    64: "its command line or a key of it is wrong",
     _UNTRUSTED: "it does not trust the trust root",
+    _NO_KEY: "its link key is none",
+    _MISSING: "a file of its folder is missing, or others may look into that folder",
 }
+_DAMAGED_HELP: Final = "docs/flying/isolation.md says what to do"
 
 
 class BoundaryError(Exception):
@@ -112,8 +121,119 @@ def measures_here(user: tuple[int, int] | None) -> Measure:
     return Measure(int.from_bytes(greeting[:4], "little"))
 
 
-class BoundaryProcess:
-    """A boundary that runs. `measures` are those in force.
+class _Connected:
+    """The socket of a boundary, and what its first message said."""
+
+    _socket: socket.socket
+    #: the measures in force
+    measures: Measure
+    #: the name of the link's key, and the public halves of the log's key and of its own, None for those it has not
+    link_name: bytes | None
+    log_public: bytes | None
+    own_public: bytes | None
+    #: whether it decides by its own clock; else the caller's time counts, as of a vehicle that is flown faster
+    own_clock: bool
+
+    @property
+    def missing(self) -> Sequence[str]:
+        """The measures that are not in force, in words."""
+        return [text for measure, text in MISSING.items() if measure not in self.measures]
+
+    def call(self, octets: bytes) -> bytes:
+        """One call. Raises OSError when nobody answers; an empty answer says that it is gone. One that is late is put
+        to an end: it must not go on behind the back of who did not wait for it.
+        """
+        loads = octets[0] == LOAD
+        try:
+            self._socket.send(octets)
+            if loads:
+                self._socket.settimeout(PATIENCE_S)
+            return self._socket.recv(_ANSWER)
+        except TimeoutError:
+            return self._once_more()
+        finally:
+            if loads:
+                self._socket.settimeout(ANSWER_S)
+
+    def _once_more(self) -> bytes:
+        self._socket.settimeout(AGAIN_S)
+        try:
+            return self._socket.recv(_ANSWER)
+        except TimeoutError:
+            self._end()
+            raise
+        finally:
+            self._socket.settimeout(ANSWER_S)
+
+    def _end(self) -> None:
+        """Put it to an end."""
+        raise NotImplementedError
+
+    def _take_in(self, greeting: bytes) -> None:
+        self.measures = Measure(int.from_bytes(greeting[:4], "little"))
+        link, log, own, self.own_clock = _SAID.unpack(greeting[4:])
+        self.link_name, self.log_public, self.own_public = (each if any(each) else None for each in (link, log, own))
+        self._socket.settimeout(ANSWER_S)
+
+
+def _sized(connection: socket.socket) -> socket.socket:
+    """A socket that takes the largest call."""
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * _CALL)
+    return connection
+
+
+class ListeningBoundary(_Connected):
+    """A boundary that somebody else starts for whoever connects to the socket at `path`; until `close`.
+
+    It ends when that connection does: one that hangs is ended by the kernel (boundary/home/process.c), for a run may
+    not end what another user runs. One that is ending, or that another run has, is waited for as long as one that we
+    start. Raises BoundaryError.
+    """
+
+    def __init__(self, path: Path) -> None:
+        until_s = time.monotonic() + ENDING_S
+        while (greeting := self._greeted(path)) is None:
+            if time.monotonic() > until_s:
+                text = f"another run has the boundary at `{path}`, or its program does not start"
+                raise BoundaryError("in-use", text, "wait until that run is over; `journalctl` says more of the latter")
+            time.sleep(0.02)
+        self._take_in(greeting)
+
+    def close(self) -> None:
+        """Let it end: it does so when its socket is closed."""
+        self._socket.close()
+
+    def _end(self) -> None:
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+
+    def _greeted(self, path: Path) -> bytes | None:
+        """The first message; None where the connection was closed without one, or the file of the vehicle is held."""
+        self._socket = _sized(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+        self._socket.settimeout(PATIENCE_S)
+        try:
+            self._socket.connect(str(path))
+        except OSError as error:
+            self._socket.close()
+            text = f"no boundary listens at `{path}`: {(error.strerror or str(error)).lower()}"
+            raise BoundaryError("missing", text, "`systemctl status 'rtshcua-boundary@*'`") from None
+        try:
+            greeting = self._socket.recv(_ANSWER)
+        except TimeoutError:
+            self._socket.close()
+            raise BoundaryError("not-begun", f"the boundary at `{path}` does not begin") from None
+        except OSError:
+            greeting = b""
+        if len(greeting) == _GREETING:
+            return greeting
+        self._socket.close()
+        if greeting in (b"", bytes([_IN_USE])):
+            return None
+        raise _unbegun(greeting[0], f"what the boundary at `{path}` keeps")
+
+
+class BoundaryProcess(_Connected):
+    """A boundary that runs, started here.
 
     `own_seed` is that of the key that it signs its own evidence with, `log_seed` that of the log's key. `settings` are
     the parameters that are set of the vehicle before the flight, and `owed` those that earlier runs set and did not put
@@ -148,8 +268,8 @@ class BoundaryProcess:
                 words += [name, str(handle)]
             if user is not None:
                 words += ["--user", str(user[0]), "--group", str(user[1])]
-            for end in (ours, theirs):
-                end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * _CALL)
+            _sized(ours)
+            _sized(theirs)
             try:
                 self._process = subprocess.Popen(
                     [path, *words], pass_fds=files, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
@@ -167,47 +287,12 @@ class BoundaryProcess:
                 os.close(handle)
         ours.settimeout(PATIENCE_S)
         self._socket = ours
-        greeting = self._greeting(link_key, kept_file(state, vehicle))
-        self.measures = Measure(int.from_bytes(greeting[:4], "little"))
-        #: the name of the link's key
-        self.link_name = greeting[4:] if link_key is not None else None
-        ours.settimeout(ANSWER_S)
+        self._take_in(self._greeting(link_key, kept_file(state, vehicle)))
 
     @property
     def pid(self) -> int:
         """Its process."""
         return self._process.pid
-
-    @property
-    def missing(self) -> Sequence[str]:
-        """The measures that are not in force, in words."""
-        return [text for measure, text in MISSING.items() if measure not in self.measures]
-
-    def call(self, octets: bytes) -> bytes:
-        """One call. Raises OSError when nobody answers; an empty answer says that it is gone. One that is late is put
-        to an end: it must not go on behind the back of who did not wait for it.
-        """
-        loads = octets[0] == LOAD
-        try:
-            self._socket.send(octets)
-            if loads:
-                self._socket.settimeout(PATIENCE_S)
-            return self._socket.recv(_ANSWER)
-        except TimeoutError:
-            return self._once_more()
-        finally:
-            if loads:
-                self._socket.settimeout(ANSWER_S)
-
-    def _once_more(self) -> bytes:
-        self._socket.settimeout(AGAIN_S)
-        try:
-            return self._socket.recv(_ANSWER)
-        except TimeoutError:
-            self._process.kill()
-            raise
-        finally:
-            self._socket.settimeout(ANSWER_S)
 
     def close(self) -> None:
         """Let it end: it does so when its socket is closed."""
@@ -217,6 +302,9 @@ class BoundaryProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+
+    def _end(self) -> None:
+        self._process.kill()
 
     def _handles(
         self, vehicle: str, state: Path, link_key: Path | None, given: Mapping[str, bytes | None]
@@ -252,13 +340,19 @@ class BoundaryProcess:
             return greeting
         self._socket.close()
         self._process.kill()
-        code = self._process.wait()
+        ended = self._process.wait()
+        code = greeting[0] if greeting else ended
         if link_key is not None and code == _NO_KEY:
             raise no_link_key(link_key)
-        if code == _DAMAGED:
-            text = f"`{kept}` is damaged: which bundles the boundary has opened is not known"
-            raise BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
-        if code == _IO:
-            raise BoundaryError("not-kept", f"`{kept}` cannot be read or written, or its disk is full")
-        text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
-        raise BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text)
+        raise _unbegun(code, f"`{kept}`")
+
+
+def _unbegun(code: int, kept: str) -> BoundaryError:
+    """Why a boundary does not begin, by the code that its program ends with; `kept` names what it keeps."""
+    if code == _DAMAGED:
+        text = f"{kept} is damaged: which bundles the boundary has opened is not known"
+        return BoundaryError("damaged", text, _DAMAGED_HELP)
+    if code == _IO:
+        return BoundaryError("not-kept", f"{kept} cannot be read or written, or its disk is full")
+    text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
+    return BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text)

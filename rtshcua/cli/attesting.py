@@ -12,7 +12,7 @@ from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire.boundary_chain import START
-from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.keys import Duty, SigningKey, key_id
 from rtshcua.wire.trust import TrustRoot, key_refusal
 from rtshcua.wire.untrusted import Untrusted
 
@@ -25,8 +25,7 @@ def boundary_key(
     root: TrustRoot, vehicle: str, now_us: int, store: KeyStore, path: Path | None, passphrase_file: Path | None
 ) -> SigningKey | None:
     """The key that the boundary signs with; None where the root asks for none. Raises `Refused`."""
-    named = root.keys_for(Duty.BOUNDARY)
-    good = {kid for kid, key in named.items() if key_refusal(key, vehicle=vehicle, now_us=now_us) is None}
+    good = _named(root, vehicle, now_us)
     if not good:
         return None
     try:
@@ -36,14 +35,40 @@ def boundary_key(
     except FileNotFoundError as error:
         text = f"the trust root asks for what the boundary signs, and its key is not here: `{error.filename}`"
         raise Refused(ExitCode.INPUT, "no-boundary-key", text, _HELP) from None
-    if key.kid not in good:
-        text = f"the trust root names no boundary key {key.kid.hex()} for `{vehicle}`: nobody could verify the log"
-        raise Refused(ExitCode.UNTRUSTED, "unknown-key", text, _HELP)
+    _expect_named(key.kid, good, vehicle)
     return key
 
 
 class Elsewhere:
     """In place of the boundary's key: the boundary's process has it, and nobody here."""
+
+
+def elsewhere(root: TrustRoot, vehicle: str, now_us: int, public: bytes | None) -> Elsewhere | None:
+    """What stands for the key of a boundary that listens, of which it said the public half, None where it has none;
+    None where the root asks for none. Raises `Refused`.
+    """
+    good = _named(root, vehicle, now_us)
+    if not good:
+        return None
+    if public is None:
+        text = "the trust root asks for what the boundary signs, and the boundary has no key"
+        raise Refused(
+            ExitCode.INPUT, "no-boundary-key", text, "`boundary.seed` of its folder; `rtshcua keys provision`"
+        )
+    _expect_named(key_id(Duty.BOUNDARY, public), good, vehicle)
+    return Elsewhere()
+
+
+def _named(root: TrustRoot, vehicle: str, now_us: int) -> set[bytes]:
+    """The boundary keys that the root trusts for a vehicle now."""
+    named = root.keys_for(Duty.BOUNDARY)
+    return {kid for kid, key in named.items() if key_refusal(key, vehicle=vehicle, now_us=now_us) is None}
+
+
+def _expect_named(kid: bytes, good: set[bytes], vehicle: str) -> None:
+    if kid not in good:
+        text = f"the trust root names no boundary key {kid.hex()} for `{vehicle}`: nobody could verify the log"
+        raise Refused(ExitCode.UNTRUSTED, "unknown-key", text, _HELP)
 
 
 class BoundarySession:

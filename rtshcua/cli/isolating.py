@@ -1,4 +1,4 @@
-"""`run --mode process`: the boundary begins as a process of its own, and takes the bundle over."""
+"""`run --mode process` and `--boundary-socket`: the boundary is a process of its own, and takes the bundle over."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess
+from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, ListeningBoundary
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -33,27 +33,52 @@ CODES: Final = {
 }
 
 
+def _refused(error: BoundaryError) -> Refused:
+    return Refused(CODES.get(error.slug, ExitCode.REFUSED), f"boundary-{error.slug}", str(error), error.help)
+
+
+def started(
+    vehicle: str, signed_root: bytes, state: Path, *,
+    link_key: Path | None, own_key: SigningKey | None, log_key: SigningKey,
+    user: tuple[int, int] | None, paced: bool, settings: Mapping[str, int], owed: Mapping[str, Owed],
+) -> BoundaryProcess:  # fmt: skip
+    """A boundary that is started for one run, until `close`. Raises `Refused`, and OSError."""
+    pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
+    try:
+        return BoundaryProcess(
+            signed_root, pinned, vehicle, state, link_key=link_key, user=user, paced=paced,
+            own_seed=None if own_key is None else own_key.private.private_bytes_raw(),
+            log_seed=log_key.private.private_bytes_raw(),
+            settings=_listed({name: Owed(0, value) for name, value in settings.items()}), owed=_listed(owed),
+        )  # fmt: skip
+    except BoundaryError as error:
+        raise _refused(error) from None
+
+
+def connected(path: Path, *, paced: bool) -> ListeningBoundary:
+    """A boundary that listens, until `close`. `paced`: the run's time is not the machine's. Raises `Refused`."""
+    try:
+        found = ListeningBoundary(path)
+    except BoundaryError as error:
+        raise _refused(error) from None
+    why = "it has no log key (`log.seed`)" if found.log_public is None else ""
+    if paced and found.own_clock:
+        why = "it decides by its own clock, and `--speed` is another"
+    if why:
+        found.close()
+        raise Refused(ExitCode.REFUSED, "boundary-not-begun", f"the boundary at `{path}` does not serve: {why}")
+    return found
+
+
 class Apart:
-    """The boundary of one run that runs apart, under one trust root, until `close`. Raises `Refused`, and OSError."""
+    """The boundary of one run that runs apart: what this end has of it, under one trust root."""
 
     def __init__(
-        self, vehicle: str, root: TrustRoot, signed_root: bytes, state: Path, *,
-        link_key: Path | None, own_key: SigningKey | None, log_key: SigningKey,
-        user: tuple[int, int] | None, paced: bool, settings: Mapping[str, int], owed: Mapping[str, Owed],
-    ) -> None:  # fmt: skip
+        self, process: BoundaryProcess | ListeningBoundary, vehicle: str, root: TrustRoot, settings: Mapping[str, int]
+    ) -> None:
+        self.process = process
         self._vehicle, self._root, self._settings = vehicle, root, settings
-        pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
-        try:
-            seed = None if own_key is None else own_key.private.private_bytes_raw()
-            self.process = BoundaryProcess(
-                signed_root, pinned, vehicle, state, link_key=link_key, own_seed=seed, user=user, paced=paced,
-                log_seed=log_key.private.private_bytes_raw(),
-                settings=_listed({name: Owed(0, value) for name, value in settings.items()}), owed=_listed(owed),
-            )  # fmt: skip
-        except BoundaryError as error:
-            code = CODES.get(error.slug, ExitCode.REFUSED)
-            raise Refused(code, f"boundary-{error.slug}", str(error), error.help) from None
-        self._caller = Caller(self.process.call, signs=link_key is not None)
+        self._caller = Caller(process.call, signs=process.link_name is not None)
 
     @property
     def root(self) -> TrustRoot:

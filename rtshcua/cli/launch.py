@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP
+from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP, ListeningBoundary
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.keystore import KeyStore
@@ -28,12 +28,12 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.cli import simulated, simulation
 from rtshcua.cli.agents import Agents
-from rtshcua.cli.attesting import UNNAMED, BoundarySession, Elsewhere, boundary_key
+from rtshcua.cli.attesting import UNNAMED, BoundarySession, Elsewhere, boundary_key, elsewhere
 from rtshcua.cli.configured import would_set
 from rtshcua.cli.faults import code_of, say, untrusted, words_of
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.interrupts import Interrupts
-from rtshcua.cli.isolating import CODES, IN_USE, Apart
+from rtshcua.cli.isolating import CODES, IN_USE, Apart, connected, started
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.log_signer import LogSigner
@@ -63,7 +63,7 @@ from rtshcua.onboard.rehearsal import stranded
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, claimed_vehicle, open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
-from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.keys import SEED_BYTES, Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -79,6 +79,7 @@ _LOOPBACK = "127.0.0.1"
 _TOO_SLOW = "a faster link, or longer deadlines and times to stale in the policy; docs/flying/link.md counts octets"
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
 #: where it stands which vehicle a bundle is for
+_UNVERIFIABLE = ", which has the log's key: nobody can verify this log, its key is drawn for it alone"
 IDENTITY_HELP = "`identity` of the policy's `vehicle` says which one it is for, `--vehicle` which one this is"
 
 
@@ -110,6 +111,8 @@ class Launch:
     `settings`: parameters that are set before the flight, by name, and put back after it. `wait_s`: the bundle says the
     policy alone, and for so many seconds at most it waits for the one that flies. `boundary_user`: the user and group
     that a boundary of its own process runs as; `unbuilt`, that there is none only because its program is missing.
+    `boundary_socket`: where a boundary listens that has the keys, of the log, of its own and of the link; `listening`
+    is that boundary once it is connected, or why it is not.
     """
 
     bundle: Path
@@ -142,16 +145,33 @@ class Launch:
     boundary_user: tuple[int, int] | None = None
     unbuilt: bool = False
     boundary_key: Path | None = None
+    boundary_socket: Path | None = None
+    listening: ListeningBoundary | Refused | None = None
 
 
 def launch(order: Launch) -> ExitCode:
     """Fly, and show how it ended. Raises `Refused`, and OSError for files that cannot be read or written."""
+    if order.boundary_socket is None:
+        return _launch(order)
+    try:
+        listening = connected(order.boundary_socket, paced=order.speed != 1)
+    except Refused as refused:  # what hangs in the air comes down without
+        return _launch(replace(order, listening=refused))
+    try:
+        return _launch(replace(order, listening=listening))
+    finally:
+        listening.close()
+
+
+def _launch(order: Launch) -> ExitCode:
     bundle = _read(order.bundle)
     clock: LinkClock = SystemClock() if order.speed == 1 else PacedClock(order.speed)
     utc = _utc(order, clock)
     trust, log_key, loaded = _signed_by(*_trusting(order, bundle, clock))
     witnesses = Witnessing(order.witnesses, trust.root.witnesses(loaded.vehicle, clock.now().utc_us))
-    past = None if order.dry_run else Past(order.state, loaded.vehicle, log_key.key())
+    past = None
+    if not order.dry_run:
+        past = Past(order.state, loaded.vehicle, log_key.key() if order.boundary_socket is None else None)
     with ExitStack() as view:  # it may still be shown when everything else is over
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
@@ -208,7 +228,7 @@ def launch(order: Launch) -> ExitCode:
             _expect_all(absent, keyless, resumed=resumed)
             inside = BoundarySession(BoundaryStore(order.state, loaded.vehicle), own_key, aloft=resumed)
             told = trust.settle(resumed=resumed)
-            run, elsewhere = _run_folder(order, loaded, bundle, clock, resumed=resumed)
+            run, moved = _run_folder(order, loaded, bundle, clock, resumed=resumed)
             feed = view.enter_context(Feed(order.style))
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
@@ -226,8 +246,9 @@ def launch(order: Launch) -> ExitCode:
             unsure = [UTC_NOTE] if utc.waits else []
             unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
             alone = "" if absent is None else f"{_why(absent)}; it is brought down without a boundary of its own"
+            alone += _UNVERIFIABLE if alone and order.boundary_socket is not None else ""
             hangs = "" if resumed else _hanging(past, loaded)
-            told_before = filter(None, [alone, hangs, told, elsewhere, past.note, unsigned, inside.note])
+            told_before = filter(None, [alone, hangs, told, moved, past.note, unsigned, inside.note])
             for note in (*signing.notes, *told_before, *unsure):
                 feed.post(Note(note))
             gc.collect()
@@ -303,6 +324,9 @@ def _begin(
         if not _may_hang(order, loaded, past) or (_is_in_use(error) and not _broke_off(past)):
             raise
         apart, absent = None, error
+        if order.boundary_socket is not None:
+            log_key.use(_log_key_here(order))
+            key = None, _keyless()
     if apart is not None:
         log_key.hand_over(apart.sign_log)
         key = (None if own_key is None else Elsewhere(), keyless)
@@ -315,7 +339,7 @@ def _begin(
             order, loaded, trust, log_key, past, clock, interrupts, slack, transport, agents, apart, absent
         )
         if waited is not trust and not isinstance(loaded.executor, IsolatedExecutor):
-            key = _boundary_key(order, waited.root, loaded, clock)
+            key = _boundary_key(order, waited.root, loaded, clock) if order.listening is None else (None, _keyless())
         begun = _Begun(bundle, loaded, waited, key, apart, absent, transport, agents)
     if isinstance(begun.loaded.preparation, PreparationIssuer):  # the one elsewhere was told when it began
         begun.loaded.preparation.owes(owed)
@@ -337,24 +361,30 @@ def _is_in_use(error: Refused | OSError) -> bool:
 
 
 def _apart(
-    order: Launch, loaded: Loaded, trust: Trusted, own_key: SigningKey | None, log_key: LogSigner,
+    order: Launch, loaded: Loaded, trust: Trusted, own_key: SigningKey | Elsewhere | None, log_key: LogSigner,
     owed: Mapping[str, Owed], stack: ExitStack,
 ) -> Apart | None:  # fmt: skip
     """A boundary that runs apart, where that is asked for, until the stack is closed. What may have expired is brought
-    down by the one in this process, which does not ask. Raises `Refused` and OSError.
+    down by the one in this process, which does not ask, but where one listens: that has a trust root of its own. Raises
+    `Refused` and OSError.
     """
+    if isinstance(order.listening, Refused):
+        raise order.listening
+    if order.listening is not None:
+        return Apart(order.listening, loaded.vehicle, trust.root, order.settings)
     if order.mode is not Mode.PROCESS or order.dry_run or trust.distrust is not None:
         return None
+    assert not isinstance(own_key, Elsewhere)
     try:
-        apart = Apart(
-            loaded.vehicle, trust.root, trust.signed, order.state, link_key=order.signing_key, own_key=own_key,
+        process = started(
+            loaded.vehicle, trust.signed, order.state, link_key=order.signing_key, own_key=own_key,
             log_key=log_key.key(),
             user=order.boundary_user, paced=order.speed != 1, settings=order.settings, owed=owed,
         )  # fmt: skip
     except LinkKeyError as error:
         raise _of_link_key(error) from None
-    stack.callback(apart.process.close)
-    return apart
+    stack.callback(process.close)
+    return Apart(process, loaded.vehicle, trust.root, order.settings)
 
 
 def _taken_over(apart: Apart | None, loaded: Loaded, bundle: bytes, clock: LinkClock) -> Loaded:
@@ -368,13 +398,22 @@ def _taken_over(apart: Apart | None, loaded: Loaded, bundle: bytes, clock: LinkC
 
 def _boundary_key(
     order: Launch, root: TrustRoot, loaded: Loaded, clock: LinkClock
-) -> tuple[SigningKey | None, Refused | None]:
+) -> tuple[SigningKey | Elsewhere | None, Refused | None]:
     """The key that the boundary signs with, or why there is none."""
     store, now_us = KeyStore(order.data), clock.now().utc_us
+    if isinstance(order.listening, Refused):
+        return None, _keyless()
     try:
+        if order.listening is not None:
+            return elsewhere(root, loaded.vehicle, now_us, order.listening.own_public), None
         return boundary_key(root, loaded.vehicle, now_us, store, order.boundary_key, order.passphrase_file), None
     except Refused as refused:
         return None, refused
+
+
+def _keyless() -> Refused:
+    """Why nothing is signed inside, where the boundary that listens does not decide."""
+    return Refused(ExitCode.INPUT, "no-boundary-key", "what is decided is not signed inside: the boundary has the key")
 
 
 def _why(absent: Refused | OSError) -> str:
@@ -463,14 +502,16 @@ def _wait(
         broken_off = None if past is None else _broken_off(order, past, base, vehicle, clock, events)
         if broken_off is not None:
             (data, loaded), under = broken_off
-            same = apart if under.root == trusted.root and under.distrust is None else None  # it has the one root
+            same = apart if under.root == trusted.root and under.distrust is None else None  # it has the one root,
+            if order.listening is not None:
+                same = apart  # or its own
             try:
                 admitted = Admitted(data, _taken_over(same, loaded, data, clock))
             except Refused as refused:
                 say(f"note: {refused}; it is brought down all the same")
                 admitted = Admitted(data, loaded)
             if not isinstance(admitted.loaded.executor, IsolatedExecutor):
-                log_key.use(_log_key(order))
+                log_key.use(_log_key_here(order))
             agents.fly(admitted.loaded)
             return admitted, under
         if trusted.distrust is not None:  # what it is not enough for is to fly anything new
@@ -578,7 +619,7 @@ def _read(path: Path) -> bytes:
 
 def _trusting(
     order: Launch, bundle: bytes, clock: LinkClock, flight: bytes | None = None
-) -> tuple[Trusted, SigningKey, Loaded]:
+) -> tuple[Trusted, SigningKey | VerificationKey, Loaded]:
     """The trust root that counts, the key that will sign the log, and the bundle under that root, as a flight of this
     id, or else of a new one. Raises `Refused`.
 
@@ -606,11 +647,26 @@ def _trusting(
     return trusted, key, loaded
 
 
-def _log_key(order: Launch) -> SigningKey:
+def _log_key(order: Launch) -> SigningKey | VerificationKey:
+    """The key that signs the log; the public half of it where a boundary that listens has it."""
+    if isinstance(order.listening, ListeningBoundary):
+        assert order.listening.log_public is not None
+        return VerificationKey(Duty.LOG, order.listening.log_public)
+    return _log_key_here(order)
+
+
+def _log_key_here(order: Launch) -> SigningKey:
+    """The key by which this process signs the log; one that is drawn, and nobody knows, for what comes down without the
+    boundary that has it.
+    """
+    if order.boundary_socket is not None:
+        return SigningKey.from_seed(secrets.token_bytes(SEED_BYTES), duty=Duty.LOG, development=True)
     return unlock(KeyStore(order.data), Duty.LOG, path=order.log_key, passphrase_file=order.passphrase_file)
 
 
-def _signed_by(trusted: Trusted, key: SigningKey, loaded: Loaded) -> tuple[Trusted, LogSigner, Loaded]:
+def _signed_by(
+    trusted: Trusted, key: SigningKey | VerificationKey, loaded: Loaded
+) -> tuple[Trusted, LogSigner, Loaded]:
     """What `_trusting` found, its key in the hands of who signs the log, and of nobody else."""
     return trusted, LogSigner(key), loaded
 
@@ -620,13 +676,15 @@ def _signs_no_more(_checkpoint: bytes) -> Refusal:
 
 
 def _loading(
-    order: Launch, bundle: bytes, trusted: Trusted, key: SigningKey, clock: LinkClock, flight: bytes | None
-) -> Loaded:
+    order: Launch, bundle: bytes, trusted: Trusted, key: SigningKey | VerificationKey, clock: LinkClock,
+    flight: bytes | None,
+) -> Loaded:  # fmt: skip
     """The bundle under a root; under one that is not to be trusted any more, whatever has expired since."""
     now = clock.now()
     if trusted.distrust is not None:
         now = Now(now.monotonic_us, 0, now.utc_error_us)
-    _expect_log_key(key, trusted.root)
+    if not isinstance(order.listening, Refused):
+        _expect_log_key(key, trusted.root)
     loaded = _load(order, bundle, trusted.root, now, flight)
     _expect_current(_unverifiable(trusted.root, key.kid, loaded.vehicle, now.utc_us), resumed=False)
     return loaded
@@ -634,7 +692,8 @@ def _loading(
 
 def _unverifiable(root: TrustRoot, log_key: bytes, vehicle: str, now_us: int) -> Refused | None:
     """Why nobody could verify a log that the key of this name signs now; None where they could."""
-    refusal = key_refusal(root.keys_for(Duty.LOG)[log_key], vehicle=vehicle, now_us=now_us)
+    named = root.keys_for(Duty.LOG).get(log_key)  # none: `_log_key_here`
+    refusal = None if named is None else key_refusal(named, vehicle=vehicle, now_us=now_us)
     if refusal is None:
         return None
     text = f"the log key {log_key.hex()} may not speak for `{vehicle}` now: nobody could verify the log"
@@ -658,7 +717,7 @@ def _vehicle(order: Launch, bundle: bytes) -> str | None:
         return None
 
 
-def _expect_log_key(key: SigningKey, root: TrustRoot) -> None:
+def _expect_log_key(key: SigningKey | VerificationKey, root: TrustRoot) -> None:
     if key.kid in root.revocations:
         text = f"the trust root revokes the log key {key.kid.hex()}"
         raise Refused(ExitCode.UNTRUSTED, REVOKED, text, "`--log-key` gives the one that took its place")
@@ -715,23 +774,27 @@ def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now, flight: bytes
 def _sign(order: Launch, loaded: Loaded, clock: LinkClock, apart: Apart | None = None) -> Signing:
     """What signs the link; where the boundary that decides runs apart, that one, and its key is not read here."""
     gate = loaded.executor.frames
-    elsewhere = apart.process if apart is not None and isinstance(gate, IsolatedGate) else None
+    process = apart.process if apart is not None and isinstance(gate, IsolatedGate) else None
     try:
         signing = Signing(
-            order.signing_key if elsewhere is None else None, loaded.bundle.policy, gate, order.state, clock,
+            order.signing_key if process is None else None, loaded.bundle.policy, gate, order.state, clock,
             unsigned_radio=order.unsigned_radio, even_damaged=not order.dry_run,
         )  # fmt: skip
-        if elsewhere is not None and isinstance(gate, IsolatedGate):
-            if elsewhere.missing:
-                signing.notes.append(f"the boundary runs without {'; without '.join(elsewhere.missing)}")
-            if elsewhere.link_name is not None:
+        if process is not None and isinstance(gate, IsolatedGate):
+            if order.boundary_socket is not None:
+                signing.notes.append(
+                    f"the boundary at `{order.boundary_socket}` decides, by keys and a root of its own"
+                )
+            if process.missing:
+                signing.notes.append(f"the boundary runs without {'; without '.join(process.missing)}")
+            if process.link_name is not None:
                 policy, radio = loaded.bundle.policy, order.unsigned_radio
-                signing.elsewhere(elsewhere.link_name, gate, policy, unsigned_radio=radio)
+                signing.elsewhere(process.link_name, gate, policy, unsigned_radio=radio)
     except LinkKeyError as error:
         raise _of_link_key(error) from None
     if order.unbuilt:
         signing.notes.append(f"{UNBUILT}: {UNBUILT_HELP}")
-    if order.signing_key is None and order.link is not None and not order.link.is_loopback:
+    if signing.name is None and order.link is not None and not order.link.is_loopback:
         signing.notes.append(
             f"`{order.link}` has no key: whoever reaches it can speak as the vehicle (`--signing-key`)"
         )

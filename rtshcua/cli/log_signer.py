@@ -5,29 +5,32 @@ from collections.abc import Callable
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 
 
 class LogSigner:
-    """The log's key, until it is handed over. `kid` names it, and `public` is its public half."""
+    """The log's key, until it is handed over. `kid` names it, and `public` is its public half; there may be no more of
+    it here.
+    """
 
-    def __init__(self, key: SigningKey) -> None:
-        self.kid, self.public = key.kid, key.public
+    def __init__(self, key: SigningKey | VerificationKey) -> None:
+        self._key: SigningKey | None = None
+        self._elsewhere: Callable[[bytes], bytes | Refusal] | None = None
         self.use(key)
 
-    def use(self, key: SigningKey) -> None:
-        """This process signs, with this key."""
-        self._key: SigningKey | None = key
-        self._elsewhere: Callable[[bytes], bytes | Refusal] | None = None
+    def use(self, key: SigningKey | VerificationKey) -> None:
+        """This process signs, with this key, if it has it."""
+        self.kid, self.public = key.kid, key.public
+        self._key, self._elsewhere = (key if isinstance(key, SigningKey) else None), None
 
     def hand_over(self, elsewhere: Callable[[bytes], bytes | Refusal]) -> None:
         """Who has the key too signs from now on; it is let go here."""
         self._key, self._elsewhere = None, elsewhere
 
     def key(self) -> SigningKey:
-        """The key. Raises LookupError once it was handed over."""
+        """The key. Raises LookupError once it was handed over, and where it never was here."""
         if self._key is None:
-            raise LookupError("the log's key was handed over")
+            raise LookupError("the log's key is not here")
         return self._key
 
     def sign(self, checkpoint: bytes) -> bytes:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rtshcua.adapters.files.last_log import Earlier, LastLog
 from rtshcua.adapters.files.logs import lines
-from rtshcua.adapters.files.recovery import alone, recover
+from rtshcua.adapters.files.recovery import alone, look, recover
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.cli.recover import signer_of
 from rtshcua.onboard.enforcement.load import Loaded
@@ -21,10 +21,11 @@ _UNKEPT = "the next log will not know of this one, for that cannot be kept"
 class Past:
     """Ends the last log of a vehicle, where it must, when it is made. `hash` and `note` are for the next log."""
 
-    def __init__(self, state: Path, vehicle: str, log_key: SigningKey) -> None:
+    def __init__(self, state: Path, vehicle: str, log_key: SigningKey | None) -> None:
+        """Without the log's key the log before stays without an end."""
         self._last = LastLog(state, vehicle)
-        signer = signer_of(log_key)
-        self._earlier: Earlier = self._last.settle(lambda path: recover(path, signer))
+        signer = None if log_key is None else signer_of(log_key)
+        self._earlier: Earlier = self._last.settle(look if signer is None else lambda path: recover(path, signer))
         self._log: Path | None = None
         self._held = ExitStack()
 

@@ -6,6 +6,7 @@ import pwd
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -52,6 +53,10 @@ def run(
     ] = None,
     boundary_user: Annotated[
         str | None, typer.Option(metavar="USER", help="with `--mode process`: the user that it runs as; needs root")
+    ] = None,
+    boundary_socket: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="with --connect: there a boundary listens, which has the keys"),
     ] = None,
     speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
     flavour: simulated.Flavour = None,
@@ -132,14 +137,19 @@ def run(
     misplaced = _misplaced(
         wait=wait, timed=wait_for is not None, socket=agent_socket is not None, never=rehearsal or scenario is not None
     )
-    lonely = misplaced or (_LONELY[system is not None, utc_error is not None] if own else "")
+    given = {
+        "--signing-key": signing_key, "--boundary-user": boundary_user, "--log-key": log_key, "--set": set_,
+        "--boundary-key": boundary_key, "--passphrase-file": passphrase_file, "--dry-run": rehearsal,
+    }  # fmt: skip
+    alone = "" if boundary_socket is None else _not_with_socket(given, own=own, mode=mode)
+    lonely = misplaced or alone or (_LONELY[system is not None, utc_error is not None] if own else "")
     if lonely:
         return fail(ExitCode.USAGE, lonely)
     if fresh_state and (state_dir is not None or not own):
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
-    if unsigned_radio and signing_key is None:
+    if unsigned_radio and signing_key is None and boundary_socket is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
-    mode, unbuilt = _mode(mode, own=own, named=boundary_user is not None)
+    mode, unbuilt = _mode(mode, own=own, named=boundary_user is not None or boundary_socket is not None)
     user = _boundary_user(boundary_user, mode)
     group = _group(agent_socket, operator_socket, agent_group)
     if isinstance(user, str) or isinstance(group, str):
@@ -166,6 +176,7 @@ def run(
             mode=mode,
             unbuilt=unbuilt,
             boundary_user=user,
+            boundary_socket=boundary_socket,
             speed=speed,
             vehicle=vehicle,
             roots=tuple(root or ()),
@@ -212,6 +223,7 @@ _UTC = "`--utc-error` goes with `--connect`: a simulation has this machine's tim
 #: what is wrong without `--connect`, by whether `--system` and `--utc-error` are given
 _LONELY = {(False, False): "", (True, False): _SYSTEM, (True, True): _SYSTEM, (False, True): _UTC}
 _VEHICLE_HELP = "its identity, as its policy says it: a bundle for another vehicle is refused then"
+_OWN = "the boundary there has keys of its own, sets no parameters, and rehearses nothing"
 _SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
 
 
@@ -235,6 +247,16 @@ def _misplaced(*, wait: bool, timed: bool, socket: bool, never: bool) -> str | N
     if wait and never:
         return "`--wait` does not go with `--dry-run` and `--scenario`, which know the mission before"
     return None
+
+
+def _not_with_socket(given: Mapping[str, object], *, own: bool, mode: Mode | None) -> str:
+    """What is wrong about `--boundary-socket` on a command line with these options; empty for nothing."""
+    if own:
+        return "`--boundary-socket` goes with `--connect`"
+    if mode not in (None, Mode.PROCESS):
+        return f"`--boundary-socket` goes with `--mode process`, not with `{mode}`"
+    found = next((name for name, value in given.items() if value), None)
+    return "" if found is None else f"`{found}` does not go with `--boundary-socket`: {_OWN}"
 
 
 def _mode(mode: Mode | None, *, own: bool, named: bool) -> tuple[Mode, bool]:

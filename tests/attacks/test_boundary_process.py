@@ -25,7 +25,7 @@ from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import AGAIN_S, ANSWER_S, BoundaryError, BoundaryProcess, Measure, kept_file
 from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.adapters.store.writing import lock
-from rtshcua.cli.isolating import Apart
+from rtshcua.cli.isolating import started
 from rtshcua.cli.refused import Refused
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
@@ -345,11 +345,11 @@ def test_when_it_dies_nothing_leaves_that_was_not_signed_ahead(held: Held) -> No
 # ---------------------------------------------------------------------------------------- what keeps it from beginning
 
 
-def begun(state: Path) -> Apart:
+def begun(state: Path) -> BoundaryProcess:
     """As `run` begins one."""
-    root, signed = case.root(issued_us())
-    return Apart(
-        VEHICLE, root, signed, state, link_key=None, own_key=None, log_key=case.KEYS[Duty.LOG], user=None, paced=False,
+    _, signed = case.root(issued_us())
+    return started(
+        VEHICLE, signed, state, link_key=None, own_key=None, log_key=case.KEYS[Duty.LOG], user=None, paced=False,
         settings={}, owed={},
     )  # fmt: skip
 
@@ -364,7 +364,7 @@ def test_each_reason_not_to_begin_has_a_slug_and_an_exit_code(tmp_path: Path, mo
     monkeypatch.setattr(boundary_process, "ENDING_S", 0.05)
     first = begun(tmp_path)
     assert why_not(tmp_path) == (ExitCode.REFUSED, "boundary-in-use")
-    first.process.close()
+    first.close()
     path = kept_file(tmp_path, VEHICLE)
     path.write_bytes(bytes(path.stat().st_size))
     assert why_not(tmp_path) == (ExitCode.INPUT, "boundary-damaged")
@@ -382,7 +382,7 @@ def test_a_boundary_that_is_still_ending_is_waited_for(tmp_path: Path) -> None:
     held = lock(kept_file(tmp_path, VEHICLE))
     ends = threading.Timer(0.3, os.close, (held,))
     ends.start()
-    begun(tmp_path).process.close()
+    begun(tmp_path).close()
     ends.join()
 
 
@@ -396,6 +396,6 @@ def test_a_disk_that_is_full_at_the_first_start_is_no_damage(tmp_path: Path) -> 
         assert why_not(tmp_path) == (ExitCode.FULL, "boundary-not-kept")
         assert kept_file(tmp_path, VEHICLE).stat().st_size == 0
         subprocess.run(["mount", "-o", "remount,size=2m", str(tmp_path)], check=True, capture_output=True)
-        begun(tmp_path).process.close()
+        begun(tmp_path).close()
     finally:
         subprocess.run(["umount", "-l", str(tmp_path)], check=True, capture_output=True)

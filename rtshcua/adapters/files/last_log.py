@@ -18,7 +18,7 @@ import msgspec
 from rtshcua.adapters.files.recovery import InUse, Recovered
 from rtshcua.adapters.store.reading import read_if_there
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace
-from rtshcua.evidence.recovery import State
+from rtshcua.evidence.recovery import RECOVERABLE, State
 
 _LARGEST = 1 << 16  # octets of the file
 
@@ -52,7 +52,7 @@ class LastLog:
         self.path = state / "logs" / f"vehicle-{quote(vehicle, safe='')}"
 
     def settle(self, recover: Callable[[Path], Recovered]) -> Earlier:
-        """The last log, ended by `recover` where it has no end. Never raises: a flight does not wait for a log."""
+        """The last log; `recover` ends it where it has no end, if it can. Never raises: no flight waits for a log."""
         try:
             known = _remembered(self.path)
         except (OSError, ValueError) as error:
@@ -111,6 +111,9 @@ def _told(log: Path, before: str | None, done: Recovered) -> Earlier:
         return Earlier(done.last, note, log=log)
     if found.state is State.CLOSED:
         return Earlier(done.last, log=log)
+    if found.state in RECOVERABLE:
+        text = f"the log before, `{log}`, was not closed: `rtshcua recover` ends it, where the log's key is"
+        return Earlier(done.last, text, log=log)
     if found.state is State.UNBEGUN:
         return Earlier(before)
     reason = "" if found.reason is None else f" (record {found.reason.record}: {found.reason.text})"

@@ -1,0 +1,225 @@
+"""Threat: the runtime is wholly taken over, and the boundary is one that listens under a user of its own, with the keys
+in a folder of that user. The attacker has the runtime's user, and may connect as often as it likes.
+
+Outcomes: it reads no key, file or memory of the boundary, and cannot signal it; what it says of root, keys, identity or
+time is not asked for; a second connection is turned away; a boundary that hangs is ended by the kernel, and the next
+one serves.
+"""
+
+import ctypes
+import os
+import signal
+import socket
+import struct
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters import boundary_process
+from rtshcua.adapters.boundary_process import BoundaryError, ListeningBoundary, Measure
+from rtshcua.cli import isolating
+from rtshcua.cli.refused import Refused
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.isolated import ENFORCE, LOST, SEAL, Caller
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.wire.keys import Duty
+from virtual import case
+from virtual.listening import ROOT, RUN_USER, VEHICLE, Listening, listening
+from virtual.shipped import shipped
+
+OTHER_USER = pytest.mark.skipif(not ROOT, reason="only root may start what runs as another user")
+LOG_SEED, OWN_SEED = (key.private.private_bytes_raw() for key in (case.KEYS[Duty.LOG], case.BOUNDARY_KEY))
+
+
+def now() -> Now:
+    return Now(time.monotonic_ns() // 1_000, time.time_ns() // 1_000, 1_000)
+
+
+class Provisioned:
+    """A boundary that listens, what its folder holds, and a bundle for it."""
+
+    def __init__(self, made: Listening) -> None:
+        self.made, self.socket = made, made.socket
+        self.issued = time.time_ns() // 1_000 - 60_000_000
+        self.root, signed = case.root(self.issued)
+        made.own.mkdir(parents=True)
+        made.own.chmod(0o700)
+        self.put("root.trust", signed)
+        self.put("root.pin", case.KEYS[Duty.ROOT].kid.hex().encode())
+        self.put("log.seed", LOG_SEED.hex().encode() + b"\n")
+        self.put("boundary.seed", OWN_SEED.hex().encode() + b"\n")
+        self.put("link.key", b"5a" * 32 + b"\n")
+        made.give()
+
+    def put(self, name: str, octets: bytes) -> None:
+        path = self.made.own / name
+        path.write_bytes(octets)
+        path.chmod(0o600)
+
+    def load(self, process: ListeningBoundary) -> Loaded | Refusal:
+        return load(
+            shipped("short", self.issued), root=self.root, vehicle=VEHICLE, now=now(), mode=Mode.PROCESS,
+            session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False,
+            caller=Caller(process.call, signs=True),
+        )  # fmt: skip
+
+    def why_not(self) -> str:
+        with pytest.raises(BoundaryError) as refused:
+            ListeningBoundary(self.socket)
+        return refused.value.slug
+
+
+@pytest.fixture
+def provisioned(monkeypatch: pytest.MonkeyPatch) -> Iterator[Provisioned]:
+    monkeypatch.setattr(boundary_process, "ENDING_S", 0.2)
+    with listening() as made:
+        yield Provisioned(made)
+
+
+def test_it_serves_with_the_keys_of_its_folder(provisioned: Provisioned) -> None:
+    process = ListeningBoundary(provisioned.socket)
+    assert process.log_public == case.KEYS[Duty.LOG].public
+    assert process.own_public == case.BOUNDARY_KEY.public
+    assert process.link_name is not None
+    assert (Measure.OWN_USER in process.measures) is ROOT
+    assert process.own_clock
+    assert isinstance(provisioned.load(process), Loaded)
+    process.close()
+    provisioned.made.await_gone(1)
+
+
+def as_user(user: int, act: Callable[[], int]) -> int:
+    """What a program of another user comes to, which acts so; 101 where it fails."""
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setgroups([])
+            os.setresgid(user, user, user)
+            os.setresuid(user, user, user)
+            os._exit(min(act(), 100))
+        finally:
+            os._exit(101)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@OTHER_USER
+def test_the_runs_user_reads_and_signals_nothing_of_it(provisioned: Provisioned) -> None:
+    def connects() -> int:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as made:
+            made.connect(str(provisioned.socket))
+            return len(made.recv(100))
+
+    def reads() -> int:
+        process = ListeningBoundary(provisioned.socket)
+        (pid,) = provisioned.made.boundaries()
+        names = [Path(f"/proc/{pid}/{name}") for name in ("mem", "maps", "environ", "syscall", "auxv")]
+        names += [Path(f"/proc/{pid}/fd/{each}") for each in range(3, 20)]
+        own = ("kept", "log.seed", "boundary.seed", "link.key", "root.trust")
+        got = 0
+        for path in (*names, *(provisioned.made.own / name for name in own)):
+            with suppress(OSError), path.open("rb") as file:
+                got += len(file.read(1))
+        for path in (provisioned.made.folder, provisioned.made.own):
+            with suppress(OSError):
+                got += len(list(path.iterdir()))
+        for number in (signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM, 0):
+            with suppress(PermissionError):
+                os.kill(pid, number)
+                got += 1
+        libc, attach, seize = ctypes.CDLL(None, use_errno=True), 16, 0x4206
+        got += (libc.ptrace(attach, pid, 0, 0) == 0) + (libc.ptrace(seize, pid, 0, 0) == 0)
+        process.call(b"\x14")
+        return got
+
+    provisioned.made.folder.chmod(0o700)
+    assert as_user(RUN_USER, connects) == 77, "the one who may connect does"
+    assert as_user(RUN_USER, reads) == 0
+    assert as_user(RUN_USER + 10, connects) == 101, "nobody else may"
+
+
+def test_a_second_connection_is_turned_away(provisioned: Provisioned) -> None:
+    first = ListeningBoundary(provisioned.socket)
+    loaded = provisioned.load(first)
+    assert provisioned.why_not() == "in-use"
+    assert isinstance(loaded, Loaded)
+    assert Caller(first.call).flight() != LOST, "and the first goes on"
+    first.close()
+
+
+@pytest.mark.parametrize("pending", [False, True])
+def test_one_that_is_halted_ends(provisioned: Provisioned, pending: bool) -> None:
+    """Whoever connected may not kill it: the kernel does, and the next one begins no step of the bundle again."""
+    process = ListeningBoundary(provisioned.socket)
+    provisioned.load(process)
+    (halted,) = provisioned.made.boundaries()
+    os.kill(halted, signal.SIGSTOP)
+    if pending:
+        assert Caller(process.call)(ENFORCE, b"anything") is LOST
+    else:
+        process.close()
+    provisioned.made.await_gone(5)
+    again = ListeningBoundary(provisioned.socket)
+    assert isinstance(provisioned.load(again), Loaded)
+    again.close()
+    process.close()
+
+
+def test_it_does_not_believe_a_time_that_is_made_up(provisioned: Provisioned) -> None:
+    """And no run may ask it to: `--speed` needs one that was started so."""
+    process = ListeningBoundary(provisioned.socket)
+    provisioned.load(process)
+    at = struct.pack(">q", now().monotonic_us + 10_000_000)
+    answer = Caller(process.call)(SEAL, at, b"anything")
+    assert isinstance(answer, Refusal)
+    assert answer.slug == "time-apart"
+    process.close()
+    provisioned.made.await_gone(1)
+    with pytest.raises(Refused, match="its own clock"):
+        isolating.connected(provisioned.socket, paced=True)
+
+
+@pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed"])
+def test_a_missing_file(provisioned: Provisioned, name: str) -> None:
+    (provisioned.made.own / name).unlink()
+    assert provisioned.why_not() == "not-begun"
+
+
+def test_files_that_do_not_serve(provisioned: Provisioned) -> None:
+    own, put = provisioned.made.own, provisioned.put
+    pin = (own / "root.pin").read_bytes()
+    put("root.pin", case.KEYS[Duty.LOG].kid.hex().encode())
+    assert provisioned.why_not() == "untrusted", "signed by another key than the pinned one"
+    put("root.pin", pin)
+    root = (own / "root.trust").read_bytes()
+    put("root.trust", root[:-1] + bytes([root[-1] ^ 1]))
+    assert provisioned.why_not() == "untrusted"
+    put("root.trust", root)
+    put("link.key", b"no key")
+    assert provisioned.why_not() == "not-begun"
+    put("link.key", b"5a" * 32)
+    (own / "kept").write_bytes(bytes((own / "kept").stat().st_size))
+    assert provisioned.why_not() == "damaged"
+    (own / "kept").unlink()
+    (own / "kept").symlink_to("/dev/null")
+    assert provisioned.why_not() == "not-kept"
+    (own / "kept").unlink()
+    ListeningBoundary(provisioned.socket).close()
+    provisioned.made.await_gone(1)
+    own.chmod(0o750)
+    assert provisioned.why_not() == "not-begun", "others may look into its folder"
+
+
+def test_no_vehicle_but_that_of_its_socket(provisioned: Provisioned) -> None:
+    """A runtime that says another one changes nothing: there is no folder of it."""
+    provisioned.made.own.rename(provisioned.made.folder / "quad-08")
+    assert provisioned.why_not() == "not-begun"
+
+
+def test_nobody_listens(tmp_path: Path) -> None:
+    with pytest.raises(BoundaryError, match="no boundary listens") as refused:
+        ListeningBoundary(tmp_path / "none")
+    assert refused.value.slug == "missing"

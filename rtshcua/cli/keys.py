@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import re
 import secrets
 import sys
@@ -19,13 +20,17 @@ from rtshcua.adapters.files.keystore import OPERATOR, OWNER, PROPOSERS, KeyStore
 from rtshcua.adapters.files.roots import RootStore
 from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key, write_link_key
 from rtshcua.adapters.link_setup import LinkSetup, after_setup, carry_out
+from rtshcua.adapters.store.laying import appearing
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, write_new
 from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.address import parse as parse_address
 from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.cli import attesting
 from rtshcua.cli.connection import System
 from rtshcua.cli.documents import AsJson
 from rtshcua.cli.faults import code_of, fail, misaddressed, refuse, untrusted
 from rtshcua.cli.meeting import unopened
+from rtshcua.cli.refused import Refused
 from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
 from rtshcua.cli.stdout import out, out_json
@@ -36,7 +41,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
-from rtshcua.wire.trust import HUMAN, LINK_ID_BYTES, PERSON, TrustRoot, open_root
+from rtshcua.wire.trust import HUMAN, LINK_ID_BYTES, PERSON, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
@@ -174,6 +179,63 @@ def boundary(
         own_passphrase_file,
         as_json=as_json,
     )
+
+
+@app.command()
+def provision(
+    folder: Annotated[Path, typer.Argument(help="where the vehicle's folder is made: `/var/lib/rtshcua-boundary`")],
+    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="the vehicle's identity, which its folder is named")],
+    signing_key: Annotated[Path | None, typer.Option(metavar="FILE", help="the key of its link, if it has one")] = None,
+    log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
+    boundary_key: Annotated[
+        Path | None, typer.Option(help="the key that the enforcement boundary signs with (the key store's)")
+    ] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase of these keys")] = None,
+) -> ExitCode:  # fmt: skip
+    """Make the folder of a boundary that listens (`run --boundary-socket`): its keys, unlocked, and the trust root.
+
+    The folder appears whole, readable by its owner alone, or not at all; one that is there is left alone. It goes to
+    the user of the boundary, and these keys to nobody else aboard.
+    """
+    place = folder / vehicle
+    if vehicle in ("", ".", "..") or place.name != vehicle or not vehicle.isprintable():
+        return fail(ExitCode.USAGE, f"`{visible(vehicle)}` names no folder", "accepted: an identity without `/`")
+    if os.path.lexists(place):
+        text = f"there is a folder `{place}` already"
+        return fail(ExitCode.REFUSED, text, "what is kept there is of a vehicle that flies: move it away, or only copy")
+    store, now_us = KeyStore(data_folder()), time.time_ns() // 1000
+    try:
+        root = open_root(store.root(), pinned=store.pin(), now_us=now_us)
+        log = unlock(store, Duty.LOG, path=log_key, passphrase_file=passphrase_file)
+        named = root.keys_for(Duty.LOG).get(log.kid)
+        slug = "unknown-key" if named is None else key_refusal(named, vehicle=vehicle, now_us=now_us)
+        if slug is not None:
+            text = f"the trust root lets no log key {log.kid.hex()} speak for `{vehicle}` now"
+            return fail(ExitCode.UNTRUSTED, text, "`--log-key` gives one that it names", slug=slug)
+        own = attesting.boundary_key(root, vehicle, now_us, store, boundary_key, passphrase_file)
+        link = None if signing_key is None else read_link_key(signing_key)
+    except Untrusted as error:
+        return _refused(error)
+    except Refused as refused:
+        return fail(refused.code, str(refused), refused.help, slug=refused.slug)
+    except LinkKeyError as error:
+        return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
+    seeds = {"log.seed": log.private.private_bytes_raw(), "root.pin": store.pin()}
+    seeds |= {} if own is None else {"boundary.seed": own.private.private_bytes_raw()}
+    seeds |= {} if link is None else {"link.key": link}
+    make_folder(folder, mode=PRIVATE_FOLDER)
+    with appearing(place) as fresh:
+        for name, octets in seeds.items():
+            write_new(fresh / name, octets.hex().encode() + b"\n", mode=PRIVATE_FILE)
+        write_new(fresh / "root.trust", store.root(), mode=PRIVATE_FILE)
+    out(
+        f"{place}: the boundary of `{vehicle}`, under trust root version {root.version}",
+        f"  log key        {log.kid.hex()}",
+        f"  boundary key   {'none: the trust root names none for it' if own is None else own.kid.hex()}",
+        f"  link key       {'none' if link is None else fingerprint(link)}",
+        "give it to the boundary's user: `chown -R rtshcua-boundary:` it, and keep these keys nowhere else aboard",
+    )
+    return ExitCode.OK
 
 
 @app.command()

@@ -33,7 +33,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
 }
 
 #: parameters that are folders
-FOLDERS: Final = frozenset({"directory", "runs", "state_dir", "archive"})
+FOLDERS: Final = frozenset({"directory", "folder", "runs", "state_dir", "archive"})
 
 
 def words(command: str, parameter: str) -> tuple[str, ...]:

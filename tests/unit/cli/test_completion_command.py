@@ -63,7 +63,8 @@ def test_bash_completes_all_of_it(tab: Complete) -> None:
     assert set(tab("")) == {row.name for row in COMMANDS} | {"help"}
     assert tab("verify-") == ["verify-log", "verify-proof"]
     assert set(tab("keys", "")) == {
-        "accept", "approver", "boundary", "init", "link", "list", "mission", "replace", "revoke", "rotate-root", "show",
+        "accept", "approver", "boundary", "init", "link", "list", "mission", "provision", "replace",
+        "revoke", "rotate-root", "show",
     }  # fmt: skip
     assert "--if-missing" in tab("keys", "init", "--i")
     assert tab("check", "--deny") == ["--deny-warnings"]

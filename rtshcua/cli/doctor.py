@@ -14,7 +14,15 @@ import msgspec
 import typer
 
 from rtshcua import library
-from rtshcua.adapters.boundary_process import MISSING, UNBUILT, UNBUILT_HELP, BoundaryError, measures_here, program
+from rtshcua.adapters.boundary_process import (
+    MISSING,
+    UNBUILT,
+    UNBUILT_HELP,
+    BoundaryError,
+    ListeningBoundary,
+    measures_here,
+    program,
+)
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
@@ -70,6 +78,9 @@ def doctor(
         str | None, typer.Option(metavar="USER", help="who the agent runs as: is it told apart from operators?")
     ] = None,
     set_: MeantSettings = None,
+    boundary_socket: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="where a boundary listens that is to decide: look at that one")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
 ) -> ExitCode:  # fmt: skip
     """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
@@ -115,7 +126,7 @@ def doctor(
             return refuse(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
-        findings = _boundary() + agents
+        findings = _boundary(boundary_socket) + agents
         findings += list(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
@@ -135,18 +146,24 @@ def doctor(
     return code
 
 
-def _boundary() -> list[VehicleFinding]:
-    """Where a run on this machine decides, and which measures that keep others out of a process of its own it would be
-    without.
+def _boundary(socket: Path | None = None) -> list[VehicleFinding]:
+    """Where a run on this machine decides, or one that calls the boundary at this socket, and which measures that keep
+    others out of a process of its own that would be without.
     """
     slug = "boundary/process"
-    if program() is None:
+    if socket is None and program() is None:
         return [VehicleFinding(slug, MissionVerdict.WARN, UNBUILT, "a process of its own", UNBUILT_HELP)]
     try:
-        here = measures_here(None)
+        if socket is None:
+            here, where = measures_here(None), "a run decides in a process of its own (`run --mode process`)"
+        else:
+            listening = ListeningBoundary(socket)
+            listening.close()
+            here, where = listening.measures, f"a boundary listens at `{socket}`"
     except BoundaryError as error:
-        return [VehicleFinding(slug, MissionVerdict.WARN, str(error), "a process of its own", error.help)]
-    found = [VehicleFinding(slug, MissionVerdict.OK, "a run decides in a process of its own (`run --mode process`)")]
+        verdict = MissionVerdict.WARN if socket is None else MissionVerdict.STOP
+        return [VehicleFinding(slug, verdict, str(error), "a process of its own", error.help)]
+    found = [VehicleFinding(slug, MissionVerdict.OK, where)]
     for measure, text in MISSING.items():
         if measure not in here:
             name = f"boundary/{str(measure.name).lower().replace('_', '-')}"

@@ -1,4 +1,4 @@
-"""The unit for permanent use: systemd takes it, it is shut in, and a run flies so."""
+"""The units for permanent use: systemd takes them, they are shut in, and a run flies so."""
 
 import re
 import shutil
@@ -11,9 +11,11 @@ import pytest
 
 from rtshcua.cli.app import main
 
-UNIT = Path(__file__).resolve().parents[2] / "examples" / "systemd" / "rtshcua@.service"
+UNITS = Path(__file__).resolve().parents[2] / "examples" / "systemd"
+UNIT = UNITS / "rtshcua@.service"
+SERVICES = ("rtshcua@quad-07.service", "rtshcua-boundary@quad-07.service")
 #: exposure in tenths, of 100, as `systemd-analyze security` counts it
-MOST = 15
+MOST = {"rtshcua@quad-07.service": 15, "rtshcua-boundary@quad-07.service": 6}
 ANALYZE = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze is installed")
 
 
@@ -22,29 +24,49 @@ def analyzed(*words: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture
-def instance(tmp_path: Path) -> Path:
-    """The unit for one vehicle; the program and the user that it names are here."""
-    text = UNIT.read_text(encoding="utf-8").replace("/opt/rtshcua/bin/rtshcua", sys.executable)
-    made = tmp_path / "rtshcua@quad-07.service"
-    made.write_text(re.sub("(?m)^(User|Group)=rtshcua$", r"\1=root", text), encoding="utf-8")
-    return made
+def instances(tmp_path: Path) -> Path:
+    """A folder with the units for one vehicle; the programs and users that they name are here."""
+    for unit in UNITS.iterdir():
+        text = re.sub("/opt/rtshcua/bin/rtshcua(-boundary)?", sys.executable, unit.read_text(encoding="utf-8"))
+        text = re.sub("(?m)^((?:Socket)?(?:User|Group))=rtshcua(-boundary)?$", r"\1=root", text)
+        for name in (unit.name, unit.name.replace("@", "@quad-07")):
+            (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
 
 
 @ANALYZE
-def test_systemd_takes_it(instance: Path) -> None:
-    checked = analyzed("verify", "--man=no", instance)
+def test_systemd_takes_them(instances: Path) -> None:
+    made = [instances / name for name in (*SERVICES, "rtshcua-boundary@quad-07.socket")]
+    checked = analyzed("verify", "--man=no", *made)
     assert (checked.returncode, checked.stderr) == (0, "")
-    instance.write_text(instance.read_text().replace("ProtectSystem=strict", "ProtectSystems=strict"))
-    assert "ProtectSystems" in analyzed("verify", "--man=no", instance).stderr
+    for each, right in zip(made, ("ProtectSystem=", "ProtectSystem=", "MaxConnections="), strict=True):
+        text = each.read_text()
+        each.write_text(text.replace(right, f"Wrong{right}"))
+        assert f"Wrong{right[:-1]}" in analyzed("verify", "--man=no", each).stderr
+        each.write_text(text)
 
 
 @ANALYZE
-def test_it_is_shut_in(instance: Path, tmp_path: Path) -> None:
-    own = tmp_path / "own" / instance.name
+@pytest.mark.parametrize("name", SERVICES)
+def test_it_is_shut_in(name: str, instances: Path, tmp_path: Path) -> None:
+    own = tmp_path / "own" / name
     own.parent.mkdir()
-    own.write_text(instance.read_text().replace("=root", "=daemon"))
-    checked = analyzed("security", "--offline=true", f"--threshold={MOST}", own)
+    own.write_text((instances / name).read_text().replace("=root", "=daemon"))
+    checked = analyzed("security", "--offline=true", f"--threshold={MOST[name]}", own)
     assert checked.returncode == 0, checked.stdout
+
+
+def test_who_may_connect_is_the_user_of_the_run() -> None:
+    """And the boundary has another user, whose folder is the one that its program is given."""
+    run, boundary, socket = (
+        dict(re.findall("(?m)^([A-Za-z]+)=(.*)$", (UNITS / name).read_text(encoding="utf-8")))
+        for name in ("rtshcua@.service", "rtshcua-boundary@.service", "rtshcua-boundary@.socket")
+    )
+    assert (socket["SocketUser"], socket["SocketMode"]) == (run["User"], "0600")
+    assert boundary["User"] not in (run["User"], "root")
+    assert boundary["ExecStart"].endswith(f" --folder /var/lib/{boundary['StateDirectory']}")
+    assert f"--boundary-socket {socket['ListenSequentialPacket']} " in run["ExecStart"]
+    assert run["Requires"] == "rtshcua-boundary@%i.socket"
 
 
 def test_its_command_is_one_that_run_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,183 @@
+"""`rtshcua run --boundary-socket`: by a boundary that somebody else starts, under a user of its own, with the keys."""
+
+import json
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.boundary_process import ListeningBoundary
+from rtshcua.cli.app import main
+from virtual.listening import Listening, listening
+
+#: so slow that a busy machine's hold-ups stay below what a permit lasts
+SPEED = 3
+
+
+class Aboard:
+    """A vehicle, and a boundary for it that has the keys; the run's key store has none."""
+
+    def __init__(self, ground: Any, made: Listening, port: int, *, signed: bool) -> None:
+        self.ground, self.made, self.port = ground, made, port
+        self.key = ground.folder / "link.key"
+        self.key.write_text("5a" * 32 + "\n")
+        self.key.chmod(0o600)
+        linked = ["--signing-key", str(self.key)] if signed else []
+        words = ["keys", "provision", str(made.folder), "--vehicle", "quad-07", *linked]
+        assert ground.start(*words).process.wait() == 0
+        made.give()
+        self.bundles = [ground.bundle(), ground.bundle(name="another")]
+        ground.vehicle(port, SPEED, *linked)
+        self.key.unlink()
+        for secret in ground.store.folder.glob("*.key"):
+            secret.unlink()
+
+    def run(self, bundle: int = 0, *words: str) -> Any:
+        where = ("--connect", f"udpin:127.0.0.1:{self.port}", "--vehicle", "quad-07", "--unsigned-radio")
+        socket = ("--boundary-socket", str(self.made.socket), "--utc-error", "1s")
+        return self.ground.run(self.bundles[bundle], *where, *socket, *words, speed=SPEED)
+
+    def verified(self, folder: Path) -> tuple[int, dict[str, Any]]:
+        done = self.ground.start("verify-log", "--audit", str(folder), "--json").end()
+        (said,) = done.events
+        return done.code, said
+
+    def runs(self) -> set[Path]:
+        return set((self.ground.folder / "runs").iterdir())
+
+
+@pytest.fixture
+def made() -> Iterator[Listening]:
+    """Its time is the run's: the vehicle is flown faster than life."""
+    with listening("--paced") as found:
+        yield found
+
+
+def test_a_flight_of_which_the_run_has_no_key(ground: Any, made: Listening, port: int) -> None:
+    aboard = Aboard(ground, made, port, signed=True)
+    run = aboard.run()
+    run.until("dispatched", step=0)
+    second = aboard.run(1).end()
+    assert (second.code, second.events[-1]["slug"]) == (5, "boundary-in-use")
+    assert run.end().code == 0, run.stderr
+    notes = [event["text"] for event in run.events if event["event"] == "note"]
+    assert any(str(made.socket) in text and "decides" in text for text in notes), notes
+    code, said = aboard.verified(run.folder)
+    assert code == 0, said
+    assert "boundary" in {claim["slug"] for claim in said["proven"]}
+    assert run.log()[0]["mode"] == "process"
+    made.await_gone(1)
+    again = aboard.run().end()
+    assert again.code == 5, "a bundle flies once"
+
+
+def test_a_runtime_that_is_killed(ground: Any, made: Listening, port: int) -> None:
+    """The boundary is gone at once, and the next run brings the vehicle down. The log that broke off stays open: its
+    key is not here.
+    """
+    aboard = Aboard(ground, made, port, signed=False)
+    first = aboard.run()
+    first.until("dispatched", step=1)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    made.await_gone(1)
+    (killed,) = aboard.runs()
+    second = aboard.run().end()
+    assert second.code == 6, second.stderr
+    (other,) = aboard.runs() - {killed}
+    records = [json.loads(line) for line in (other / "log.jsonl").read_text().splitlines()]
+    assert "resumed" in [record.get("event") for record in records]
+    assert records[0]["mode"] == "process"
+    assert any("`rtshcua recover` ends it" in event.get("text", "") for event in second.events)
+    assert aboard.verified(killed)[0] == 10
+    assert aboard.verified(other)[0] == 0
+
+
+def test_what_is_in_the_air_comes_down_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
+    """Nobody can verify that log, for the log's key is drawn; nothing new flies."""
+    aboard = Aboard(ground, made, port, signed=False)
+    first = aboard.run()
+    first.until("dispatched", step=1)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    made.await_gone(1)
+    made.close()
+    (killed,) = aboard.runs()
+    other = aboard.run(1).end()
+    assert (other.code, other.events[-1]["slug"]) == (5, "boundary-missing")
+    second = aboard.run().end()
+    assert second.code == 6, second.stderr
+    assert any("nobody can verify this log" in event.get("text", "") for event in second.events)
+    (log,) = aboard.runs() - {killed}
+    assert aboard.verified(log)[0] == 4
+
+
+def test_a_boundary_that_is_killed_in_flight(ground: Any, made: Listening, port: int) -> None:
+    """What it signed ahead brings the vehicle down, which enforces signing."""
+    aboard = Aboard(ground, made, port, signed=True)
+    run = aboard.run()
+    run.until("obeyed", step=1)
+    (boundary,) = made.boundaries()
+    os.kill(boundary, signal.SIGKILL)
+    assert run.end().code == 6, run.stderr
+    records = run.log()
+    (lost,) = [record for record in records if record.get("event") == "boundary-lost"]
+    after = [record for record in records[lost["seq"] :] if record.get("event") == "dispatched"]
+    assert after[-1]["detail"] in ("return_home", "emergency_land")
+    code, said = aboard.verified(run.folder)
+    assert (code, said["shortfall"]["slug"]) == (10, "boundary/lost")
+
+
+def test_the_doctor_looks_at_it_and_uses_nothing_up(ground: Any, made: Listening, port: int) -> None:
+    aboard = Aboard(ground, made, port, signed=False)
+    words = ("doctor", "--connect", f"udpin:127.0.0.1:{port}", "--seconds", "3", "--json", "--boundary-socket")
+    for place, verdict in ((made.socket, "ok"), (made.socket.with_name("none"), "stop")):
+        looked = aboard.ground.start(*words, str(place))
+        out = looked.process.stdout.read()
+        (found,) = [each for each in json.loads(out)["findings"] if each["slug"] == "boundary/process"]
+        assert found["verdict"] == verdict, found
+        looked.process.wait()
+    made.await_gone(1)
+    ListeningBoundary(made.socket).close()
+
+
+WRONG = [
+    (("--boundary-socket", "s"), "goes with `--connect`"),
+    (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", "--mode", "software"), "software"),
+    *(
+        (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", name, *value), f"`{name}` does")
+        for name, *value in (
+            ("--signing-key", "k"), ("--boundary-user", "nobody"), ("--log-key", "k"), ("--boundary-key", "k"),
+            ("--passphrase-file", "k"), ("--set", "GF_ACTION=2"), ("--dry-run",),
+        )
+    ),
+]  # fmt: skip
+
+
+def test_what_does_not_go_with_it(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, said in WRONG:
+        assert main(["run", "b.bundle", *words]) == 2, words
+        assert said in capsys.readouterr().err
+
+
+def test_provisioning_is_whole_or_nothing(ground: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "boundaries"
+    words = ["keys", "provision", str(folder), "--vehicle"]
+    for name in ("", ".", "..", "a/b", "/a", "a\n"):
+        assert main([*words, name]) == 2, name
+    assert main([*words, "quad-07", "--signing-key", str(tmp_path / "none")]) == 3
+    assert not folder.exists() or not list(folder.iterdir())
+    assert main([*words, "quad-07"]) == 0
+    own = folder / "quad-07"
+    assert {each.name for each in own.iterdir()} == {"root.trust", "root.pin", "log.seed", "boundary.seed"}
+    assert own.stat().st_mode & 0o777 == 0o700
+    assert {each.stat().st_mode & 0o777 for each in own.iterdir()} == {0o600}
+    said = capsys.readouterr().out
+    for name in ("log.seed", "boundary.seed"):
+        assert (own / name).read_text().strip() not in said
+    before = {each.name: each.read_bytes() for each in own.iterdir()}
+    assert main([*words, "quad-07"]) == 5
+    assert before == {each.name: each.read_bytes() for each in own.iterdir()}

@@ -39,6 +39,7 @@ def hostile(tmp_path: Path) -> Path:
 
 
 def test_the_action_imports_nothing_from_the_checkout(hostile: Path, tmp_path: Path) -> None:
+    (hostile / "tests/flights.rts").unlink()  # tests/integration/test_action.py flies it
     ended = runner(tmp_path)(hostile)
     assert not (tmp_path / "owned").exists(), (tmp_path / "owned").read_text()
     assert {*ended.outcomes.values()} == {"success"}, ended.printed
@@ -46,7 +47,7 @@ def test_the_action_imports_nothing_from_the_checkout(hostile: Path, tmp_path: P
 
 def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_path: Path, commands: Forked) -> None:
     (hostile / "tests/::warning::nobody said this.rts").write_text("test  x\n", encoding="utf-8")
-    (hostile / "tests/flights.rts").unlink()  # the test before flies it
+    (hostile / "tests/flights.rts").unlink()
     ended = runner(tmp_path, commands)(hostile, sarif="")
     stopped = None
     for line in ended.printed.splitlines():

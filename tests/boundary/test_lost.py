@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import pytest
@@ -16,10 +17,10 @@ from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
 from virtual import case
+from virtual.sampling import each_once
 
 FLAVOURS = ("px4", "ardupilot")
-KEYS = (KEY, None)
-NAMES = ("signed", "keyless")
+KEYS = {"signed": KEY, "keyless": None}
 #: what moves the vehicle is among these
 MOVING = (COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT)
 
@@ -77,10 +78,9 @@ def came_down(flown: Any) -> None:
     assert report.shortfall.slug == "boundary/lost"
 
 
-@pytest.mark.parametrize("key", KEYS, ids=NAMES)
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_ten_minutes_after_takeoff(flavour: str, key: bytes | None, apart: Make) -> None:
-    of = apart(flavour, key, legs=80, hover_us=40 * 60 * S)
+@pytest.mark.parametrize(("flavour", "key"), each_once(FLAVOURS, KEYS))
+def test_ten_minutes_after_takeoff(flavour: str, key: str, apart: Make) -> None:
+    of = apart(flavour, KEYS[key], legs=80, hover_us=40 * 60 * S)
     took_off: list[int] = []
 
     def dies(of: Apart) -> bool:
@@ -94,22 +94,21 @@ def test_ten_minutes_after_takeoff(flavour: str, key: bytes | None, apart: Make)
     step = links[0][1]
     assert step > 10
     assert links == [(FALLBACK_LINK, step, 0), (FALLBACK_LINK, step, 1)], "hover, and when its time is over, home"
-    assert (of.gate.counts.unverified > 100) == (key is not None)
+    assert (of.gate.counts.unverified > 100) == (key == "signed")
 
 
-@pytest.mark.parametrize("second", [12, 30, pytest.param(20, marks=pytest.mark.soak)])
-@pytest.mark.parametrize("key", KEYS, ids=NAMES)
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_whenever_it_is_lost_the_vehicle_comes_down(flavour: str, key: bytes | None, second: int, apart: Make) -> None:
-    came_down(apart(flavour, key).fly(at(second * S)))
+@pytest.mark.parametrize(("vehicle", "second"), each_once(product(FLAVOURS, KEYS), (12, 30, 20)))
+def test_whenever_it_is_lost_the_vehicle_comes_down(vehicle: tuple[str, str], second: int, apart: Make) -> None:
+    flavour, key = vehicle
+    came_down(apart(flavour, KEYS[key]).fly(at(second * S)))
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("second", range(3, 100, 2))
-@pytest.mark.parametrize("key", KEYS, ids=NAMES)
+@pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_at_each_moment(flavour: str, key: bytes | None, second: int, apart: Make) -> None:
-    of = apart(flavour, key)
+def test_at_each_moment(flavour: str, key: str, second: int, apart: Make) -> None:
+    of = apart(flavour, KEYS[key])
     flown = of.fly(at(second * S))
     assert not flown.vehicle.simulation.truth().in_air
     if flown.ending is not Ending.COMPLETED:

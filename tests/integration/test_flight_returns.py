@@ -12,6 +12,7 @@ from rtshcua.model.scenario import AfterStep
 from rtshcua.virtual.flown import Sample, ScenarioFlown
 from rtshcua.virtual.judge import judge, local_mm
 from virtual import case
+from virtual.sampling import each_once
 from virtual.scenarios import flown, scenario, when
 from virtual.shipped import sealed
 
@@ -87,12 +88,12 @@ def away(of: ScenarioFlown) -> Callable[[Sample], float]:
     return metres
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-@pytest.mark.parametrize(
-    "fault", [faults.BatteryLevel(0, 3_800), faults.PilotMode(0, Mode.RETURN)], ids=["degraded", "by-the-pilot"]
-)
-def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str, fault: Fault) -> None:
-    found = flown(scenario(when(AfterStep(2, 29 * case.S, 29 * case.S), fault)), flavour, bundle=bundle)
+WHY: dict[str, Fault] = {"degraded": faults.BatteryLevel(0, 3_800), "by the pilot": faults.PilotMode(0, Mode.RETURN)}
+
+
+@pytest.mark.parametrize(("why", "flavour"), each_once(WHY, ["px4", "ardupilot"]))
+def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str, why: str) -> None:
+    found = flown(scenario(when(AfterStep(2, 29 * case.S, 29 * case.S), WHY[why])), flavour, bundle=bundle)
     homeward = [each for each in found.samples if each.mode is Mode.RETURN and each.in_air]
     far = away(found)
     begun = homeward[0]

@@ -1,7 +1,6 @@
 """What ships flies on a stock copter: GPS, barometer and battery, and nothing else, booted as recorded."""
 
 from functools import cache
-from itertools import product
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from rtshcua.simulation.config import STOCK, Boot, Kind
 from rtshcua.virtual.fitting import fitting
 from virtual import case
 from virtual.flight import Flight, Flown
+from virtual.sampling import each_once
 from virtual.shipped import NAMES, shipped
 
 STARTER = Path(__file__).resolve().parents[2] / "examples/starter/missions/first_look.rts"
@@ -49,17 +49,7 @@ def flown(name: str, flavour: str) -> tuple[Flown, set[str]]:
     return flew, {kind.name for kind in kinds if kind is not None}
 
 
-#: the long ones fly on one autopilot each in `make test`, on both in soak
-LONG = {("extended", "px4"), ("one_bridge", "ardupilot"), ("standard", "ardupilot")}
-
-
-@pytest.mark.parametrize(
-    ("name", "flavour"),
-    [
-        pytest.param(*each, marks=[pytest.mark.soak] if each in LONG else [])
-        for each in product(("starter", *NAMES), FLAVOURS)
-    ],
-)
+@pytest.mark.parametrize(("name", "flavour"), each_once(("starter", *NAMES), FLAVOURS))
 def test_what_ships_flies_on_a_stock_copter(name: str, flavour: str) -> None:
     flight, said = flown(name, flavour)
     assert flight.ending is Ending.COMPLETED, flight.decisions()

@@ -72,7 +72,9 @@ def open_permit(data: bytes, key: bytes) -> Permit | None:
     return Permit(*fields)
 
 
+@lru_cache(maxsize=4)
 def _mac(key: bytes, body: bytes) -> bytes:
+    """Remembered, for a permit is opened right after it was sealed."""
     inner, outer = _begun(key)
     inner, outer = inner.copy(), outer.copy()
     inner.update(body)

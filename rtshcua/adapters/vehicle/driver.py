@@ -93,6 +93,7 @@ class Driver:
         self._texts = StatusTexts()
         self._announcer = Announcer()
         self.link = VehicleLink(frames, verifier, system)
+        self._gate_may_be_lost = frames.may_be_lost
         self.source = SourceTime()
         #: what it was last seen to do
         self.seen = ObservedVehicle()
@@ -127,7 +128,7 @@ class Driver:
         self._timed = False  # and the times of what it says are known, or not waited for any more
         self._crash = CrashWatch()
         self._spoken: set[str] = set()
-        self._beat_us: int | None = None
+        self._beats_us = 0  # when our next heartbeat is due
         self._was_ready = False
         self._released = False
         self._was_air: tuple[bool, bool] | None = None
@@ -199,25 +200,12 @@ class Driver:
         """What is due at a time: heartbeat, requests for streams, retries, a link that went down."""
         if self.flavour is None:
             return [], []
-        send: list[Message] = []
         events: list[Event] = []
-        if self._beat_us is None or now_us - self._beat_us >= HEARTBEAT_US:
-            self._beat_us = now_us
-            send.append(messages.heartbeat())
         seen = self.seen
         aged = seen.pass_time(now_us)
-        self._watch.strict = self._watch.strict or seen.airborne  # what is sent to it there has to arrive
-        if now_us >= self.source.clock.due_us:
-            send += self._ask_time(now_us)
-        if self.asks_utc and now_us - self._asked_utc_us >= EACH_US:
-            self._asked_utc_us = now_us
-            send.append(messages.request(self.system, "SYSTEM_TIME"))
-        if now_us >= self.stream_requests.due_us:
-            send += self.stream_requests.due(self.system, now_us)
-        if self.asks is not None and seen.down:
-            send += self.asks.due(self.system, now_us)
-        if not self._was_ready and seen.down and not self.prepares:
-            send += self.preflight.due(self.system, now_us)
+        if not self._watch.strict:
+            self._watch.strict = seen.airborne  # what is sent to it there has to arrive
+        send = self._questions(now_us)
         if self._texts.parts:
             self._hear(self._texts.due(now_us), events)
         self._look(now_us, events)
@@ -228,7 +216,8 @@ class Driver:
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
-        self._renew_ahead(now_us, events, begins=False)
+        if self._gate_may_be_lost:
+            self._renew_ahead(now_us, events, begins=False)
         if seen.notes or self.stream_requests.notes or self.preflight.notes:
             self._tell_notes(now_us, events)
         if self._announcer.waiting:
@@ -237,6 +226,25 @@ class Driver:
         if self.settings.outstanding:
             frames += self._set_parameters(now_us)
         return events, frames
+
+    def _questions(self, now_us: int) -> list[Message]:
+        """The heartbeat and the questions that are due, whatever flies."""
+        send: list[Message] = []
+        if now_us >= self._beats_us:
+            self._beats_us = now_us + HEARTBEAT_US
+            send.append(messages.heartbeat())
+        if now_us >= self.source.clock.due_us:
+            send += self._ask_time(now_us)
+        if self.asks_utc and now_us - self._asked_utc_us >= EACH_US:
+            self._asked_utc_us = now_us
+            send.append(messages.request(self.system, "SYSTEM_TIME"))
+        if now_us >= self.stream_requests.due_us:
+            send += self.stream_requests.due(self.system, now_us)
+        if self.asks is not None and self.seen.down:
+            send += self.asks.due(self.system, now_us)
+        if not self._was_ready and self.seen.down and not self.prepares:
+            send += self.preflight.due(self.system, now_us)
+        return send
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
         """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard.
@@ -259,7 +267,8 @@ class Driver:
         self._unsent = command.token
         events: list[Event] = []
         send: list[Message] = []
-        self._renew_ahead(now_us, events, begins=True)  # what brings it down is there before it sets off
+        if self._gate_may_be_lost:
+            self._renew_ahead(now_us, events, begins=True)  # what brings it down is there before it sets off
         self._advance(now_us, send, events)
         return events, self._pack(send, now_us, events)
 
@@ -412,7 +421,7 @@ class Driver:
         """
         watch = self._watch
         was = watch.down
-        if self.link.is_mute:
+        if self._gate_may_be_lost and self.link.is_mute:
             watch.unasked()
         changed = watch.look(now_us)
         self.seen.up_us = watch.up_us

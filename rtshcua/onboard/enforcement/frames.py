@@ -84,6 +84,11 @@ class Signer(Protocol):
 class Gate(Protocol):
     """What an adapter gets of a `FrameSession`: it may ask, and tell what it heard. It opens nothing."""
 
+    @property
+    def may_be_lost(self) -> bool:
+        """Whether it may stop answering in a flight: only then is it ever mute, or signs anything ahead."""
+        ...
+
     def observe(self, frame: bytes, now_us: int = 0) -> None:
         """Take in one good frame from the link, at a monotonic time; without one, it is too old for what has to be
         recent.
@@ -121,7 +126,7 @@ class FrameSession:
     """The gate that frames leave by. Opened and closed by the executor alone."""
 
     #: this gate is there as long as who sends by it
-    is_mute = False
+    may_be_lost = is_mute = False
 
     def __init__(self) -> None:
         #: where what leaves is chained
@@ -209,7 +214,7 @@ class FrameSession:
         return sealed
 
     def renew_ahead(self, encode: Callable[[Command], Sequence[bytes]], now_us: int, *, begins: bool) -> Sequence[str]:
-        """Nothing: see `is_mute`."""
+        """Nothing: see `may_be_lost`."""
         return ()
 
     def sign_ahead(self, frame: bytes, command: Command, now_us: int) -> bytes | Refusal:

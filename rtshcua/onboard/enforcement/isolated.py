@@ -195,6 +195,8 @@ class IsolatedGate:
     verified then: what looks as the vehicle's frames looked is taken in all the same, so that the way down is seen.
     """
 
+    may_be_lost = True
+
     def __init__(self, caller: Caller, commands: Commands) -> None:
         self._caller = caller
         #: what leaves when it is lost

@@ -1,11 +1,14 @@
 """One direction of the link: what is sent arrives later, in another order, or not at all."""
 
-from heapq import heappop, heappush
-from itertools import count
+from bisect import insort
+from collections.abc import Iterable, Sequence
+from operator import itemgetter
 from random import Random
 
 OVERTAKEN_US = 60_000
 """How much later than the rest a datagram comes that others overtake."""
+
+_arrival = itemgetter(0)
 
 
 class Link:
@@ -24,22 +27,30 @@ class Link:
         self.held = False
         """Whether everything waits: it comes in one burst, later."""
         self._chance = chance
-        self._order = count()
         self._free_us = 0
-        self.under_way: list[tuple[int, int, bytes]] = []
-        """What was sent and has not arrived, a heap: when it does, its place in the order of sending, the datagram."""
+        self.under_way: list[tuple[int, Sequence[bytes]]] = []
+        """What was sent and has not arrived, in the order of arriving: when it does, and datagrams that come then."""
         self._waiting: list[bytes] = []
 
-    def send(self, datagram: bytes, now_us: int) -> None:
-        """Puts a datagram on its way."""
-        if self.silent or (self.loss and self._happens(self.loss)):
+    def send(self, datagrams: Sequence[bytes], now_us: int) -> None:
+        """Puts datagrams on their way, in this order."""
+        if self.silent:
             return
-        if self.held:
-            self._waiting.append(datagram)
-        else:
-            self._launch(datagram, now_us)
+        for some in self._apart(datagrams):
+            if self.loss and self._happens(self.loss):
+                continue
+            if self.held:
+                self._waiting += some
+            else:
+                self._launch(some, now_us)
 
-    def _launch(self, datagram: bytes, now_us: int) -> None:
+    def _apart(self, datagrams: Sequence[bytes]) -> Iterable[Sequence[bytes]]:
+        """Those that share their lot: all, unless chance decides about each."""
+        if not datagrams or self.loss or self.jitter_us or self.reordered:
+            return [(datagram,) for datagram in datagrams]
+        return (datagrams,)
+
+    def _launch(self, datagrams: Sequence[bytes], now_us: int) -> None:
         at_us = now_us + self.delay_us
         if self.jitter_us:
             at_us += self._chance.randrange(self.jitter_us + 1)
@@ -49,7 +60,7 @@ class Link:
             at_us += OVERTAKEN_US
         else:
             self._free_us = at_us
-        heappush(self.under_way, (at_us, next(self._order), datagram))
+        insort(self.under_way, (at_us, datagrams), key=_arrival)  # behind those that arrive at the same time
 
     def release(self, now_us: int, shuffle: Random | None = None) -> None:
         """Sends what waited, in another order if it is to be shuffled."""
@@ -57,15 +68,15 @@ class Link:
         waited, self._waiting = self._waiting, []
         if shuffle is not None:
             shuffle.shuffle(waited)
-        for datagram in waited:
-            self._launch(datagram, now_us)
+        for some in self._apart(waited):
+            self._launch(some, now_us)
 
     def due(self, now_us: int) -> list[bytes]:
         """What has arrived by now."""
         arrived: list[bytes] = []
         under_way = self.under_way
         while under_way and under_way[0][0] <= now_us:
-            arrived.append(heappop(under_way)[2])
+            arrived += under_way.pop(0)[1]
         return arrived
 
     def _happens(self, part: int) -> bool:

@@ -105,12 +105,11 @@ class Simulation:
             if not self._halted:
                 autopilot.tick()
                 if autopilot.outbox or autopilot.now_us >= autopilot.streams.next_us:
-                    for frame in face.due():
-                        down.send(frame, at_us)
+                    down.send(face.due(), at_us)
             if autopilot.taker is not None and self._taken_over_us is None:
                 self._taken_over_us = at_us
             if at_us >= face.radio_due_us:
-                down.send(face.radio(at_us), at_us)
+                down.send((face.radio(at_us),), at_us)
             at_us += TICK_US
         now_us = self._now_us
         if to_us > now_us:
@@ -125,7 +124,7 @@ class Simulation:
         On a link without delay the vehicle has obeyed when this returns, and its answers are among the datagrams.
         """
         before = self.advance(at_us)
-        self._up.send(data, self._now_us)
+        self._up.send((data,), self._now_us)
         self._deliver(self._now_us)
         if self._inbox is not None:
             self._obey(self._inbox, self._now_us)
@@ -196,8 +195,7 @@ class Simulation:
 
     def _answer(self, received: Received, now_us: int) -> None:
         self._autopilot.since_us = now_us - self._ticked_us
-        for frame in self._face.obey(received):
-            self._down.send(frame, now_us)
+        self._down.send(self._face.obey(received), now_us)
 
     def _happen(self, now_us: int) -> None:
         while self._events and self._events[0][0] <= now_us:

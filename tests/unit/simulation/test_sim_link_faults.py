@@ -188,7 +188,7 @@ def test_a_link_delivers_all_in_time_and_the_same_for_the_same_seed(
         for number, gap in enumerate(gaps):
             now_us += gap
             came += [(now_us, datagram) for datagram in link.due(now_us)]
-            link.send(number.to_bytes(1, "big"), now_us)
+            link.send([number.to_bytes(1, "big")], now_us)
         last_us = now_us + delay_us + jitter_us + OVERTAKEN_US
         return came + [(last_us, datagram) for datagram in link.due(last_us)]
 

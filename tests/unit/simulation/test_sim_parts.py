@@ -124,9 +124,9 @@ def test_energy_never_rises(level: float, parts: list[tuple[float, float, float]
 def test_link_keeps_the_order_when_the_delay_shrinks() -> None:
     link = Link(Random(1))
     link.delay_us = 1_000
-    link.send(b"first", 0)
+    link.send([b"first"], 0)
     link.delay_us = 0
-    link.send(b"second", 10)
+    link.send([b"second"], 10)
     assert link.due(999) == []
     assert link.due(1_000) == [b"first", b"second"]
 

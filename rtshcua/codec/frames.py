@@ -54,6 +54,9 @@ class Kind(NamedTuple):
     """The payload of a message, zeros at its end included; None where it holds texts."""
 
 
+_UNKNOWN = Kind("", b"", Struct(""), tuple, b"", None)
+"""Of messages that the dialect does not have."""
+
 _met: dict[bytes, Kind] = {}  # the kinds of messages that came, by number: at most as many as the dialect has
 
 
@@ -189,8 +192,8 @@ class Codec:
         """The message's frame, with the next sequence number."""
         sender = self._sender
         kind = kind_of(type(message).id)  # of the class: some messages have a field of this name
-        payload_of = None if kind is None else kind.payload
-        if kind is None or payload_of is None:
+        _, extra, _, _, number, payload_of = kind or _UNKNOWN
+        if payload_of is None:
             frame: bytes = message.pack(sender)
         else:
             # What pymavlink does, in a third of the time. Zeros at the end of a payload are not sent, but for the
@@ -198,9 +201,9 @@ class Codec:
             payload = payload_of(message)
             if not payload[-1]:
                 payload = payload.rstrip(b"\0") or b"\0"
-            head = _HEAD(len(payload), 0, 0, sender.seq, sender.srcSystem, sender.srcComponent, kind.number)
+            head = _HEAD(len(payload), 0, 0, sender.seq, sender.srcSystem, sender.srcComponent, number)
             covered = head + payload
-            frame = b"\xfd" + covered + octets_of_checksum(covered + kind.extra)
+            frame = b"\xfd" + covered + octets_of_checksum(covered + extra)
         sender.seq = (sender.seq + 1) % 256
         return frame
 

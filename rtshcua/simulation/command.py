@@ -1,14 +1,13 @@
 """COMMAND_LONG and COMMAND_INT, brought to one form."""
 
-from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 from rtshcua.codec.frames import Message, Received
 from rtshcua.mavlink.enums import NO_PLACE
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(NamedTuple):
     """A command: parameters 1 to 4, the place in 1e-7 degree (None if not given), the altitude in metres (or NaN)."""
 
     number: int

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Codec, Message, Received
+from rtshcua.codec.frames import Codec, Message, Received, maker
 from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import from_message
@@ -23,6 +23,8 @@ FENCE_PREFIXES = ("FENCE_", "GF_")
 """How the names of the parameters begin that make the fence another one."""
 _RADIO_INTERVAL_US = 1_000_000
 _NEVER = 1 << 62
+
+_COMMAND_ACK = maker(mavlink.MAVLink_command_ack_message)
 
 
 class Face:
@@ -68,11 +70,12 @@ class Face:
         autopilot = self._autopilot
         if autopilot.off_us:
             return []
+        builders, outbox = autopilot.reports.builders, autopilot.outbox
         for number in autopilot.streams.due(autopilot.now_us):
-            message = autopilot.reports.message(number)
+            message = builders[number]()
             if message is not None:
-                autopilot.outbox.append(message)
-        return self._collect() if autopilot.outbox else []
+                outbox.append(message)
+        return self._collect() if outbox else []
 
     def radio(self, now_us: int) -> bytes:
         """The frame that the radio sends now, from `radio_due_us` on."""
@@ -114,7 +117,7 @@ def _set_mode(a: Autopilot, received: Received) -> None:
 
 def _acknowledge(a: Autopilot, received: Received, command: int, results: tuple[int, ...]) -> None:
     for result in results:
-        a.send(mavlink.MAVLink_command_ack_message(command, result, 0, 0, received.system, received.component))
+        a.send(_COMMAND_ACK(command, result, 0, 0, received.system, received.component))
 
 
 def _position_target(a: Autopilot, received: Received) -> None:

@@ -7,12 +7,14 @@ from math import hypot, isfinite
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Message
+from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import Mode
 from rtshcua.simulation import plans
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plans import AMSL_FRAMES, FENCE, MISSION, Item, Plans
 from rtshcua.simulation.vehicle import Landed, Vehicle
+
+_MISSION_CURRENT = maker(mavlink.MAVLink_mission_current_message)
 
 _ARRIVED_UP_M = 1.0
 _IN_MISSION, _SUSPENDED = 1, 2
@@ -133,7 +135,7 @@ class Mission:
         first = self._rules.first
         mode = (_IN_MISSION if self._vehicle.mode is Mode.MISSION else _SUSPENDED) if first else 0
         total = max(0, len(self.items) - first)
-        return mavlink.MAVLink_mission_current_message(self.current, total, self.state, mode)
+        return _MISSION_CURRENT(self.current, total, self.state, mode)
 
     def tell_current(self) -> None:
         """Says which item begins, if it is one that takes time and the flavour says so."""

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Mapping
 from copy import copy
+from functools import partial
 from random import Random
 
 from rtshcua.codec.frames import Message
@@ -75,12 +76,17 @@ class Reports:
         self._old: dict[int, Message | None] | None = None
         self._delay_us = 0
         self._made: dict[int, deque[tuple[int, Message | None]]] = {}
+        self.builders = self._build
+        """What builds each message as it is told now; what it gives is None if there is nothing to tell."""
 
     def __contains__(self, number: int) -> bool:
         return number in self._build
 
     def message(self, number: int) -> Message | None:
         """The message of this number with what is known now; None if there is nothing to tell."""
+        return self.builders[number]()
+
+    def _faulty(self, number: int) -> Message | None:
         if number in self._silent:
             return None
         if self._old is not None and number in self._old:
@@ -98,6 +104,7 @@ class Reports:
     def silence(self, number: int, silent: bool) -> None:
         """From now on this message does not come, or comes again."""
         (self._silent.add if silent else self._silent.discard)(number)
+        self._choose()
 
     def stick(self, number: int, stuck: bool) -> None:
         """From now on this message keeps its values, with new time stamps; or tells what is again."""
@@ -105,20 +112,28 @@ class Reports:
             self._stuck[number] = self._build[number]() if number in self._build else None
         else:
             self._stuck.pop(number, None)
+        self._choose()
 
     def freeze(self, frozen: bool) -> None:
         """From now on all measurements are those of now, time stamps included; or fresh ones again."""
         self._old = self._measured() if frozen else None
+        self._choose()
 
     def delay(self, delay_us: int) -> None:
         """From now on all measurements are as old as this when they are sent, and say so; or fresh ones again, at 0."""
         self._delay_us = delay_us
         now_us = self._clock()
         self._made = {number: deque([(now_us, m)]) for number, m in self._measured().items()} if delay_us else {}
+        self._choose()
 
     def restart(self) -> None:
         """The clock begins anew: what was made before is not known any more."""
         self.delay(self._delay_us)
+
+    def _choose(self) -> None:
+        """A fault has begun or ended: as long as there is none, messages are built without asking for one."""
+        faults = self._silent or self._stuck or self._old is not None or self._delay_us
+        self.builders = {number: partial(self._faulty, number) for number in self._build} if faults else self._build
 
     def _measured(self) -> dict[int, Message | None]:
         now = {number: build() for number, build in self._build.items()}

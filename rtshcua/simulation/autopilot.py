@@ -229,9 +229,9 @@ class Autopilot:
             self._fail_over,
         )  # fmt: skip
         self.streams = Streams(flavour.streams, self._phases)
-        self.fence = FenceWatch(flavour.fence, self.plans, self.home, self.parameters.value)
+        self.fence = FenceWatch(flavour.fence, self.plans, self.home, self.parameters.value, self._where, self._time)
         self.mission = Mission(
-            flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self.send, self.say
+            flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self._where, self.send, self.say
         )
         self.transfer = Transfer(flavour.transfer, self.plans, self.send, self._stored, self._may_clear)
         self.plans.listeners.append(partial(flavour.on_plan, self))
@@ -262,8 +262,8 @@ class Autopilot:
         if self.surroundings.pillars and vehicle.in_air and self.surroundings.is_hit(vehicle.body):
             vehicle.crash()
         self.failsafes.step(_TICK_S)
-        if self.flavour.target_timeout_us is not None:
-            self._keep_targets(self.flavour.target_timeout_us)
+        if vehicle.mode is _GUIDED:
+            self._keep_targets()
         self._follow_plans()
         if self._boot_texts:
             self._tell_of_boot()
@@ -337,14 +337,20 @@ class Autopilot:
 
     def _follow_plans(self) -> None:
         """The mission, the fence and the transfers go on."""
-        vehicle, fence, now_us, where = self.vehicle, self.fence, self.now_us, self._where
+        fence, now_us = self.fence, self.now_us
         self.transfer.step(now_us)
-        self.mission.step(now_us, where)
+        self.mission.step(now_us)
+        self.vehicle.return_under = fence.return_under
+        if now_us >= fence.due_us or fence.breach is not None or self.delayed is not None:
+            self._keep_to_fence()
+
+    def _keep_to_fence(self) -> None:
+        """What a breach brings, and another mode in one."""
+        vehicle, fence = self.vehicle, self.fence
         breached, mode = fence.breach is not None, vehicle.mode
         if breached and mode is not self._mode_in_breach:
             self.flavour.on_mode_in_breach(self)
-        vehicle.return_under = fence.return_under
-        began = fence.step(now_us, where, vehicle)
+        began = fence.step(self.now_us, vehicle)
         if began is not None:
             self.take_over(Taker.FAILSAFE, partial(self.flavour.on_breach, self, began))
         elif breached and fence.breach is None:
@@ -373,10 +379,10 @@ class Autopilot:
     def _may_clear(self, kind: int) -> bool:
         return kind != MISSION or self._home_item is None or not self.mission.running
 
-    def _keep_targets(self, timeout_us: int) -> None:
-        """Leaves GUIDED when position targets stop coming."""
-        vehicle, last = self.vehicle, self.last_target_us
-        if vehicle.mode is not _GUIDED or not vehicle.in_air or not vehicle.armed:
+    def _keep_targets(self) -> None:
+        """Leaves GUIDED when position targets stop coming, where the flavour does."""
+        vehicle, last, timeout_us = self.vehicle, self.last_target_us, self.flavour.target_timeout_us
+        if timeout_us is None or not vehicle.in_air or not vehicle.armed:
             return
         if last is None or self.now_us - last > timeout_us:
             self._fail_over(Mode.LOITER)

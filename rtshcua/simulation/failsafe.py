@@ -79,7 +79,6 @@ class Failsafes:
             return
         if not self._lands_blind and self._sensors.has_position:
             self._without_s = 0.0
-            self._back_s += dt
         else:
             self._watch_position(dt)
         if battery.level <= LOW_TO_LAND and vehicle.mode is not Mode.LAND:

@@ -158,20 +158,28 @@ class FenceRules:
 
 
 class FenceWatch:
-    """The fence of one vehicle. `value` gives a parameter's value by its name."""
+    """The fence of one vehicle.
 
-    def __init__(self, rules: FenceRules, plans: Plans, home: Home, value: Callable[[str], float]) -> None:
+    `value` gives a parameter's value by its name, `where` tells where the vehicle believes to be, `clock` the
+    microseconds since the start.
+    """
+
+    def __init__(
+        self, rules: FenceRules, plans: Plans, home: Home, value: Callable[[str], float], where: Callable[[], Point],
+        clock: Callable[[], int],
+    ) -> None:  # fmt: skip
         self._rules = rules
         self._plans = plans
         self._home = home
         self._value = value
+        self._where = where
+        self._clock = clock
         self._area = Area()
         self._limits: FenceLimits | None = None
         self.return_under = inf
         """The height above home under which a return stays, for the fence's sake."""
-        self._changed_us = 0
-        self._checked_us = -CHECK_US
-        self._now_us = 0
+        self.due_us = LOADED_US
+        """When it is looked at next."""
         self._stale = True
         self.breach: Breach | None = None
         """What is violated now, while armed and in the air."""
@@ -188,7 +196,7 @@ class FenceWatch:
         """A parameter was set; the fence is another one a moment later."""
         self._limits, self.return_under = None, inf
         self._stale = True
-        self._changed_us = self._now_us
+        self.due_us = self._clock() + LOADED_US
 
     @property
     def in_force(self) -> bool:
@@ -205,19 +213,16 @@ class FenceWatch:
         limits = self._limits
         return limits is None or (limits.floor <= point.up and limits.holds(point))
 
-    def step(self, now_us: int, where: Callable[[], Point], vehicle: Vehicle) -> Breach | None:
-        """Lets time pass; the breach that began now, if one did. `where` tells where the vehicle believes to be."""
-        self._now_us = now_us
-        if now_us - self._checked_us < CHECK_US and not self._stale:
+    def step(self, now_us: int, vehicle: Vehicle) -> Breach | None:
+        """Lets time pass; the breach that began now, if one did."""
+        if now_us < self.due_us:
             return None
         if self._stale:
-            if now_us - self._changed_us < LOADED_US:
-                return None
             self._stale, self._limits = False, self._rules.limits(self._value, self._area)
             self.return_under = inf if self._limits is None else self._limits.return_under
-        self._checked_us = now_us
+        self.due_us = now_us + CHECK_US
         limits = self._limits
-        point = where() if limits is not None and vehicle.armed and vehicle.in_air else None
+        point = self._where() if limits is not None and vehicle.armed and vehicle.in_air else None
         if limits is None or point is None or limits.holds(point):
             self.breach = None
             return None

@@ -61,7 +61,7 @@ class MissionRules:
 
 
 class Mission:
-    """The mission of one vehicle, and how far it is."""
+    """The mission of one vehicle, and how far it is. `where` tells where the vehicle believes to be."""
 
     def __init__(
         self,
@@ -70,6 +70,7 @@ class Mission:
         vehicle: Vehicle,
         home: Home,
         allows: Callable[[Point], bool],
+        where: Callable[[], Point],
         send: Callable[[Message], None],
         say: Callable[[int, str], None],
     ) -> None:
@@ -78,6 +79,7 @@ class Mission:
         self._vehicle = vehicle
         self._home = home
         self._allows = allows
+        self._where = where
         self._send = send
         self._say = say
         self._judge_at_us: int | None = None
@@ -173,8 +175,8 @@ class Mission:
 
     # ------------------------------------------------------------------------------------------------- in time
 
-    def step(self, now_us: int, where: Callable[[], Point]) -> None:
-        """Goes on with the mission if the mode is MISSION; `where` tells where the vehicle believes to be."""
+    def step(self, now_us: int) -> None:
+        """Goes on with the mission if the mode is MISSION."""
         self._now_us = now_us
         if self._judge_at_us is not None and now_us >= self._judge_at_us:
             self._judge()
@@ -199,7 +201,7 @@ class Mission:
         if self.state is not MissionState.ACTIVE:
             self.state = MissionState.ACTIVE
             self._send(self.message())
-        here = where()
+        here = self._where()
         for _ in range(len(self.items)):
             if not self._step_item(self.items[self.current], here):
                 return

@@ -30,7 +30,8 @@ def towards(body: Body, north: float, east: float, speed: float, approach: Appro
         return 0.0, 0.0
     # Where it will be by the time that it has turned over, so that it does not slow down too late.
     closing = (north * body.v_north + east * body.v_east) / distance if distance > _NEAR_M else 0.0
-    stops = approach.speed(max(distance - closing * LEAD_S, 0.0))
+    left = distance - closing * LEAD_S
+    stops = approach.speed(left) if left > 0 else 0.0
     if stops < speed:
         speed = stops
     return north / distance * speed, east / distance * speed
@@ -117,7 +118,9 @@ def steepest(body: Body, north: float, east: float, up: float) -> float:
     if away < _LEVEL_M:
         return inf
     closing = (north * body.v_north + east * body.v_east) / away
-    return max(closing, _NEAR_M) * abs(up - body.up) / away
+    if closing < _NEAR_M:
+        closing = _NEAR_M
+    return closing * abs(up - body.up) / away
 
 
 def landing_rate(body: Body, handling: Handling) -> float:

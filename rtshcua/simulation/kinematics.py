@@ -93,8 +93,9 @@ class Body:
 
         `climb` is the wanted speed upwards, reached by at most `climb_most`; `wind` is the velocity of the air.
         """
-        ask_north = (want[0] - self.v_north) * _FOLLOW
-        ask_east = (want[1] - self.v_east) * _FOLLOW
+        want_north, want_east = want
+        ask_north = (want_north - self.v_north) * _FOLLOW
+        ask_east = (want_east - self.v_east) * _FOLLOW
         much = hypot(ask_north, ask_east)
         if much > most:
             ask_north *= most / much
@@ -136,7 +137,8 @@ class Body:
         self._roll = roll + copysign(min(TUMBLE_RATE * dt, max(0.0, TIPPED - abs(roll))), roll)
         v_up = self.v_up
         self.a_up = a_up = max(-GRAVITY, (-MAX_FALL - v_up) / dt)
-        self._move(dt, 0.0, 0.0)
+        self.north += self.v_north * dt
+        self.east += self.v_east * dt
         self.up += (v_up + a_up * dt / 2) * dt
         self.v_up = v_up + a_up * dt
 
@@ -173,26 +175,24 @@ class Body:
             change_east *= jerk / change
         self.lean_north = lean_north = lean_north + change_north
         self.lean_east = lean_east = lean_east + change_east
-        air_north, air_east = wind[0] - self.v_north, wind[1] - self.v_east
+        v_north, v_east = self.v_north, self.v_east
+        air_north, air_east = wind[0] - v_north, wind[1] - v_east
         drag = _ROTOR_DRAG + _BODY_DRAG * hypot(air_north, air_east)
         drag_north, drag_east = drag * air_north, drag * air_east
         learn = dt / _LEARN_S
         self._trim_north += (-drag_north - self._trim_north) * learn
         self._trim_east += (-drag_east - self._trim_east) * learn
-        self._move(dt, (lean_north + drag_north) * dt, (lean_east + drag_east) * dt)
+        d_north, d_east = (lean_north + drag_north) * dt, (lean_east + drag_east) * dt
+        # The mean of old and new velocity: exact while the acceleration is constant.
+        self.north += (v_north + d_north / 2) * dt
+        self.east += (v_east + d_east / 2) * dt
+        self.v_north, self.v_east = v_north + d_north, v_east + d_east
         self._leans_at = self.yaw
         a_up, v_up = self.a_up, self.v_up
         change = within((climb - v_up) * 2 * _FOLLOW, climb_most) - a_up
         self.a_up = a_up = a_up + within(change, _CLIMB_JERK * dt)
         self.up += (v_up + a_up * dt / 2) * dt
         self.v_up = v_up + a_up * dt
-
-    def _move(self, dt: float, d_north: float, d_east: float) -> None:
-        # The mean of old and new velocity: exact while the acceleration is constant.
-        v_north, v_east = self.v_north, self.v_east
-        self.north += (v_north + d_north / 2) * dt
-        self.east += (v_east + d_east / 2) * dt
-        self.v_north, self.v_east = v_north + d_north, v_east + d_east
 
 
 def within(value: float, most: float) -> float:

@@ -45,7 +45,7 @@ class BootPlan:
         """How long all of it takes."""
         return max(
             self.answers_s, self.standby_s, self.initialised_s, self.attitude_s, self.receiver_s, self.origin_s,
-            self.checks_s, self.position_s,
+            self.checks_s, self.position_s, *(at_s for at_s, _, _ in self.texts),
         )  # fmt: skip
 
 
@@ -96,15 +96,15 @@ class Sensors:
         self._plan = plan
         self._pace = pace
         self.age_s = 0.0
-        """Seconds since the start, as the plan counts them."""
+        """Seconds since the start, as the plan counts them, until all is up."""
         self.lost = False
         """Whether the receiver has lost its fix; when it has found it again the estimate is right again."""
         self._come_up()
 
     def step(self, dt: float) -> None:
         """Lets `dt` seconds pass."""
-        self.age_s += dt * self._pace
         if not self._is_up:
+            self.age_s += dt * self._pace
             self._come_up()
         if self.lost or self.glitch != (0.0, 0.0):
             self._without_fix_s += dt

@@ -138,10 +138,12 @@ class Vehicle:
     @property
     def speed(self) -> float:
         """The ground speed that it flies to a target with."""
-        handling = self.handling
+        handling, speed = self.handling, self._speed
         if self.mode is _RETURN and handling.return_speed > 0:
-            return min(handling.return_speed, handling.max_speed)
-        return min(handling.cruise if self._speed is None else self._speed, handling.max_speed)
+            speed = handling.return_speed
+        elif speed is None:
+            speed = handling.cruise
+        return within(speed, handling.max_speed)
 
     @speed.setter
     def speed(self, value: float) -> None:
@@ -392,9 +394,10 @@ class Vehicle:
 
     def _fly(self, dt: float, wind: tuple[float, float], error: tuple[float, float], sees: bool) -> None:
         body, agility = self.body, self.handling.agility
-        self._waiting_s -= dt
-        if self._activity not in _STEADY:
-            self._advance(error)
+        if self._activity is not _TRACK:
+            self._waiting_s -= dt
+            if self._activity not in _STEADY:
+                self._advance(error)
         activity, target, past = self._activity, self.target, self._past
         most = agility.takeoff_acceleration if activity is _CLIMB else agility.climb_acceleration
         north, east = target.north - error[0], target.east - error[1]

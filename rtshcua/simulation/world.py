@@ -89,14 +89,15 @@ class Simulation:
     def advance(self, to_us: int) -> list[bytes]:
         """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
         autopilot, face, up, down, inbox = self._autopilot, self._face, self._up, self._down, self._inbox
+        surroundings, events = autopilot.surroundings, self._events
         at_us = self._ticked_us + TICK_US
         while at_us <= to_us:
             if inbox is not None and inbox.next_us is not None:
                 self._obey(inbox, at_us - 1)
             self._ticked_us = at_us
-            if autopilot.surroundings.moving:
-                autopilot.surroundings.step(TICK_US / 1_000_000)
-            if self._events:
+            if surroundings.moving:
+                surroundings.step(TICK_US / 1_000_000)
+            if events:
                 self._happen(at_us)
             if up.under_way:
                 self._deliver(at_us)

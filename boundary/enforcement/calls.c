@@ -66,7 +66,7 @@ static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_byte
     if (!document && what != RT_CALL_LOAD) return "malformed";
     if (document ? !boundary->loaded : boundary->loaded && boundary->executor.flies) return document ? "not-loaded" : "flies";
     if (!document) {
-        (void)rt_give_back(boundary); /* what nothing was sent of may be loaded again */
+        if (rt_give_back(boundary)) boundary->to_keep = true; /* what nothing was sent of may be loaded again, after a crash too */
         boundary->loaded = false;
     }
     if (at == 0) *size = 0;

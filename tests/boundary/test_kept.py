@@ -1,11 +1,14 @@
-"""What a boundary's process keeps of a link with a key outlives starts without that key."""
+"""What a boundary's process keeps, over starts without its link's key, and when it is killed."""
 
+import os
+import signal
 from pathlib import Path
 
 from boundary import kept as keeping
 from boundary.together import PIN, SIGNED_ROOT
 from reference.world import START, VEHICLE, sealed
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.isolated import Caller
 
 
@@ -25,3 +28,15 @@ def test_a_start_without_the_key_leaves_the_links_timestamps_as_they_were(tmp_pa
     used = link_after(tmp_path, key)
     assert used.timestamp > 0
     assert link_after(tmp_path, None) == used
+
+
+def test_a_mission_that_another_bundle_gave_back_stays_given_back_when_it_is_killed(tmp_path: Path) -> None:
+    """Nothing was sent of it, and the other bundle is refused."""
+    process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, tmp_path, paced=True)
+    caller = Caller(process.call)
+    assert isinstance(caller.load(sealed(), START), bytes)
+    assert keeping.read(kept_file(tmp_path, VEHICLE)).opened
+    assert isinstance(caller.load(b"no bundle", START), Refusal)
+    os.kill(process.pid, signal.SIGKILL)
+    process.close()
+    assert not keeping.read(kept_file(tmp_path, VEHICLE)).opened

@@ -1,6 +1,6 @@
 """From places to velocities: what the autopilot asks of the body. Metres, seconds, radians."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan2, copysign, cos, hypot, inf, sin, sqrt
 
 from rtshcua.simulation.handling import Agility, Handling
@@ -53,11 +53,15 @@ class Past:
 
     north: float
     east: float
+    far: float = field(init=False, repr=False, compare=False)
+    """How far that is, whatever the direction."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "far", hypot(self.north, self.east))
 
     def is_over(self, body: Body, north: float, east: float) -> bool:
         """Whether it has flown past the target (north, east) and comes back."""
-        to_north, to_east = self.north, self.east
-        far = hypot(to_north, to_east)
+        to_north, to_east, far = self.north, self.east, self.far
         along = ((body.north - north) * to_north + (body.east - east) * to_east) / far
         if along <= 0:
             return False

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from errno import ENOSPC
-from functools import partial
+from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Any, Final, Protocol, Self
 
@@ -285,7 +285,11 @@ class _Seeds:
         return self._drawn.to_bytes(32)
 
 
+@lru_cache(maxsize=8)
 def claimed(bundle: bytes) -> tuple[Policy, Mission]:
-    """What is in a bundle, whoever signed it: `load` verifies it, once it is known when it flies, and on what."""
+    """What is in a bundle, whoever signed it: `load` verifies it, once it is known when it flies, and on what.
+
+    The flights of a campaign, which are all of one bundle, read it once.
+    """
     policy, mission = (cose.unverified(envelope).payload for envelope in bundles.envelopes(bundle))
     return bundles.parse(names.POLICY, policy, Policy), bundles.parse(names.MISSION, mission, Mission)

@@ -95,7 +95,7 @@ def mcp(
     try:
         token = token_of(token_file)
     except BadToken as error:
-        return fail(ExitCode.UNTRUSTED, str(error), "`chmod 600`, and a new token")
+        return fail(ExitCode.UNTRUSTED, str(error), f"`chmod 600 {token_file}`, and a new token")
     with socket.socket() as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

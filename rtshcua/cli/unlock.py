@@ -128,7 +128,9 @@ def read_passphrase(path: Path) -> bytes:
     """
     with path.open("rb") as file:
         if why := exposed(file):
-            text = f"others may read the passphrase in `{path}`: {why}. `chmod 600` it, or choose another passphrase"
+            text = (
+                f"others may read the passphrase in `{path}`: {why}. `chmod 600 {path}`, or choose another passphrase"
+            )
             raise KeyStoreError("exposed", text)
         data = file.read(_LONGEST + 1)
     if len(data) > _LONGEST:

@@ -46,7 +46,7 @@ def open_link_key(path: Path) -> BinaryIO:
     file = open_regular(path)
     if why := exposed(file):
         file.close()
-        raise LinkKeyError("exposed", f"others may read the key `{path}`: {why}", "`chmod 600`")
+        raise LinkKeyError("exposed", f"others may read the key `{path}`: {why}", f"`chmod 600 {path}`")
     return file
 
 

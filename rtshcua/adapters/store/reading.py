@@ -31,17 +31,26 @@ def open_regular(path: str | Path, root: Path | None = None) -> BufferedReader:
         if root is None:
             handle = os.open(path, os.O_RDONLY | UNAWAITED)
         else:
-            with opened_folder(Path(path).parent, root) as folder:
+            with unfollowed(path), opened_folder(Path(path).parent, root) as folder:
                 handle = os.open(Path(path).name, os.O_RDONLY | os.O_NOFOLLOW | UNAWAITED, dir_fd=folder)
     except OSError as error:
         if error.errno == ENXIO:  # a socket
             raise NotRegular(ENXIO, "no regular file", str(path)) from None
-        if error.errno == ELOOP and root is not None:
-            raise NotRegular(ELOOP, "symbolic links are not followed here", str(path)) from None
         error.filename = str(path)
         raise
     expect_regular(handle, path)
     return os.fdopen(handle, "rb")
+
+
+@contextmanager
+def unfollowed(path: str | Path) -> Iterator[None]:
+    """What is opened here without following links: raises `NotRegular` for one."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno == ELOOP:
+            raise NotRegular(ELOOP, "symbolic links are not followed here", str(path)) from None
+        raise
 
 
 def read_regular(path: str | Path, most: int, root: Path | None = None) -> bytes:

@@ -20,6 +20,7 @@ from rtshcua.adapters.store.reading import (
     open_regular,
     opened_folder,
     read_regular,
+    unfollowed,
 )
 
 #: modes, from which the umask takes away
@@ -205,7 +206,7 @@ def append(path: Path, data: bytes, root: Path | None = None) -> None:
     """Puts data behind that of a regular file, which is made where there is none, and on the disk; no link is followed
     to it, nor below `root`, and a file of several names, any of which may be elsewhere, is left alone. Raises OSError.
     """
-    with naming(path), opened_folder(path.parent, root) as folder:
+    with naming(path), unfollowed(path), opened_folder(path.parent, root) as folder:
         handle = os.open(path.name, _MORE, PUBLIC_FILE, dir_fd=folder)
         expect_regular(handle, path)
         try:
@@ -237,7 +238,8 @@ def lock(path: Path, *, mode: int = PRIVATE_FILE) -> int:
 
     Raises BlockingIOError where somebody holds it, and OSError.
     """
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | UNAWAITED, mode)
+    with unfollowed(path):
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | UNAWAITED, mode)
     expect_regular(handle, path)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

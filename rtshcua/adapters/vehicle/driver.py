@@ -42,6 +42,8 @@ from rtshcua.onboard.left import Left
 from rtshcua.onboard.ports import Command, Event, Said
 
 HEARTBEAT_US = 1_000_000
+#: why a vehicle that signs answers nothing to whoever does not
+KEYLESS = "it signs what it sends, and answers nothing that is not signed: give the link's key with `--signing-key`"
 
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 _OF_PREFLIGHT = frozenset(preflight.HEEDED)
@@ -83,6 +85,7 @@ class Driver:
     ) -> None:  # fmt: skip
         self._policy = policy
         self._signed = verifier is not None
+        self._mute = "it answers nothing that it is asked"
         self._capacity: int | None = None
         self._steps = steps
         #: what parameters are judged to be, though they are not set
@@ -164,12 +167,13 @@ class Driver:
         if self.flavour is None:
             return self.link.crowd or self.seen.unready
         # before anything is sent it must have answered: its mode has to be known before each frame that moves it
-        mute = None if self._watch.answers else "it answers nothing that it is asked"
+        mute = None if self._watch.answers else self._mute
         if self._flies:
             return self.link.crowd or mute or self.seen.unready
         if self.prepares:
             return self.other_kind or self.link.crowd or "its parameters are being set"
-        waits = self.other_kind or self.link.crowd or self.source.unready or mute or self.preflight.astray
+        keyless = mute if self._mute == KEYLESS else None  # why its clock is not known either
+        waits = self.other_kind or self.link.crowd or keyless or self.source.unready or mute or self.preflight.astray
         return waits or self.seen.unready or self.preflight.unready
 
     def overhear(self, datagram: bytes, now_us: int) -> None:
@@ -305,6 +309,8 @@ class Driver:
         flavour = self.flavour = _FLAVOURS.get(frame.message.autopilot)
         if flavour is not None:
             self.system = frame.system
+            if frame.signed and not self._signed:
+                self._mute = KEYLESS
             if frame.message.type not in MULTIROTORS:
                 self.other_kind = f"it is no multirotor (MAV_TYPE {frame.message.type})"
             self.link.settle(frame.system)

@@ -70,7 +70,9 @@ def test_what_is_no_key(tmp_path: Path, data: bytes) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="modes are of POSIX")
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o644, 0o610])
 def test_a_key_that_others_may_read_is_refused(tmp_path: Path, mode: int) -> None:
-    assert slug(lambda: read_link_key(put(tmp_path / "key", KEY, mode))) == "exposed"
+    with pytest.raises(LinkKeyError) as refused:
+        read_link_key(put(tmp_path / "key", KEY, mode))
+    assert (refused.value.slug, refused.value.help) == ("exposed", f"`chmod 600 {tmp_path / 'key'}`")
 
 
 def test_a_key_that_is_not_there(tmp_path: Path) -> None:

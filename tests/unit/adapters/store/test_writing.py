@@ -97,8 +97,9 @@ def test_no_link_is_written_through(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         write_new(tmp_path / "b", b"one")
     for write in (append, lambda path, _: os.close(lock(path))):
-        with pytest.raises(OSError, match="symbolic links"):
+        with pytest.raises(NotRegular, match="symbolic links are not followed here") as refused:
             write(tmp_path / "c", b"one")
+        assert refused.value.filename == str(tmp_path / "c")
     assert not (tmp_path / "a").is_symlink()
     assert (tmp_path / "victim").read_bytes() == b"mine"
 

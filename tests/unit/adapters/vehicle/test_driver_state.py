@@ -5,10 +5,11 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.driver import KEYLESS, Driver
 from rtshcua.adapters.vehicle.observed import NoDatum, ObservedVehicle
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
+from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Event, Failed, Noted, Readings, Ready, Said, TakenOver
@@ -20,22 +21,30 @@ SENSORS = 0x1020_002F  # gyroscope, accelerometer, magnetometer, barometer, GPS,
 PX4, ARDUPILOT = 12, 3
 
 
+def link() -> SignedLink:
+    return SignedLink(bytes(range(32)), State(0, {}), 1_800_000_000_000_000, 0)
+
+
 class Bench:
     """A driver, and an autopilot that says what it is told to say."""
 
-    def __init__(self, autopilot: int = PX4) -> None:
+    def __init__(self, autopilot: int = PX4, *, signs: bool = False, keyed: bool = False) -> None:
         self.autopilot = autopilot
         self.frames = FrameSession()
-        self.driver = Driver(POLICY, self.frames)
+        self.signed = link() if signs else None
+        self.driver = Driver(POLICY, self.frames, verifier=link() if keyed else None)
         self.codec = Codec(1, 1)
         self.now_us = S
         self.answers = True  # TIMESYNC; it was started when our clock was
+        self.deaf = False  # it answers nothing at all
         self.events: list[Event] = []
         self.sent: list[Any] = []
         self.beat(0)
 
     def hear(self, message: Any) -> None:
-        self.events += self.driver.receive(self.codec.pack(message), self.now_us).events
+        frame = self.codec.pack(message)
+        frame = frame if self.signed is None else self.signed.sign(frame, self.now_us)
+        self.events += self.driver.receive(frame, self.now_us).events
 
     def tick(self, seconds: float = 0.1) -> None:
         for _ in range(round(seconds * 10)):
@@ -45,9 +54,9 @@ class Bench:
             sent = [Codec(0, 0).parse(frame)[0] for frame in frames]
             self.sent += sent
             for frame in sent:
-                if frame.name == "TIMESYNC" and self.answers:
+                if frame.name == "TIMESYNC" and self.answers and not self.deaf:
                     self.hear(mavlink.MAVLink_timesync_message(self.now_us * 1_000, frame.message.ts1))
-            if any(each.name == "COMMAND_LONG" and each.message.command == 512 for each in sent):
+            if any(each.name == "COMMAND_LONG" and each.message.command == 512 for each in sent) and not self.deaf:
                 self.answer()
 
     def answer(self) -> None:
@@ -144,6 +153,19 @@ def test_without_a_clock_nothing_is_known_and_it_is_not_ready(autopilot: int) ->
     assert not [event for event in one.events if isinstance(event, Readings | Ready)]
     asked = [frame for frame in one.sent if frame.name == "TIMESYNC"]
     assert len(asked) > 30, "ten times a second at first"
+
+
+@BOTH
+def test_a_vehicle_that_signs_and_does_not_answer_asks_for_the_key(autopilot: int) -> None:
+    def unready(*, deaf: bool, keyed: bool = False) -> str | None:
+        one = Bench(autopilot, signs=True, keyed=keyed)
+        one.deaf = deaf
+        one.tick(5)
+        return one.driver.unready
+
+    assert unready(deaf=True) == KEYLESS
+    assert unready(deaf=True, keyed=True) == "its clock is not known yet: no TIMESYNC answer"
+    assert unready(deaf=False) != KEYLESS, "it signs, and obeys anyone"
 
 
 def test_it_is_asked_why_it_would_not_arm_and_not_too_often() -> None:

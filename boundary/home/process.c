@@ -45,12 +45,11 @@ enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, NO_KEY = 66, MISSING = 72, IO = 74,
 /* how far ahead of what was used the link's timestamp is kept, in its units of 10 us, and how often: signing.py */
 #define RESERVE 300000LL
 #define EVERY_US 1000000LL
-/* how long a call may take, and the beginning or loading a bundle, in s: the runtime waits for 1.2 s and 20 s (boundary_process.py);
-   how often one that waits for a call says that it is well, and after how long it is not */
-#define CALL_S 2
+/* how long a call may take, and the beginning or loading a bundle, in s: the runtime waits for 1.2 s and 20 s (boundary_process.py),
+   and a machine that stands still for a moment ends nothing; and how often one wakes that waits for a call */
+#define CALL_S 3
 #define BEGINNING_S 20
 #define WAKING_S 1
-#define WAITING_S 3
 
 static rt_boundary boundary;
 static rt_kept slots[2];
@@ -408,14 +407,14 @@ int main(int count, char **words) {
         (void)!send(given.socket, &why, sizeof why, MSG_NOSIGNAL);
         return code;
     }
-    if (!give_time(WAITING_S) || !greet(&given, measures, keys))
+    if (!give_time(CALL_S) || !greet(&given, measures, keys))
         return IO;
     rt_kept *kept = boundary.kept;
     int64_t kept_us = own_time_us(CLOCK_MONOTONIC);
     bool flies = false;
     for (;;) {
         ssize_t size = recv(given.socket, call, sizeof call, 0);
-        if (!give_time(size <= 0 ? WAITING_S : call[0] == RT_CALL_LOAD ? BEGINNING_S : CALL_S))
+        if (!give_time(size > 0 && call[0] == RT_CALL_LOAD ? BEGINNING_S : CALL_S))
             return IO;
         if (size < 0 && (errno == EINTR || errno == EAGAIN))
             continue;
@@ -441,7 +440,7 @@ int main(int count, char **words) {
             if (!rt_end_with(runtime))
                 return IO;
         }
-        if (!give_time(WAITING_S) || send(given.socket, result, answered, 0) != (ssize_t)answered)
+        if (!give_time(CALL_S) || send(given.socket, result, answered, 0) != (ssize_t)answered)
             return IO;
     }
 }

@@ -33,6 +33,8 @@ AGAIN_S: Final = 0.2
 ENDING_S: Final = 2.0
 _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
 _BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
+#: how often one that listens is asked again, in s: each time is a line of systemd's journal
+_ASKING_S: Final = 0.1
 #: octets of the largest call and answer
 _CALL, _ANSWER = MAX_PART + 64, 2_112
 #: after the measures, as `process.c` has it: the name of the link's key, two public halves, whether its clock counts
@@ -196,7 +198,7 @@ class ListeningBoundary(_Connected):
             if time.monotonic() > until_s:
                 text = f"another run has the boundary at `{path}`, or its program does not start"
                 raise BoundaryError("in-use", text, "wait until that run is over; `journalctl` says more of the latter")
-            time.sleep(0.02)
+            time.sleep(_ASKING_S)
         self._take_in(greeting)
 
     def close(self) -> None:
@@ -229,6 +231,8 @@ class ListeningBoundary(_Connected):
         self._socket.close()
         if greeting in (b"", bytes([_IN_USE])):
             return None
+        if len(greeting) > 1:
+            raise BoundaryError("not-begun", f"the boundary at `{path}` is of another release")
         raise _unbegun(greeting[0], f"what the boundary at `{path}` keeps")
 
 

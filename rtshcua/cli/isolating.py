@@ -61,12 +61,10 @@ def connected(path: Path, *, paced: bool) -> ListeningBoundary:
         found = ListeningBoundary(path)
     except BoundaryError as error:
         raise _refused(error) from None
-    why = "it has no log key (`log.seed`)" if found.log_public is None else ""
     if paced and found.own_clock:
-        why = "it decides by its own clock, and `--speed` is another"
-    if why:
         found.close()
-        raise Refused(ExitCode.REFUSED, "boundary-not-begun", f"the boundary at `{path}` does not serve: {why}")
+        text = f"the boundary at `{path}` decides by its own clock, and `--speed` is another"
+        raise Refused(ExitCode.REFUSED, "boundary-not-begun", text, "without `--speed`")
     return found
 
 

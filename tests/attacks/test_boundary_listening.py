@@ -11,6 +11,7 @@ import os
 import signal
 import socket
 import struct
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -217,6 +218,24 @@ def test_no_vehicle_but_that_of_its_socket(provisioned: Provisioned) -> None:
     """A runtime that says another one changes nothing: there is no folder of it."""
     provisioned.made.own.rename(provisioned.made.folder / "quad-08")
     assert provisioned.why_not() == "not-begun"
+
+
+def test_one_of_another_release(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind(str(tmp_path / "s"))
+        listener.listen()
+
+        def greet() -> None:
+            connection, _ = listener.accept()
+            with connection:
+                connection.send(bytes(12))
+
+        answers = threading.Thread(target=greet)
+        answers.start()
+        with pytest.raises(BoundaryError, match="another release") as refused:
+            ListeningBoundary(tmp_path / "s")
+        answers.join()
+    assert refused.value.slug == "not-begun"
 
 
 def test_nobody_listens(tmp_path: Path) -> None:

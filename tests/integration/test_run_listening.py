@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
+from rtshcua.adapters.agent_socket import hand_in
 from rtshcua.adapters.boundary_process import ListeningBoundary
 from rtshcua.cli.app import main
+from rtshcua.wire.keys import Duty
 from virtual.listening import Listening, listening
 
 #: so slow that a busy machine's hold-ups stay below what a permit lasts
@@ -32,6 +34,7 @@ class Aboard:
         self.bundles = [ground.bundle(), ground.bundle(name="another")]
         ground.vehicle(port, SPEED, *linked)
         self.key.unlink()
+        self.log_key = ground.store.key_path(Duty.LOG).read_bytes()
         for secret in ground.store.folder.glob("*.key"):
             secret.unlink()
 
@@ -95,6 +98,12 @@ def test_a_runtime_that_is_killed(ground: Any, made: Listening, port: int) -> No
     assert aboard.verified(killed)[0] == 10
     assert aboard.verified(other)[0] == 0
 
+    key = ground.store.key_path(Duty.LOG)
+    key.write_bytes(aboard.log_key)
+    key.chmod(0o600)
+    assert ground.start("recover", str(killed / "log.jsonl")).process.wait() == 0
+    assert aboard.verified(killed)[0] == 0, "it is ended where the log's key is"
+
 
 def test_what_is_in_the_air_comes_down_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
     """Nobody can verify that log, for the log's key is drawn; nothing new flies."""
@@ -129,6 +138,44 @@ def test_a_boundary_that_is_killed_in_flight(ground: Any, made: Listening, port:
     assert after[-1]["detail"] in ("return_home", "emergency_land")
     code, said = aboard.verified(run.folder)
     assert (code, said["shortfall"]["slug"]) == (10, "boundary/lost")
+
+
+def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
+    """As the unit has it: what is handed in flies; one that is killed is begun again, and brings the vehicle down."""
+    aboard = Aboard(ground, made, port, signed=True)
+    place = made.socket.with_name("agent")
+    words = ("--wait", "--agent-socket", str(place))
+    first = aboard.run(0, *words)
+    first.until("waiting")
+    (waiting,) = made.boundaries()
+    assert hand_in(place, (ground.folder / aboard.bundles[1]).read_bytes()).slug == "accepted"
+    first.until("dispatched", step=1)
+    assert made.boundaries() == [waiting], "one boundary over the waiting and the flight"
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    second = aboard.run(0, *words).end()
+    assert second.code == 6, second.stderr
+    (other,) = [run for run in aboard.runs() if "resumed" in (run / "log.jsonl").read_text()]
+    assert json.loads((other / "log.jsonl").read_bytes().splitlines()[0])["mode"] == "process"
+    assert aboard.verified(other)[0] == 0
+
+
+def test_keys_that_the_trust_root_does_not_name(ground: Any, made: Listening, port: int) -> None:
+    """A log that nobody could verify does not begin; neither does one without what the boundary signs."""
+    assert ground.start("keys", "provision", str(made.folder), "--vehicle", "quad-07").process.wait() == 0
+    made.give()
+    where = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--boundary-socket", str(made.socket))
+    bundle = ground.bundle()
+    ground.vehicle(port, SPEED)
+    for name, codes in (("boundary.seed", (4, 3)), ("log.seed", (4, 5))):
+        seed = made.own / name
+        kept = seed.read_bytes()
+        for octets, code in zip((b"7a" * 32, None), codes, strict=True):
+            seed.write_bytes(octets) if octets else seed.unlink()
+            refused = ground.run(bundle, *where, speed=SPEED).end()
+            assert refused.code == code, (name, refused.events, refused.stderr)
+        seed.write_bytes(kept)
+        made.give()
 
 
 def test_the_doctor_looks_at_it_and_uses_nothing_up(ground: Any, made: Listening, port: int) -> None:

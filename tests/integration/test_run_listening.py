@@ -141,8 +141,13 @@ def test_a_boundary_that_is_killed_in_flight(ground: Any, made: Listening, port:
 
 
 def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
-    """As the unit has it: what is handed in flies; one that is killed is begun again, and brings the vehicle down."""
+    """As the unit has it, with no key store at all: what is handed in flies; one that is killed is begun again, and
+    brings the vehicle down.
+    """
     aboard = Aboard(ground, made, port, signed=True)
+    store = ground.store.folder
+    assert ground.start("keys", "accept", str(store / "root.trust"), "--vehicle", "quad-07").process.wait() == 0
+    store.rename(store.with_name("elsewhere"))
     place = made.socket.with_name("agent")
     words = ("--wait", "--agent-socket", str(place))
     first = aboard.run(0, *words)
@@ -155,9 +160,26 @@ def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
     assert first.process.wait() == -signal.SIGKILL
     second = aboard.run(0, *words).end()
     assert second.code == 6, second.stderr
+    store.with_name("elsewhere").rename(store)
     (other,) = [run for run in aboard.runs() if "resumed" in (run / "log.jsonl").read_text()]
     assert json.loads((other / "log.jsonl").read_bytes().splitlines()[0])["mode"] == "process"
     assert aboard.verified(other)[0] == 0
+
+
+def test_what_an_earlier_run_owes_is_left_to_one_that_may_put_it_back(ground: Any, made: Listening, port: int) -> None:
+    """This one may set nothing, and its log says so."""
+    aboard = Aboard(ground, made, port, signed=False)
+    owed = Path(ground.environment["RTSHCUA_DATA_DIR"]) / "state" / "parameters" / "vehicle-quad-07"
+    owed.parent.mkdir(parents=True)
+    kept = '{"GF_ACTION": ["3", "2"]}'
+    owed.write_text(kept)
+    run = aboard.run()
+    run.until("dispatched", step=0)
+    run.signal(signal.SIGINT)
+    run.end()
+    assert json.loads(owed.read_text()) == json.loads(kept)
+    assert "not-prepared" in run.effects()
+    assert "prepared" not in run.effects()
 
 
 def test_keys_that_the_trust_root_does_not_name(ground: Any, made: Listening, port: int) -> None:

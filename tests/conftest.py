@@ -227,11 +227,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     What only a random example reaches is covered by luck: it gets a case of its own.
     """
-    tests = CHECKOUT / "tests"
-    covering = tuple(tests / folder for folder in COVERING)
+    covering = tuple(CHECKOUT / "tests" / folder for folder in COVERING)
+
+    @cache
+    def covers(path: Path) -> bool:
+        return any(path.is_relative_to(folder) for folder in covering)
+
     for item in items:
-        drawn = getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
-        if drawn or not any(item.path.is_relative_to(folder) for folder in covering):
+        if not covers(item.path) or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
             item.add_marker("unmeasured")
 
 

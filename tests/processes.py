@@ -78,7 +78,7 @@ class Processes:
         ):
             return None
         files = [[at for at, _ in group] for _, group in groupby(enumerate(session.items), lambda each: each[1].path)]
-        # the next is the last. Flights in real time take longest, and wait most: they come first
+        # flights in real time come last: half of the processes begin at that end, see `next_file`
         files.sort(key=lambda each: "integration" in session.items[each[0]].path.parts)
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  one folder for all processes
         try:
@@ -133,7 +133,7 @@ class Processes:
             said = worker.pipe.recv()
             worker.heard_s = time.monotonic()
             if said is None:
-                file = files.pop() if files else []
+                file = next_file(worker, files)
                 worker.given += file
                 worker.pipe.send(file)
                 return
@@ -186,6 +186,15 @@ class Processes:
         report = pytest.TestReport(item.nodeid, item.location, {}, "failed", why, "call")
         report.node = worker.node  # type: ignore[attr-defined]
         session.config.hook.pytest_runtest_logreport(report=report)
+
+
+def next_file(worker: Worker, files: list[list[int]]) -> list[int]:
+    """The next file for a process, from the end that it works from until both ends meet.
+
+    Flights in real time mostly wait. Were they all begun first, or last, the processors would have little to do
+    meanwhile; so half of the processes fly them, while the other half compute.
+    """
+    return files.pop(-1 if worker.number % 2 else 0) if files else []
 
 
 def _end(workers: list[Worker]) -> None:

@@ -3,9 +3,12 @@
 import os
 import subprocess
 import sys
+from multiprocessing import Pipe
 from pathlib import Path
 
 import pytest
+
+from processes import Worker, next_file
 
 CONFTEST = """
 import os
@@ -88,7 +91,10 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def unheard(request):
-    request.config.pluginmanager.unregister(name="told")
+    plugins = request.config.pluginmanager
+    told = plugins.unregister(name="told")
+    yield
+    plugins.register(told, "told")  # this process may be given the other file too
 
 def test_says_nothing():
     assert 1 + 1 == 3
@@ -127,6 +133,14 @@ def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
     for name in ("test_a", "test_d"):
         assert (tmp_path / f"{name}.py.ran").read_text(encoding="utf-8").split() == ["0", "1", "2"]
     assert (tmp_path / "ended").read_text(encoding="utf-8").split() == ["over"] * 2
+
+
+def test_half_of_the_processes_begin_with_the_last_files() -> None:
+    files = [[0, 1], [2], [3, 4], [5]]
+    own, other = Pipe()
+    with own, other:
+        given = [next_file(Worker(number, 0, own), files) for number in (0, 1, 2, 3, 4)]
+    assert given == [[0, 1], [5], [2], [3, 4], []]
 
 
 @pytest.mark.parametrize(

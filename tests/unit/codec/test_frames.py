@@ -136,7 +136,7 @@ def test_any_payload_with_a_right_checksum_decodes_or_is_counted() -> None:
         assert len(receiver.parse(frame + checksum.crc.to_bytes(2, "little"))) == 1
 
 
-@settings(max_examples=100)
+@settings(max_examples=settings().max_examples * 2)
 @given(st.lists(st.one_of(st.binary(max_size=40), st.integers(0, 2**32 - 1)), max_size=8), st.data())
 def test_good_frames_survive_garbage_without_markers(parts: list[bytes | int], data: st.DataObject) -> None:
     sender, receiver = Codec(1, 1), Codec(1, 1)

@@ -16,6 +16,7 @@ from rtshcua.wire.key_file import MAX_KEY_FILE, KeyFileError, dump_signing_key, 
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey, WrongDuty, key_id, verified
 from rtshcua.wire.untrusted import Untrusted
 from virtual.rows import rows
+from virtual.sampling import each_once
 
 SEED = bytes(range(32))
 PASSPHRASE = b"correct horse"
@@ -122,9 +123,12 @@ def test_secrets_are_never_shown():
         pickle.dumps(key)
 
 
-@rows("duty", list(Duty))
-@rows(("development", "passphrase"), [(True, None), (True, PASSPHRASE), (False, PASSPHRASE)])
-def test_key_files_come_back(duty, development, passphrase):
+PROTECTED = [(True, None), (True, PASSPHRASE), (False, PASSPHRASE)]
+
+
+@pytest.mark.parametrize(("duty", "protected"), each_once(Duty, PROTECTED))
+def test_key_files_come_back(duty, protected):
+    development, passphrase = protected
     key = signing_key(duty, development=development)
     loaded = load_signing_key(dump_signing_key(key, passphrase=passphrase), duty=duty, passphrase=passphrase)
     assert (loaded.duty, loaded.development, loaded.public, loaded.kid) == (duty, development, key.public, key.kid)

@@ -19,7 +19,7 @@ Add = Callable[..., list[Done]]
 UTC, VEHICLE, SKILL, OUTCOME, REASON, CLAUSE, VERSION, SEQ = range(8)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def asker(filled: Folder) -> Iterator[Asker]:
     asker = Asker(filled)
     yield asker

@@ -113,11 +113,11 @@ def each_operation(kinds: Sequence[str], step: int) -> list[str]:
 
 
 def test_what_was_acknowledged_is_kept_when_process_or_power_fail() -> None:
-    assert campaigns(range(40)) == []
+    assert campaigns(range(25)) == []
 
 
 def test_what_was_acknowledged_is_kept_whatever_operation_fails() -> None:
-    assert each_operation(KINDS, 17) == []
+    assert each_operation(KINDS, 29) == []
 
 
 @pytest.mark.soak

@@ -76,7 +76,7 @@ def held(each: Conjunction, at: Environment) -> Truth:
     return FALSE if FALSE in truths else UNKNOWN if UNKNOWN in truths else TRUE
 
 
-@settings(max_examples=400)
+@settings(max_examples=settings().max_examples * 4)
 @given(NODES, SITUATIONS)
 def test_bounds_and_alternatives(node: tree.Node, situation: tuple[tuple[Value, ...], tuple[Value, ...], int]) -> None:
     at = environment(situation)

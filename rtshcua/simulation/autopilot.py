@@ -255,7 +255,7 @@ class Autopilot:
             air.step(_TICK_S)
         sensors.step(_TICK_S)
         wind = (air.north, air.east)
-        load = vehicle.step(_TICK_S, wind, sensors.error, powered=battery.level > 0, sees=sensors.estimates)
+        load = vehicle.step(_TICK_S, wind, sensors.error, battery.level > 0, sensors.estimates)
         battery.drain(_TICK_S, load)
         if sensors.late:
             sensors.follow(_TICK_S, vehicle.body)
@@ -321,7 +321,9 @@ class Autopilot:
             vehicle.events.clear()
         if vehicle.mode is not self._told_mode:
             self.tell_mode()
-        if vehicle.armed or not flavour.reminds:
+        if not flavour.reminds:
+            return
+        if vehicle.armed:
             self._remind_us = self.now_us + _REMIND_FIRST_US
         elif self.now_us >= self._remind_us:
             self._remind_us = self.now_us + _REMIND_US

@@ -28,12 +28,14 @@ class VirtualClock:
 
     def __init__(self, start: Now = START) -> None:
         self.elapsed_us = 0
+        self.start_us = start.monotonic_us
+        """The monotonic time at the start."""
         self._start = start
 
     @property
     def monotonic_us(self) -> int:
         """The monotonic time."""
-        return self._start.monotonic_us + self.elapsed_us
+        return self.start_us + self.elapsed_us
 
     def now(self) -> Now:
         """The present moment."""
@@ -79,21 +81,24 @@ class VirtualVehicle:
         waiting, self._waiting = self._waiting, []
         self._take(waiting, events)
         clock, driver, advance, tick_us = self.clock, self.driver, self.simulation.advance, self._tick_us
-        end_us = clock.elapsed_us + timeout_us
+        start_us, elapsed_us = clock.start_us, clock.elapsed_us
+        end_us = elapsed_us + timeout_us
         looked_at = 0
         while True:
-            happened, frames = driver.tick(clock.monotonic_us)
+            happened, frames = driver.tick(start_us + elapsed_us)
             events += happened
             if frames:
                 self._send(frames, events)
-            elapsed_us = clock.elapsed_us
             if elapsed_us >= end_us:
                 return events
             while looked_at < len(events):
                 if type(events[looked_at]) is not Readings:
                     return events
                 looked_at += 1
-            clock.elapsed_us = elapsed_us = min(end_us, elapsed_us + tick_us)
+            elapsed_us += tick_us
+            if elapsed_us > end_us:
+                elapsed_us = end_us
+            clock.elapsed_us = elapsed_us
             datagrams = advance(elapsed_us)
             if datagrams:
                 self._take(datagrams, events)

@@ -352,11 +352,10 @@ class Manoeuvre:
 
     def _again(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
         """The message once more, where it needs to be: never of a target that the autopilot flies to."""
-        commander, stage = self._commander, self._left[0]
-        goes = self._aids.targets.shown or (self._progress is not None and self._progress.shown)
+        commander = self._commander
         if self._waits:
             return []
-        if (stage.command is None and goes) or seen.up_us < commander.due_us:
+        if self._is_followed or seen.up_us < commander.due_us:
             self._aids.query.sent()
             return []
         if not self._may_send(seen, now_us):
@@ -364,6 +363,15 @@ class Manoeuvre:
         self._aids.query.sent()
         self._aids.targets.told_again()
         return commander.due(seen.up_us)
+
+    @property
+    def _is_followed(self) -> bool:
+        """Whether the message of the present stage is one that is repeated until the autopilot flies to its target, and
+        it does.
+        """
+        if self._left[0].command is not None:
+            return False
+        return self._aids.targets.shown or (self._progress is not None and self._progress.shown)
 
     def _due_us(self, seen: ObservedVehicle, now_us: int) -> int:
         """When to look again, in real time, unless something is seen before."""
@@ -383,7 +391,7 @@ class Manoeuvre:
             return (self._held_us or 0) + self._command.hold_us if ends else NEVER
         if self._waits:
             return self._entered_us + MODE_UNKNOWN_US
-        at_us = min(self._commander.due_us, self._shows_us)
+        at_us = self._shows_us if self._is_followed else min(self._commander.due_us, self._shows_us)
         if self._progress is not None:
             at_us = min(at_us, self._progress.due_us)
         return at_us if self._stop is None else min(at_us, self._stop.due_us)

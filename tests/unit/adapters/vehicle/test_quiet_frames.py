@@ -1,14 +1,19 @@
 """Frames in which a manoeuvre sees nothing new are not shown to it: nothing comes of it, whatever goes wrong."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 
 import pytest
 
 from rtshcua.adapters.vehicle.manoeuvre import Manoeuvre
+from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Event
 from rtshcua.simulation.faults import parse_fault
+from rtshcua.virtual.vehicle import SECOND, TICK_US
 from virtual.flight import Flight
+from virtual.flyer import Flyer
 from virtual.shipped import shipped, simulated
 
 FAULTS = ("link-loss,at=5s,loss=40%", "link-delay,at=0s,delay=400ms")
@@ -34,3 +39,22 @@ def test_a_flight_is_the_same_when_every_frame_is_shown(
     monkeypatch.setattr(Manoeuvre, "due_us", property(lambda _: 0, lambda _, value: None), raising=False)
     assert flown(flavour, fault) == spared
     assert b'"ending":"completed"' in spared[0][-1]
+
+
+def test_a_leg_is_not_looked_at_whenever_time_goes_by(
+    aloft: Callable[[], Flyer], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also one whose target would be repeated, were it not flown to."""
+    advance = Manoeuvre.advance
+    moments: set[int] = set()
+
+    def counted(self: Manoeuvre, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
+        moments.add(now_us)
+        return advance(self, seen, now_us)
+
+    one = aloft()
+    one.begin(MotionKind.COVER, (20_000, 0), (200_000, 0), altitude=20_000, speed=5_000)
+    one.wait(15)
+    monkeypatch.setattr(Manoeuvre, "advance", counted)
+    one.wait(5)
+    assert 0 < len(moments) < 5 * SECOND // TICK_US // 2

@@ -277,7 +277,12 @@ class CrashWatch:
             self._flown = True
         if not self._flown or self._told:
             return None
-        how = self._motors(seen, now_us, flies=flies)
+        if seen.armed:
+            if flies and seen.levelled:
+                self._flew = now_us, seen.height, seen.landing
+            how = None
+        else:
+            how = self._motors(now_us)
         if how is None and (seen.tilt >= TILTED or self._tilted_us is not None):
             how = self._attitude(seen)
         if how is None and (seen.descent >= FALLS or self._fell is not None or self._impact is not None):
@@ -285,12 +290,8 @@ class CrashWatch:
         self._told = how is not None
         return how
 
-    def _motors(self, seen: ObservedVehicle, now_us: int, *, flies: bool) -> str | None:
+    def _motors(self, now_us: int) -> str | None:
         """Autopilots call a vehicle landed that is disarmed: what counts is how it flew when it was last seen armed."""
-        if seen.armed:
-            if flies and seen.levelled:
-                self._flew = now_us, seen.height, seen.landing
-            return None
         flew, self._flew = self._flew, None
         if flew is None or now_us - flew[0] > RECENT_US or flew[1] < ABOVE or flew[2]:
             return None

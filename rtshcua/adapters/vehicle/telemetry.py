@@ -48,7 +48,9 @@ class Telemetry:
         self._told: set[tuple[str, Where]] = set()  # what came of the autopilot: of each, always the same slots
         self._first: dict[tuple[int, str, Where], Any] = {}
         self._by_message: dict[str, list[_Carried]] = {}
-        self._whole: set[str] = set()  # of these the autopilot's own carry all that such a message may carry, each time
+        #: of these the autopilot's own carry all that such a message may carry, each time; where there are several
+        #: instances, those of this one
+        self._whole: dict[str, int | None] = {}
         for signal in policy.signals:
             for source in signal.sources:
                 _check(signal, source)
@@ -76,16 +78,16 @@ class Telemetry:
             return ()
         if component != AUTOPILOT:
             doubtful = _NONE
-        elif not doubtful and name in self._whole:
+        elif not doubtful and name in self._whole and _instance(message) == self._whole[name]:
             return tuple([value for each in carried for value in each.read(message)])
         empty = name == "WIND" and _says_nothing(message)
         values: list[tuple[int, int | None]] = []
-        instanced = message.instance_field is not None
+        instance = _instance(message)
         told: list[tuple[str, Where]] = []
         for fields, slots, read, selected in carried:
             if selected and not _is_selected(selected, message):
                 continue
-            if instanced and not self._is_first(name, message, component, selected):
+            if instance is not None and not self._is_first(name, instance, component, selected):
                 continue
             told.append((name, selected))
             if empty or (doubtful and not doubtful.isdisjoint(fields)):
@@ -96,17 +98,22 @@ class Telemetry:
             if not self._told.issuperset(told):
                 self._told.update(told)
                 self._own.update(slot for slot, _ in values)
-            if name != "WIND" and not instanced and not any(each.where for each in carried):
-                self._whole.add(name)
+            if name != "WIND" and told and not any(each.where for each in carried):
+                self._whole[name] = instance
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
 
-    def _is_first(self, name: str, message: Any, component: int, where: Where) -> bool:
-        """Whether this comes from the lowest instance that the component was heard to have of a selected sensor."""
-        instance = getattr(message, message.instance_field)
+    def _is_first(self, name: str, instance: int, component: int, where: Where) -> bool:
+        """Whether this is the lowest instance that the component was heard to have of a selected sensor."""
         key = component, name, where
         first = self._first[key] = min(instance, self._first.get(key, instance))
         return bool(instance == first)
+
+
+def _instance(message: Any) -> int | None:
+    """Which instance of a sensor a message is of; None where such a message names none."""
+    field = message.instance_field
+    return None if field is None else getattr(message, field)
 
 
 def _is_selected(where: Where, message: Any) -> bool:

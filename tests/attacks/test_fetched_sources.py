@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tarfile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -37,7 +37,7 @@ def distribution(folder: Path, name: str, mark: Path, files: Any) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def files() -> Any:
     """What is unpacked, by distribution: two constants of the script, which runs as soon as it is imported."""
     source = SCRIPT.read_text(encoding="utf-8")
@@ -59,14 +59,30 @@ def fetch(place: Path, links: Path, pins: dict[str, str]) -> "subprocess.Complet
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_no_set_up_of_what_is_fetched_runs(tmp_path: Path, files: Any) -> None:
-    links, mark = tmp_path / "links", tmp_path / "ran"
-    links.mkdir()
-    pins = {name: distribution(links, name, mark, files[name]) for name in PINNED}
-    done = fetch(tmp_path / "one", links, pins)
+class Fetched(NamedTuple):
+    """A checkout that both distributions were fetched into: from where, their hashes, the mark of a set-up that ran."""
+
+    place: Path
+    links: Path
+    pins: dict[str, str]
+    mark: Path
+
+
+@pytest.fixture(scope="module")
+def fetched(tmp_path_factory: pytest.TempPathFactory, files: Any) -> Fetched:
+    top = tmp_path_factory.mktemp("fetched")
+    made = Fetched(top / "one", top / "links", {}, top / "ran")
+    made.links.mkdir()
+    made.pins.update((name, distribution(made.links, name, made.mark, files[name])) for name in PINNED)
+    done = fetch(made.place, made.links, made.pins)
     assert done.returncode == 0, done.stdout + done.stderr
+    return made
+
+
+def test_no_set_up_of_what_is_fetched_runs(fetched: Fetched, tmp_path: Path) -> None:
+    place, links, pins, mark = fetched
     assert not mark.exists()
-    unpacked = tmp_path / "one" / "build" / "boundary" / "fetched"
+    unpacked = place / "build" / "boundary" / "fetched"
     assert (unpacked / "monocypher.c").read_text() == "/* monocypher.c */"
     assert (unpacked / "private" / "common.h").exists()
     for name in PINNED:
@@ -77,14 +93,11 @@ def test_no_set_up_of_what_is_fetched_runs(tmp_path: Path, files: Any) -> None:
     assert not mark.exists()
 
 
-def test_what_is_missing_is_fetched_again(tmp_path: Path, files: Any) -> None:
-    links = tmp_path / "links"
-    links.mkdir()
-    pins = {name: distribution(links, name, tmp_path / "ran", files[name]) for name in PINNED}
-    fetch(tmp_path, links, pins)
-    unpacked = tmp_path / "build" / "boundary" / "fetched"
+def test_what_is_missing_is_fetched_again(fetched: Fetched, tmp_path: Path) -> None:
+    place = tmp_path / "another"
+    shutil.copytree(fetched.place, place)
+    unpacked = place / "build" / "boundary" / "fetched"
     (unpacked / "configure.ac").unlink()
-    assert fetch(tmp_path, links, pins).returncode == 0
+    assert fetch(place, fetched.links, fetched.pins).returncode == 0
     assert (unpacked / "configure.ac").exists()
-    shutil.rmtree(links)
-    assert fetch(tmp_path, links, pins).returncode == 0, "it is all there"
+    assert fetch(place, tmp_path / "nowhere", fetched.pins).returncode == 0, "it is all there"

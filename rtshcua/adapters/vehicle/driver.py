@@ -209,7 +209,7 @@ class Driver:
         aged = seen.pass_time(now_us)
         if not self._watch.strict:
             self._watch.strict = seen.airborne  # what is sent to it there has to arrive
-        send = self._questions(now_us)
+        send = self._housekeeping(now_us)
         if self._texts.parts:
             self._hear(self._texts.due(now_us), events)
         self._look(now_us, events)
@@ -231,7 +231,7 @@ class Driver:
             frames += self._set_parameters(now_us)
         return events, frames
 
-    def _questions(self, now_us: int) -> list[Message]:
+    def _housekeeping(self, now_us: int) -> list[Message]:
         """The heartbeat and the questions that are due, whatever flies."""
         send: list[Message] = []
         if now_us >= self._beats_us:

@@ -37,7 +37,7 @@ from reference.world import (
     request_for,
     sealed,
 )
-from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, kept_file, program
+from rtshcua.adapters.boundary_process import PATIENCE_S, BoundaryError, BoundaryProcess, kept_file, program
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -268,9 +268,10 @@ def test_killed_while_it_writes_its_file_is_whole(tmp_path: Path) -> None:
         held = Held(tmp_path)  # raises where what was kept is damaged
         held.caller.put(LOAD, sealed())
         size = struct.pack(">qqqI", AT_US, START.utc_us, START.utc_error_us, len(sealed()))
-        threading.Timer(random.random() * 0.006, os.kill, (held.process.pid, signal.SIGKILL)).start()
+        killed = threading.Timer(random.random() * 0.006, os.kill, (held.process.pid, signal.SIGKILL))
+        killed.start()
         held.caller(LOAD, size)
-        time.sleep(0.008)
+        killed.join()
         held.process.close()
     Held(tmp_path).process.close()
 
@@ -298,7 +299,7 @@ def test_when_the_runtime_is_killed_it_ends_and_gives_up_the_vehicle(point: str,
     runtime.wait()
     runtime.stdout.close()
     runtime.stdin.close()
-    second, until_s = None, time.monotonic() + 10
+    second, until_s = None, time.monotonic() + PATIENCE_S
     while second is None:
         assert time.monotonic() < until_s, "the boundary goes on without its runtime"
         with suppress(BoundaryError):  # in use

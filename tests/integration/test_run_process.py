@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from rtshcua.adapters.boundary_process import PATIENCE_S
 from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.store.writing import lock
 from rtshcua.codec.frames import Codec
@@ -21,7 +22,7 @@ AS = ("--boundary-user", "nobody") if os.geteuid() == 0 else ()
 
 def let_go(kept: Path) -> None:
     """Wait until the boundary of a run that is over has written what it keeps."""
-    until_s = time.monotonic() + 10
+    until_s = time.monotonic() + PATIENCE_S
     while True:
         try:
             os.close(lock(kept))

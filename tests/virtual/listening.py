@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.boundary_process import PATIENCE_S, program
 
 VEHICLE: Final = "quad-07"
 #: who runs the boundary, and who the run, where we may choose: ourselves, where we may not
@@ -57,7 +57,7 @@ class Listening:
             command += ["/usr/bin/setpriv", f"--reuid={BOUNDARY_USER}", f"--regid={BOUNDARY_USER}", "--clear-groups"]
         command += [str(copied), "--socket", "3", "--folder", str(self.folder), *words]
         self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        until_s = time.monotonic() + 10
+        until_s = time.monotonic() + PATIENCE_S
         while not self._is_listened_at():
             assert time.monotonic() < until_s
             time.sleep(0.01)

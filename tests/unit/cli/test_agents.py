@@ -5,7 +5,6 @@ import os
 import socket
 import tempfile
 import threading
-import time
 from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -186,7 +185,8 @@ def test_what_agents_make_the_flight_look_at_keeps_no_operator_waiting(tmp_path:
         found: list[Event] = []
         for turn in range(1, 200):
             found += agents.events(Now(turn * GAP_US, 1, 0))
-            time.sleep(0.001)
+        agents._sockets[0].worker.submit(int).result(60)  # after the operator's document
+        found += agents.events(Now(200 * GAP_US, 1, 0))
         assert len(found) == 1, "the operator's; eight of the agent's wait, and the others are told that"
         slugs = [json.loads(line).get("slug") for line in links[0].recv(1 << 20).splitlines()]
         assert slugs.count("busy") == 4

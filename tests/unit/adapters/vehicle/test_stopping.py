@@ -111,6 +111,13 @@ def test_a_hold_that_does_not_stop_has_failed(aloft: Make, monkeypatch: pytest.M
     assert failed.at_us - begun < 8 * S, "it declares no brakes: by the cautious guess"
 
 
+def _drift(vehicle: Vehicle, dt: float, *_: object) -> None:
+    """A step in which it goes on as it goes, whatever it was told."""
+    body = vehicle.body
+    body.north += body.v_north * dt
+    body.east += body.v_east * dt
+
+
 def test_a_hold_that_is_blown_along_when_its_time_is_over_has_not_succeeded_yet(
     aloft: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,7 +127,7 @@ def test_a_hold_that_is_blown_along_when_its_time_is_over_has_not_succeeded_yet(
     one.wait(2.5)
     vehicle = one.vehicle.simulation._autopilot.vehicle
     with monkeypatch.context() as blown:
-        blown.setattr(type(vehicle), "_fly", lambda self, dt, *_: self.body._move(dt, 0.0, 0.0))
+        blown.setattr(type(vehicle), "_fly", _drift)
         vehicle.body.v_north = 3.0
         ends = [event for event in one.wait(3) if isinstance(event, (Succeeded, Failed, TakenOver))]
     assert ends == []
@@ -132,7 +139,7 @@ def test_a_hold_that_drifts_away_has_failed(aloft: Make, monkeypatch: pytest.Mon
     one.begin(MotionKind.HOLD)
     one.wait(4)
     vehicle = one.vehicle.simulation._autopilot.vehicle
-    monkeypatch.setattr(type(vehicle), "_fly", lambda self, dt, *_: self.body._move(dt, 0.0, 0.0))
+    monkeypatch.setattr(type(vehicle), "_fly", _drift)
     vehicle.body.v_north = 3.0
     assert one.until((Succeeded, Failed), 15).reason == "did-not-hold"
 

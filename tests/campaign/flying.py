@@ -1,16 +1,17 @@
 """Flights of the field mission by the right runtime, and by wrong ones."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Final
 
-from campaign.wrong import BY_NAME
+from campaign.wrong import BY_NAME, Aimed
 from rtshcua.campaign.drawing import FLAVOURS, Space, Tally, draw
 from rtshcua.campaign.flights import Field, Flight, moments
 from rtshcua.campaign.results import Failed, Result
 from rtshcua.cli.sources import compile_sources
+from rtshcua.model.faults import KINDS
 from rtshcua.model.scenario import Scenario, Start
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
@@ -40,11 +41,14 @@ class Right:
 
 
 @cache
-def space() -> Space:
+def space(aimed: Aimed | None = None) -> Space:
     """What is drawn from."""
     roles = sorted({POLICY.roles[rule.approver] for rule in POLICY.rules if rule.approver >= 0})
     read = sorted({source.message for signal in POLICY.signals for source in signal.sources})
-    return Space(SKILLS, LASTS_US, tuple(roles), FLAVOURS, read=tuple(read))
+    drawn_from = Space(SKILLS, LASTS_US, tuple(roles), FLAVOURS, read=tuple(read))
+    if aimed is None:
+        return drawn_from
+    return replace(drawn_from, kinds=frozenset(KINDS[kind] for kind in aimed.kinds), flavours=aimed.flavours)
 
 
 def flight_of(seed: int, number: int, drawn_from: Space, known: Tally) -> Flight:

@@ -2,8 +2,9 @@
 
 import pytest
 
-from campaign.flying import SKILLS, calm, flown, wrongly
+from campaign.flying import SKILLS, calm, flight_of, flown, right, space, wrong_fails, wrongly
 from campaign.wrong import BY_NAME, WRONG
+from rtshcua.campaign.drawing import Tally
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode, Way
@@ -81,6 +82,14 @@ def test_what_is_wrong_is_seen(name: str) -> None:
 @pytest.mark.parametrize("name", BY_NAME)
 def test_the_right_runtime_does_not_fail_there(name: str) -> None:
     assert slugs(flown(SHOWN[name][0])) == set()
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(("name", "number"), [("restart-over-pilot", 4), ("mode-not-asked", 8)])
+def test_a_campaign_that_is_aimed_at_it_finds_it(name: str, number: int) -> None:
+    flight = flight_of(1, number - 1, space(BY_NAME[name].aimed), Tally())  # of the first round, which knows nothing
+    assert wrong_fails(name, flight)
+    assert right(flight).result.failures == ()
 
 
 @pytest.mark.parametrize(

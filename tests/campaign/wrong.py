@@ -10,7 +10,7 @@ what it changes is done only there. So that flight need not be flown again.
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from unittest.mock import patch
 
 from msgspec.structs import replace
@@ -19,6 +19,7 @@ from rtshcua.adapters import loop
 from rtshcua.adapters.px4 import flavour as px4
 from rtshcua.adapters.vehicle import driver, effects, flavour, manoeuvre, messages, source_time, supervision
 from rtshcua.adapters.vehicle.flavour import Stage
+from rtshcua.campaign.drawing import FLAVOURS
 from rtshcua.decision import case, prepare, safety
 from rtshcua.decision.values import TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
@@ -34,6 +35,19 @@ Patch = tuple[object, str, Callable[[Any], Any]]
 _ALWAYS: Final = 1 << 62
 
 
+class Aimed(NamedTuple):
+    """A campaign of faults of these kinds alone, by their words, on these autopilots."""
+
+    kinds: tuple[str, ...]
+    flavours: tuple[str, ...] = FLAVOURS
+
+    @property
+    def options(self) -> str:
+        """What asks `rtshcua campaign` for it."""
+        chosen = () if self.flavours == FLAVOURS else self.flavours
+        return " ".join([*(f"--fault {kind}" for kind in self.kinds), *(f"--flavour {each}" for each in chosen)])
+
+
 @dataclass(frozen=True)
 class Wrong:
     """A mistake: what is wrong, in words, and the functions of the right runtime that are others then."""
@@ -45,6 +59,8 @@ class Wrong:
     """Empty: it may change any flight."""
     flavour: str | None = None
     """The autopilot that it is about; None: both."""
+    aimed: Aimed | None = None
+    """The campaign that somebody would fly who fears such a mistake."""
 
     @contextmanager
     def made(self) -> Iterator[None]:
@@ -258,7 +274,7 @@ WRONG: Final = (
     Wrong("hover-by-mode", "On PX4 a stop sends DO_SET_MODE and nothing else: in Hold already, it flies on.",
           ((px4, "_stop", _hover_by_mode), (allow_list, "carries_out", _lets_modes_out)), _FALLS, "px4"),
     Wrong("grace-through-silence", "The grace of a clause that is unknown runs on while the link is silent.",
-          ((supervisor.Grace, "stood", _nothing),), (b'"link-lost"',)),
+          ((supervisor.Grace, "stood", _nothing),), (b'"link-lost"',), aimed=Aimed(("freeze", "link-silence"))),
     Wrong("mode-taken-ignored", "A mode that nothing of ours asked for does not count as a takeover.",
           ((manoeuvre.Manoeuvre, "_taken_over", _no_mode_of_others), (driver.Driver, "_watch_mode", _nothing)),
           (b'"taken-over"',)),
@@ -297,7 +313,8 @@ WRONG: Final = (
     Wrong("restart-ends-in-air", "Begun again after a crash of the program, it ends and leaves the vehicle flying.",
           ((controller.MissionController, "aloft", _ends_in_the_air),), (b'"resumed"',)),
     Wrong("restart-over-pilot", "Begun again after a crash of the program, it does not ask who flies meanwhile.",
-          ((driver.Driver, "_flown_by_others", _nobody),), (b'"taken-over"',)),
+          ((driver.Driver, "_flown_by_others", _nobody),), (b'"taken-over"',),
+          aimed=Aimed(("runtime-killed", "pilot-mode"))),
     Wrong("full-disk-unnoticed", "A record that the disk refuses counts as kept.",
           ((loop.RunLoop, "_append", _disk_is_fine),), (b'"gap"',)),
     Wrong("airspace-unchecked", "No place is looked for in the airspace: no path, no link, no predicted stop.",
@@ -308,7 +325,8 @@ WRONG: Final = (
           ((flavour, "landing", _landed_by_word),), (b'"detail":"emergency_land"',)),
     Wrong("mode-not-asked", "The mode is not asked for: what the last heartbeat said counts.",
           ((manoeuvre.WhoFliesQuery, "is_newer", _true), (manoeuvre.WhoFliesQuery, "is_young", _true),
-           (manoeuvre.WhoFliesQuery, "due", _asks_nothing)), (b'"taken-over"',)),
+           (manoeuvre.WhoFliesQuery, "due", _asks_nothing)), (b'"taken-over"',),
+          aimed=Aimed(("pilot-mode",), ("px4",))),
     Wrong("denied-trusts-step", "When a step is denied in the air its own fallback flies, not the contingency.",
           ((controller.MissionController, "_come_down", _own_fallback),), (b'"deny"', b'"resumed"', b'"gap"')),
     Wrong("crash-ignored", "That it crashed is recorded, and the mission goes on.",

@@ -66,6 +66,8 @@ class Simulation:
         self._inbox = Inbox(flavour.lanes, Random(f"{config.seed} answers")) if recorded else None
         self.heard: Callable[[int, bytes], None] | None = None
         """Is given each good frame that comes to the vehicle, and when, if somebody wants to know."""
+        self.obeyed: Callable[[int, bytes], None] | None = None
+        """And this, when the autopilot gets to it."""
         self._events: list[tuple[int, int, Callable[[], object]]] = []
         self._order = count()
         for fault in config.faults:
@@ -195,6 +197,8 @@ class Simulation:
                 self._answer(received, max(at_us, self._ticked_us))  # what waited while it was halted comes after
 
     def _answer(self, received: Received, now_us: int) -> None:
+        if self.obeyed is not None:
+            self.obeyed(now_us, received.frame)
         self._autopilot.since_us = now_us - self._ticked_us
         self._down.send(self._face.obey(received), now_us)
 

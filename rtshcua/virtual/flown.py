@@ -35,13 +35,14 @@ class Sample(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """A frame of ours: when it was sent, and when the vehicle obeyed or refused it. None: it never got there, or it was
-    nothing to obey.
+    """A frame of ours: when it was sent, when it came to the vehicle, and when the autopilot got to it, to obey,
+    answer or refuse it. None: it never did.
     """
 
     sent_us: int
     heard_us: int | None
     octets: bytes
+    obeyed_us: int | None = None
 
 
 class Happened(NamedTuple):

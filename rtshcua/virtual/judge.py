@@ -323,7 +323,8 @@ _REPOSITION: Final = 192
 _MM: Final = 11.132  # in 1e-7 degree
 #: mm: how far from its target it may stand, for all that its reports tell: half a metre, and its estimator's error
 _SAME_MM: Final = 2_000
-_ASKS: Final = frozenset({401, 511, 512})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE
+_REQUEST_MESSAGE, _HEARTBEAT = 512, 0
+_ASKS: Final = frozenset({401, 511, _REQUEST_MESSAGE})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
 _SET_MODE: Final = 176
 #: the modes of `_MODES` in which no target is reported
@@ -495,7 +496,9 @@ def _name(frame: Frame) -> str:
 
 
 def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[Failure], int | None]:
-    """From what a fallback follows from to its first frame: a turn of the loop, and what the mode's report takes."""
+    """From what a fallback follows from to its first frame: a turn of the loop, and what the mode's report takes, which
+    the autopilot may be slow to give.
+    """
     sent = [frame.sent_us for frame, _ in motion]
     found, latest = list[Failure](), None
     within_us = flown.wait_us + 2 * flown.tick_us
@@ -507,12 +510,26 @@ def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
                 continue  # nothing had to be sent, or could be
             took_us = first_us - reaction.heard_us
             latest = max(latest or 0, took_us)
-            if took_us > within_us + 2 * excuses.delay_us(reaction.heard_us, first_us, silences=True):
+            slow_us = _slow_mode_us(flown.frames, reaction.heard_us) if took_us > within_us else 0
+            if took_us > within_us + slow_us + 2 * excuses.delay_us(reaction.heard_us, first_us, silences=True):
                 text = (
                     f"a fallback took {took_us / 1e6:.3f} s to its first frame; {within_us / 1e6:.3f} s are the bound"
                 )
                 found.append(Failure("late", first_us, text, took_us))
     return found, latest
+
+
+def _slow_mode_us(frames: Sequence[Frame], from_us: int) -> int:
+    """How long the autopilot, from then on, has the question for its mode that it answers next."""
+    for frame in frames:
+        if frame.heard_us is not None and (frame.obeyed_us or 0) > from_us and _asks_for_mode(frame.octets):
+            return (frame.obeyed_us or 0) - max(frame.heard_us, from_us)
+    return 0
+
+
+def _asks_for_mode(octets: bytes) -> bool:
+    message = dialect.MAVLink(None).decode(bytearray(octets))
+    return getattr(message, "command", None) == _REQUEST_MESSAGE and message.param1 == _HEARTBEAT
 
 
 def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:

@@ -132,8 +132,9 @@ class _Watched(Simulation):
         self.samples: list[Sample] = []
         self.frames: list[Frame] = []
         self._sent: dict[bytes, int] = {}  # the number of the last frame of these octets
+        self._come: dict[bytes, int] = {}  # and of what the autopilot has not got to
         self._due_us = 0
-        self.heard = self._hear
+        self.heard, self.obeyed = self._hear, self._get_to
 
     def send(self, frame: bytes) -> bool:
         """Note that a frame is sent; that none is lost by us."""
@@ -144,7 +145,13 @@ class _Watched(Simulation):
     def _hear(self, at_us: int, frame: bytes) -> None:
         number = self._sent.pop(frame, None)
         if number is not None:
+            self._come[frame] = number
             self.frames[number] = self.frames[number]._replace(heard_us=at_us)
+
+    def _get_to(self, at_us: int, frame: bytes) -> None:
+        number = self._come.pop(frame, None)
+        if number is not None:
+            self.frames[number] = self.frames[number]._replace(obeyed_us=at_us)
 
     def advance(self, to_us: int) -> list[bytes]:
         """As the simulation does it, and no sample is left out."""

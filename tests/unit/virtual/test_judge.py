@@ -476,14 +476,22 @@ def test_two_commands_at_one_moment() -> None:
 def test_a_late_fallback(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
-    def reacts(in_us: int, *happened: Fault) -> Judgement:
+    def reacts(in_us: int, *happened: Fault, questions: tuple[Frame, ...] = ()) -> Judgement:
         reaction = Reaction(frame.sent_us - in_us, frame.sent_us)
         life = replace(good.lives[0], reactions=(reaction,))
         incidents = tuple(Happened(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
-        return judge(replace(good, lives=(life,), happened=incidents))
+        return judge(replace(good, lives=(life,), happened=incidents, frames=(*questions, *good.frames)))
+
+    def asked(came_us: int, obeyed_us: int | None, message: int = 0) -> Frame:
+        return Frame(frame.sent_us - S, frame.sent_us - came_us, long(512, message), obeyed_us)
 
     assert slugs(reacts(100_000)) == []
     assert reacts(100_000).margins.stop_us == 100_000
+    assert slugs(reacts(S, questions=(asked(900_000, frame.sent_us),))) == []
+    assert slugs(reacts(S, questions=(asked(800_000, frame.sent_us),))) == ["late"]  # it came late
+    assert slugs(reacts(S, questions=(asked(900_000, frame.sent_us - S),))) == ["late"]  # answered before
+    assert slugs(reacts(S, questions=(asked(900_000, frame.sent_us, 33),))) == ["late"]  # something else was asked
+    assert slugs(reacts(S, questions=(asked(900_000, None),))) == ["late"]
     assert slugs(reacts(S)) == ["late"]
     assert causes(reacts(S, faults.LinkSilence(2 * S))) == [] == slugs(reacts(S, faults.LinkDelay(2 * S, S)))
 

@@ -19,8 +19,9 @@
    one message: the measures that are in force (4 octets, isolation.h), the name of the link's key (8), and the public halves of the
    log's key and of its own (32 each), zeros for keys that it does not have, and whether it decides by a clock of its own (1). Where it
    does not begin, that message is the octet that it ends with: 64 for a wrong command line, 65 where the root is not to be trusted, 66
-   where the link's key is none, 72 where a file is missing or others may look into its folder, 74 where its file cannot be read or
-   written, 75 where another boundary holds that file, 78 where it is damaged. It ends with 0 when the socket is closed. */
+   where the link's key is none, 72 where a file is missing or cannot be read, or others may look into its
+   folder, 74 where its file cannot be read or written, 75 where another boundary holds that file, 78 where it is damaged. It ends
+   with 0 when the socket is closed. */
 #define _GNU_SOURCE
 #include "isolation.h"
 
@@ -114,15 +115,22 @@ static int read_options(int count, char **words, options *given) {
     return given->socket >= 0 && (given->measures || given->folder != NULL || handed);
 }
 
-/* A regular file of a folder, to be read; -1 where there is none. */
+/* A regular file of a folder, to be read; -1 where there is none, and `errno` is ENOENT where nothing at all has that name. */
 static int open_file(int folder, const char *name) {
     struct stat found;
     int file = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (file >= 0 && (fstat(file, &found) != 0 || !S_ISREG(found.st_mode))) {
         close(file);
+        errno = EINVAL;
         return -1;
     }
     return file;
+}
+
+/* The same of one that may be missing. False where it is there and cannot be read: nobody goes on as if there were no such key. */
+static int open_if_there(int folder, const char *name, int *file) {
+    *file = open_file(folder, name);
+    return *file >= 0 || errno == ENOENT;
 }
 
 static size_t read_all(int file, void *into, size_t most) {
@@ -150,8 +158,8 @@ static int open_folder(options *given) {
     if (folder < 0 || keys < 0 || fstat(folder, &found) != 0 || found.st_uid != geteuid() || (found.st_mode & 077) != 0) return MISSING;
     given->root = open_file(folder, "root.trust");
     given->log_key = open_file(keys, "log.seed");
-    given->boundary_key = open_file(keys, "boundary.seed");
-    given->link_key = open_file(keys, "link.key");
+    if (!open_if_there(keys, "boundary.seed", &given->boundary_key) || !open_if_there(keys, "link.key", &given->link_key))
+        return MISSING;
     int pinned = open_file(folder, "root.pin");
     if (given->root < 0 || given->log_key < 0 || pinned < 0) return MISSING;
     (void)read_all(pinned, pin, sizeof pin - 1);
@@ -382,8 +390,12 @@ static int begin(options *given, rt_keys *keys, uint32_t *measures) {
         *measures |= RT_OWN_USER;
     *measures |= rt_isolate(given->user, given->group);
     static uint8_t pin[RT_KEY_BYTES];
+    const uint32_t pinned =
+        given->pin == NULL ? 0 : from_hex((const uint8_t *)given->pin, strlen(given->pin), pin, sizeof pin);
+    if (given->folder != NULL && pinned == 0)
+        return UNTRUSTED; /* without a pin any development root would do */
     const rt_setup setup = {
-        keys, kept, root_bytes, {pin, given->pin == NULL ? 0 : from_hex((const uint8_t *)given->pin, strlen(given->pin), pin, sizeof pin)},
+        keys, kept, root_bytes, {pin, pinned},
         {(const uint8_t *)given->vehicle, (uint32_t)strlen(given->vehicle)}, given->link_key >= 0, given->boundary_key >= 0,
         given->log_key >= 0, meant, left,
         {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};

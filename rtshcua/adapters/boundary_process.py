@@ -76,7 +76,15 @@ _ENDED: Final = {
     64: "its command line or a key of it is wrong",
     _UNTRUSTED: "it does not trust the trust root",
     _NO_KEY: "its link key is none",
-    _MISSING: "a file of its folder is missing, or others may look into that folder",
+    _MISSING: "a file of its folder is missing or cannot be read, or others may look into that folder",
+}
+#: what to look at, of a boundary that listens
+_ENDED_HELP: Final = {
+    64: "`log.seed` and `boundary.seed` of its folder: 64 hexadecimal digits each",
+    _UNTRUSTED: "`root.trust` and `root.pin` of its folder; `rtshcua keys provision` writes both",
+    _NO_KEY: "`link.key` of its folder: 64 hexadecimal digits",
+    _MISSING: "its user's folder, mode 0700, of the vehicle's identity: `root.trust`, `root.pin`, `log.seed`; no links",
+    _IO: "`chown -R` its folder to its user, or make room",
 }
 _DAMAGED_HELP: Final = "docs/flying/isolation.md says what to do"
 
@@ -233,7 +241,8 @@ class ListeningBoundary(_Connected):
             return None
         if len(greeting) > 1:
             raise BoundaryError("not-begun", f"the boundary at `{path}` is of another release")
-        raise _unbegun(greeting[0], f"what the boundary at `{path}` keeps")
+        code = greeting[0]
+        raise _unbegun(code, f"what the boundary at `{path}` keeps", _ENDED_HELP.get(code, ""))
 
 
 class BoundaryProcess(_Connected):
@@ -351,12 +360,14 @@ class BoundaryProcess(_Connected):
         raise _unbegun(code, f"`{kept}`")
 
 
-def _unbegun(code: int, kept: str) -> BoundaryError:
-    """Why a boundary does not begin, by the code that its program ends with; `kept` names what it keeps."""
+def _unbegun(code: int, kept: str, help: str = "") -> BoundaryError:
+    """Why a boundary does not begin, by the code that its program ends with; `kept` names what it keeps, `help` what
+    to look at.
+    """
     if code == _DAMAGED:
         text = f"{kept} is damaged: which bundles the boundary has opened is not known"
         return BoundaryError("damaged", text, _DAMAGED_HELP)
     if code == _IO:
-        return BoundaryError("not-kept", f"{kept} cannot be read or written, or its disk is full")
+        return BoundaryError("not-kept", f"{kept} cannot be read or written, or its disk is full", help)
     text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
-    return BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text)
+    return BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text, help)

@@ -185,8 +185,37 @@ def test_it_does_not_believe_a_time_that_is_made_up(provisioned: Provisioned) ->
 
 @pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed"])
 def test_a_missing_file(provisioned: Provisioned, name: str) -> None:
+    """It is named among what to look at."""
     (provisioned.made.own / name).unlink()
-    assert provisioned.why_not() == "not-begun"
+    with pytest.raises(BoundaryError) as refused:
+        ListeningBoundary(provisioned.socket)
+    assert refused.value.slug == "not-begun"
+    assert f"`{name}`" in refused.value.help
+
+
+@pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed", "boundary.seed", "link.key"])
+def test_a_file_that_is_there_and_cannot_be_read(provisioned: Provisioned, name: str) -> None:
+    """A link key that is not read would leave the vehicle with one that signs nothing."""
+    place = provisioned.made.own / name
+    kept = place.read_bytes()
+    place.rename(place.with_name("elsewhere"))
+    place.symlink_to("elsewhere")
+    assert provisioned.why_not() == "not-begun", "a link is not followed"
+    for make in (Path.mkdir, os.mkfifo):
+        place.rmdir() if place.is_dir() and not place.is_symlink() else place.unlink()
+        make(place)
+        assert provisioned.why_not() == "not-begun", make
+    place.unlink()
+    place.write_bytes(kept)
+    place.chmod(0)
+    assert provisioned.why_not() == "not-begun", "its user may not read it"
+
+
+@pytest.mark.parametrize("octets", [b"", b"\n", b"no key\n", b"5a" * 600, b" " * 200])
+def test_a_pin_that_is_none(provisioned: Provisioned, octets: bytes) -> None:
+    """A development root is not trusted for want of one."""
+    provisioned.put("root.pin", octets)
+    assert provisioned.why_not() == "untrusted"
 
 
 def test_files_that_do_not_serve(provisioned: Provisioned) -> None:

@@ -166,6 +166,7 @@ static int open_folder(options *given) {
     given->pin = pin;
     given->kept = openat(folder, "kept", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
     if (given->kept < 0 || fstat(given->kept, &found) != 0 || !S_ISREG(found.st_mode)) return IO;
+    if (found.st_size == 0 && fsync(folder) != 0) return IO; /* its name too outlives a power failure */
     return flock(given->kept, LOCK_EX | LOCK_NB) == 0 ? FINE : errno == EWOULDBLOCK ? IN_USE : IO;
 }
 
@@ -452,7 +453,10 @@ int main(int count, char **words) {
             if (!rt_end_with(runtime))
                 return IO;
         }
-        if (!give_time(CALL_S) || send(given.socket, result, answered, 0) != (ssize_t)answered)
+        if (!give_time(CALL_S))
+            return IO;
+        /* where nobody is there any more, the next `recv` says so */
+        if (send(given.socket, result, answered, MSG_NOSIGNAL) != (ssize_t)answered && errno != EPIPE && errno != ECONNRESET)
             return IO;
     }
 }

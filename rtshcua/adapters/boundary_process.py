@@ -19,7 +19,7 @@ from typing import Final
 from urllib.parse import quote
 
 from rtshcua.adapters.files.signing import no_link_key, open_link_key
-from rtshcua.adapters.store.writing import PRIVATE_FOLDER, lock, make_folder
+from rtshcua.adapters.store.writing import PRIVATE_FOLDER, lock, make_folder, sync_folder
 from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 from rtshcua.wire.keys import PUBLIC_BYTES
 
@@ -334,6 +334,8 @@ class BoundaryProcess(_Connected):
                     text = f"another run's boundary holds what is kept of `{vehicle}`"
                     raise BoundaryError("in-use", text, "wait until that run is over") from None
                 time.sleep(0.02)
+        if os.fstat(kept).st_size == 0:
+            sync_folder(place.parent)  # its name too outlives a power failure
         yield "--kept", kept
         for name, data in given.items():
             if data is not None:

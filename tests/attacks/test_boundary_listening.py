@@ -25,7 +25,7 @@ from rtshcua.cli import isolating
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.isolated import ENFORCE, LOST, SEAL, Caller
+from rtshcua.onboard.enforcement.isolated import ENFORCE, LOAD, LOST, SEAL, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.wire.keys import Duty
 from virtual import case
@@ -61,11 +61,11 @@ class Provisioned:
         path.write_bytes(octets)
         path.chmod(0o600)
 
-    def load(self, process: ListeningBoundary) -> Loaded | Refusal:
+    def load(self, process: ListeningBoundary, caller: Caller | None = None) -> Loaded | Refusal:
         return load(
             shipped("short", self.issued), root=self.root, vehicle=VEHICLE, now=now(), mode=Mode.PROCESS,
             session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False,
-            caller=Caller(process.call, signs=True),
+            caller=caller or Caller(process.call, signs=True),
         )  # fmt: skip
 
     def why_not(self) -> str:
@@ -216,6 +216,29 @@ def test_a_pin_that_is_none(provisioned: Provisioned, octets: bytes) -> None:
     """A development root is not trusted for want of one."""
     provisioned.put("root.pin", octets)
     assert provisioned.why_not() == "untrusted"
+
+
+def test_a_runtime_that_is_gone_before_it_is_answered(provisioned: Provisioned) -> None:
+    """The bundle is given back, for nothing was sent of it."""
+    process = ListeningBoundary(provisioned.socket)
+    (halted,) = provisioned.made.boundaries()
+
+    def call(octets: bytes) -> bytes:
+        if octets[0] == LOAD:
+            os.kill(halted, signal.SIGSTOP)
+            process._socket.send(octets)
+            process.close()
+            os.kill(halted, signal.SIGCONT)
+            return b""
+        return process.call(octets)
+
+    provisioned.load(process, Caller(call, signs=True))
+    provisioned.made.await_gone(3)
+    again = ListeningBoundary(provisioned.socket)
+    caller = Caller(again.call, signs=True)
+    assert isinstance(provisioned.load(again, caller), Loaded)
+    assert not caller.reopened
+    again.close()
 
 
 def test_files_that_do_not_serve(provisioned: Provisioned) -> None:

@@ -99,13 +99,16 @@ class Excuses:
 
     def delay_us(self, from_us: int, to_us: int, *, silences: bool = False) -> int:
         """How much later than on a good link something may have come between two moments, in one direction: what the
-        link adds, or holds back, and how long nobody read. With `silences` also how long nothing came at all.
+        link adds, or holds back, and how long nobody read. With `silences` also how long nothing came at all. A link
+        keeps the order: what comes after a delay is over waits for what was sent before.
         """
         total = 0
+        for each in self._happened:
+            match each.fault:
+                case faults.LinkDelay(delay_us=added_us) | faults.LinkJitter(jitter_us=added_us) if each.at_us <= to_us:
+                    total += max(0, min(added_us, _ends_us(each) + added_us - from_us))
         for fault in self._during(from_us, to_us):
             match fault:
-                case faults.LinkDelay(delay_us=added_us) | faults.LinkJitter(jitter_us=added_us):
-                    total += added_us
                 case faults.StaleSource(delay_us=added_us):
                     total += added_us
                 case faults.LinkReorder():

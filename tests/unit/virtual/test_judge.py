@@ -372,6 +372,10 @@ def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
     assert taken(2 * S).margins.takeover_us == 2 * S
     assert not is_late(taken(200_000))
     assert not is_late(taken(2 * S, faults.LinkDelay(S, 2 * S)))
+    over_us = frame.sent_us - 3 * S  # a second before the takeover, which waits behind what the delay holds
+    assert not is_late(taken(2 * S, faults.LinkDelay(over_us - S, 3 * S, S)))
+    assert is_late(taken(2 * S, faults.LinkDelay(over_us - S, 2 * S, S)))  # it arrives a second after, not two
+    assert is_late(taken(2 * S, faults.LinkDelay(over_us - 3 * S, 3 * S, S)))
     assert not is_late(taken(2 * S, faults.LinkSilence(S, held=True)))
     assert is_late(taken(2 * S, faults.LinkSilence(S)))  # nothing comes later than it is
     assert is_late(taken(2 * S, faults.PilotPause(S)))  # that shows on PX4

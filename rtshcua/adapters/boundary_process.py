@@ -31,6 +31,8 @@ ANSWER_S: Final = 1.0
 AGAIN_S: Final = 0.2
 #: and how long the boundary of a run that was killed may take to write what it keeps, and end
 ENDING_S: Final = 2.0
+#: and one that listens: where it hangs, the kernel ends it 3 s after its last sign of life, and nobody else may
+LISTENING_ENDING_S: Final = 5.0
 _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
 _BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
 #: how often one that listens is asked again, in s: each time is a line of systemd's journal
@@ -196,12 +198,11 @@ class ListeningBoundary(_Connected):
     """A boundary that somebody else starts for whoever connects to the socket at `path`; until `close`.
 
     It ends when that connection does: one that hangs is ended by the kernel (boundary/home/process.c), for a run may
-    not end what another user runs. One that is ending, or that another run has, is waited for as long as one that we
-    start. Raises BoundaryError.
+    not end what another user runs. One that is ending, or that another run has, is waited for. Raises BoundaryError.
     """
 
     def __init__(self, path: Path) -> None:
-        until_s = time.monotonic() + ENDING_S
+        until_s = time.monotonic() + LISTENING_ENDING_S
         while (greeting := self._greeted(path)) is None:
             if time.monotonic() > until_s:
                 text = f"another run has the boundary at `{path}`, or its program does not start"

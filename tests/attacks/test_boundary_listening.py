@@ -76,7 +76,7 @@ class Provisioned:
 
 @pytest.fixture
 def provisioned(monkeypatch: pytest.MonkeyPatch) -> Iterator[Provisioned]:
-    monkeypatch.setattr(boundary_process, "ENDING_S", 0.2)
+    monkeypatch.setattr(boundary_process, "LISTENING_ENDING_S", 0.2)
     with listening() as made:
         yield Provisioned(made)
 
@@ -167,6 +167,16 @@ def test_one_that_is_halted_ends(provisioned: Provisioned, pending: bool) -> Non
     assert isinstance(provisioned.load(again), Loaded)
     again.close()
     process.close()
+
+
+def test_one_that_hangs_is_waited_for(provisioned: Provisioned, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that is begun again at once finds it serving: on a link with a key nothing else brings the vehicle down."""
+    monkeypatch.undo()
+    process = ListeningBoundary(provisioned.socket)
+    (halted,) = provisioned.made.boundaries()
+    os.kill(halted, signal.SIGSTOP)
+    process.close()
+    ListeningBoundary(provisioned.socket).close()
 
 
 def test_it_does_not_believe_a_time_that_is_made_up(provisioned: Provisioned) -> None:

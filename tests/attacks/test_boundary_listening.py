@@ -169,6 +169,38 @@ def test_one_that_is_halted_ends(provisioned: Provisioned, pending: bool) -> Non
     process.close()
 
 
+def test_descriptors_that_are_sent_along_are_not_taken(provisioned: Provisioned) -> None:
+    process = ListeningBoundary(provisioned.socket)
+    (pid,) = provisioned.made.boundaries()
+    given, other = os.pipe()
+    os.set_blocking(given, False)
+    try:
+        for _ in range(20):
+            socket.send_fds(process._socket, [b"\x14"], [other] * 100)
+            assert process._socket.recv(2_112)
+        os.close(other)
+        other = -1
+        assert os.read(given, 1) == b"", "nobody has the other end"
+    finally:
+        for each in (given, other):
+            if each >= 0:
+                os.close(each)
+    assert provisioned.made.boundaries() == [pid]
+    process.close()
+
+
+def test_a_runtime_that_reads_no_answer_ends_it(provisioned: Provisioned) -> None:
+    """Whoever fills the socket harms the boundary that it has, and the next one serves."""
+    process = ListeningBoundary(provisioned.socket)
+    process._socket.settimeout(0.5)
+    with suppress(TimeoutError):
+        while True:
+            process._socket.send(b"\x14")
+    provisioned.made.await_gone(6)
+    process.close()
+    ListeningBoundary(provisioned.socket).close()
+
+
 def test_one_that_hangs_is_waited_for(provisioned: Provisioned, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that is begun again at once finds it serving: on a link with a key nothing else brings the vehicle down."""
     monkeypatch.undo()

@@ -50,11 +50,13 @@ class Served:
         link = http.client.HTTPConnection("127.0.0.1", self.port, timeout=wait_s)
         try:
             all_headers = SPEAKS | {"Authorization": f"Bearer {self.token}"} | spelled(headers)
-            link.request(method, path, body=body if method == "POST" else None, headers=all_headers)
+            link.connect()
+            with suppress(ConnectionError):  # it may answer, and hang up, before it has read all of a request
+                link.request(method, path, body=body if method == "POST" else None, headers=all_headers)
             answer = link.getresponse()
             said = {name.lower(): value for name, value in answer.getheaders()}
             stream = method == "GET" and answer.status == 200
-            return answer.status, said, b"" if stream else answer.read()
+            return answer.status, said, b"" if stream else content(answer)
         finally:
             link.close()
 
@@ -76,7 +78,8 @@ class Served:
     def raw(self, data: bytes) -> bytes:
         """What comes back to these bytes, until it hangs up or has answered."""
         with self.dial() as link:
-            link.sendall(data)
+            with suppress(ConnectionError):  # as in `ask`
+                link.sendall(data)
             return first(link)
 
     def head(self, line: str = "POST /mcp HTTP/1.1", *headers: str) -> bytes:
@@ -96,6 +99,19 @@ class Served:
 
 def spelled(headers: dict[str, str]) -> dict[str, str]:
     return {name.replace("_", "-"): value for name, value in headers.items()}
+
+
+def content(answer: http.client.HTTPResponse) -> bytes:
+    """The body of an answer. Where the end of the connection ends it, this may be a reset: TCP sends one if the server
+    closes before it has read our body, behind the whole answer.
+    """
+    if answer.length is not None or answer.chunked:
+        return answer.read()
+    found = b""
+    with suppress(ConnectionResetError):
+        while more := answer.read1(65_536):
+            found += more
+    return found
 
 
 def first(link: socket.socket) -> bytes:

@@ -56,6 +56,8 @@ _SHORTEST = 12  # characters of a passphrase
 _MOST_WITNESSES = 16
 _KEY_ID = re.compile(r"[0-9a-f]{8,32}")
 _LINK_ID = re.compile(r"[0-9a-f]{16}")
+#: what the name of a socket and of its unit may be, unescaped and within the length of a socket's address
+_SERVED = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
 _ROLE = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,99}")
 _NO_PASSPHRASE = f"encrypted keys need a passphrase of {_SHORTEST} characters or more, typed alike"
 
@@ -191,6 +193,7 @@ def provision(
         Path | None, typer.Option(help="the key that the enforcement boundary signs with (the key store's)")
     ] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase of these keys")] = None,
+    as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Make the folder of a boundary that listens (`run --boundary-socket`): its keys, unlocked, and the trust root.
 
@@ -198,8 +201,13 @@ def provision(
     the user of the boundary, and these keys to nobody else aboard.
     """
     place = folder / vehicle
-    if vehicle in ("", ".", "..") or place.name != vehicle or not vehicle.isprintable():
-        return fail(ExitCode.USAGE, f"`{visible(vehicle)}` names no folder", "accepted: an identity without `/`")
+    if _SERVED.fullmatch(vehicle) is None:
+        text = f"`{visible(vehicle)}` names no socket that a boundary listens at"
+        return fail(
+            ExitCode.USAGE,
+            text,
+            "accepted: an identity of 1 to 80 letters, digits, `_`, `.` and `-`, not first `.` or `-`",
+        )
     if os.path.lexists(place):
         text = f"there is a folder `{place}` already"
         return fail(ExitCode.REFUSED, text, "what is kept there is of a vehicle that flies: move it away, or only copy")
@@ -228,11 +236,16 @@ def provision(
         for name, octets in seeds.items():
             write_new(fresh / name, octets.hex().encode() + b"\n", mode=PRIVATE_FILE)
         write_new(fresh / "root.trust", store.root(), mode=PRIVATE_FILE)
+    names = {"log_key": log.kid.hex(), "boundary_key": None if own is None else own.kid.hex()}
+    names["link_key"] = None if link is None else fingerprint(link)
+    if as_json:
+        out_json(json.dumps({"vehicle": vehicle, "folder": str(place), "trust_root": root.version, **names}))
+        return ExitCode.OK
     out(
         f"{place}: the boundary of `{vehicle}`, under trust root version {root.version}",
-        f"  log key        {log.kid.hex()}",
-        f"  boundary key   {'none: the trust root names none for it' if own is None else own.kid.hex()}",
-        f"  link key       {'none' if link is None else fingerprint(link)}",
+        f"  log key        {names['log_key']}",
+        f"  boundary key   {names['boundary_key'] or 'none: the trust root names none for it'}",
+        f"  link key       {names['link_key'] or 'none'}",
         "give it to the boundary's user: `chown -R rtshcua-boundary:` it, and keep these keys nowhere else aboard",
     )
     return ExitCode.OK

@@ -38,7 +38,7 @@ from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.log_signer import LogSigner
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
-from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, still_flies
+from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, obeys, still_flies
 from rtshcua.cli.past import Past
 from rtshcua.cli.qualified import record_of, unqualified
 from rtshcua.cli.refused import Refused as Refused
@@ -222,6 +222,7 @@ def _launch(order: Launch) -> ExitCode:
                 )  # fmt: skip
             assert past is not None
             resumed, refusal = _opened(order, loaded, vehicle, clock, events, owes=bool(debts.left))
+            _expect_obeyed(order, loaded, vehicle, clock, events, absent, resumed=resumed)
             _expect_current(lapsed, resumed=resumed)
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
@@ -418,6 +419,24 @@ def _keyless() -> Refused:
 
 def _why(absent: Refused | OSError) -> str:
     return words_of(absent) if isinstance(absent, OSError) else str(absent)
+
+
+def _expect_obeyed(
+    order: Launch, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event],
+    absent: Refused | OSError | None, *, resumed: bool,
+) -> None:  # fmt: skip
+    """A vehicle in the air that obeys nothing unsigned is not waited for where a boundary listens that has the key, and
+    does not serve: waiting would not begin it.
+    """
+    listens = order.boundary_socket
+    if not resumed or listens is None or isinstance(loaded.executor, IsolatedExecutor):
+        return
+    if obeys(vehicle, clock, events):
+        return
+    why = "it does not serve this run" if absent is None else _why(absent)
+    text = f"`{loaded.vehicle}` is in the air and answers nothing that is not signed; the boundary at `{listens}` has "
+    help = "begin this run again once the boundary serves, as systemd does; until then the pilot brings it down, or its"
+    raise Refused(ExitCode.REFUSED, "not-obeyed", f"{text}the key: {why}", f"{help} own failsafe for a lost link")
 
 
 def _expect_all(*missing: Refused | OSError | None, resumed: bool) -> None:

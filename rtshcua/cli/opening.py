@@ -18,6 +18,8 @@ from rtshcua.onboard.ports import Event, Opening
 
 #: How long word of whether the vehicle is in the air is waited for, in seconds.
 AIR_S: Final = 5.0
+#: and an answer to what is not signed.
+ANSWER_S: Final = 3.0
 _POLL_S: Final = 0.05
 _MEND: Final = "put `replay/` of the state folder right; without it, each bundle that has not expired opens again"
 
@@ -85,6 +87,16 @@ def still_flies(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]
     while not seen.landed_state and time.monotonic() < until_s:
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     return bool(seen.airborne or seen.armed)
+
+
+def obeys(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
+    """Whether the vehicle takes what is not signed, or answers, within `ANSWER_S`, what it is asked so. `events` get
+    what came meanwhile.
+    """
+    until_s = time.monotonic() + ANSWER_S
+    while vehicle.driver.keyless and time.monotonic() < until_s:
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    return not vehicle.driver.keyless
 
 
 def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -> None:

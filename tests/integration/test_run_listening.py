@@ -124,6 +124,25 @@ def test_what_is_in_the_air_comes_down_without_the_boundary(ground: Any, made: L
     assert aboard.verified(log)[0] == 4
 
 
+def test_a_vehicle_that_enforces_signing_is_not_waited_for_without_the_boundary(
+    ground: Any, made: Listening, port: int
+) -> None:
+    """Nothing that this run could send is obeyed: it ends, and one that is begun once the boundary is there does it."""
+    aboard = Aboard(ground, made, port, signed=True)
+    first = aboard.run()
+    first.until("dispatched", step=1)
+    first.signal(signal.SIGKILL)
+    assert first.process.wait() == -signal.SIGKILL
+    made.await_gone(1)
+    away = made.socket.rename(made.socket.with_name("away"))
+    without = aboard.run().end()
+    refused = without.events[-1]
+    assert (without.code, refused["slug"]) == (5, "not-obeyed"), without.stderr
+    assert str(made.socket) in refused["text"]
+    away.rename(made.socket)
+    assert aboard.run().end().code == 6
+
+
 def test_a_boundary_that_is_killed_in_flight(ground: Any, made: Listening, port: int) -> None:
     """What it signed ahead brings the vehicle down, which enforces signing."""
     aboard = Aboard(ground, made, port, signed=True)
@@ -235,16 +254,18 @@ def test_what_does_not_go_with_it(capsys: pytest.CaptureFixture[str]) -> None:
 def test_provisioning_is_whole_or_nothing(ground: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "boundaries"
     words = ["keys", "provision", str(folder), "--vehicle"]
-    for name in ("", ".", "..", "a/b", "/a", "a\n"):
+    for name in ("", ".", "..", "a/b", "/a", "a\n", "a b", "é", "a@b", ".a", "a" * 81):
         assert main([*words, name]) == 2, name
     assert main([*words, "quad-07", "--signing-key", str(tmp_path / "none")]) == 3
     assert not folder.exists() or not list(folder.iterdir())
-    assert main([*words, "quad-07"]) == 0
+    assert main([*words, "quad-07", "--json"]) == 0
+    said = capsys.readouterr().out
+    (told,) = map(json.loads, said.splitlines())
     own = folder / "quad-07"
+    assert (told["folder"], told["link_key"]) == (str(own), None)
     assert {each.name for each in own.iterdir()} == {"root.trust", "root.pin", "log.seed", "boundary.seed"}
     assert own.stat().st_mode & 0o777 == 0o700
     assert {each.stat().st_mode & 0o777 for each in own.iterdir()} == {0o600}
-    said = capsys.readouterr().out
     for name in ("log.seed", "boundary.seed"):
         assert (own / name).read_text().strip() not in said
     before = {each.name: each.read_bytes() for each in own.iterdir()}

@@ -176,6 +176,11 @@ class Driver:
         waits = self.other_kind or self.link.crowd or keyless or self.source.unready or mute or self.preflight.astray
         return waits or self.seen.unready or self.preflight.unready
 
+    @property
+    def keyless(self) -> bool:
+        """It signs what it sends, we cannot, and it answered nothing yet: what we send, it does not obey."""
+        return self._mute == KEYLESS and not self._watch.answers
+
     def overhear(self, datagram: bytes, now_us: int) -> None:
         """Take in a datagram of another sender than the vehicle's."""
         self.link.overhear(datagram, now_us)

@@ -66,6 +66,20 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
     "crash-ignored": (of("ardupilot", at(12, faults.Kill(0))), "went-on"),
     "judged-before-fresh": (of("px4", at(12, faults.LinkSilence(0, 4 * S))), "chain"),
 }  # fmt: skip
+
+
+def test_a_wrong_runtime_leaves_nothing_behind() -> None:
+    """What a process makes once and keeps was the wrong runtime's in the flights of the right one that came after."""
+    scenario, slug = SHOWN["landing-by-word"]
+    before = logs(flown(scenario))
+    assert slugs(wrongly("landing-by-word", scenario)) == {slug}
+    assert logs(flown(scenario)) == before
+
+
+def logs(was: ScenarioFlown) -> list[bytes]:
+    return [line for life in was.lives for line in life.lines]
+
+
 #: of which so many are flown at each `make test`
 SOME = ("recall-ignored", "dispatch-unwritten", "first-link-skipped", "hover-by-mode")
 

@@ -16,6 +16,7 @@ from unittest.mock import patch
 from msgspec.structs import replace
 
 from rtshcua.adapters import loop
+from rtshcua.adapters.ardupilot import flavour as ardupilot
 from rtshcua.adapters.px4 import flavour as px4
 from rtshcua.adapters.vehicle import driver, effects, flavour, manoeuvre, messages, source_time, supervision
 from rtshcua.adapters.vehicle.flavour import Stage
@@ -29,10 +30,13 @@ from rtshcua.onboard.enforcement import allow_list, executor, frames
 from rtshcua.onboard.ports import ClockStepped, Crashed
 from rtshcua.onboard.runtime import admission, controller, dispatcher, fallback, link, runtime, supervisor
 from rtshcua.wire import approval
+from rtshcua.wire.document import DocumentError
 from rtshcua.wire.request import FALLBACK_LINK, STEP
 
 Patch = tuple[object, str, Callable[[Any], Any]]
 _ALWAYS: Final = 1 << 62
+#: what is made once in a process, and of functions that a wrong runtime has others of
+_REMEMBERED: Final = (px4._coming_down, ardupilot._coming_down)
 
 
 class Aimed(NamedTuple):
@@ -64,8 +68,11 @@ class Wrong:
 
     @contextmanager
     def made(self) -> Iterator[None]:
-        """The runtime is wrong meanwhile."""
+        """The runtime is wrong meanwhile. What it remembers of a right one is forgotten, and the other way round."""
         with ExitStack() as stack:
+            for remembered in _REMEMBERED:
+                remembered.cache_clear()
+                stack.callback(remembered.cache_clear)
             for owner, name, broken in self.patches:
                 stack.enter_context(patch.object(owner, name, broken(vars(owner)[name])))
             yield
@@ -188,9 +195,12 @@ def _released_anew(of: Any) -> Any:
 
 
 def _taken_again(of: Any) -> Any:
-    def add(self: Any, answered: Any, now: Any) -> bool:
-        of(self, answered, now)
-        return True
+    def add(self: Any, answered: Any, now: Any) -> None:
+        try:
+            of(self, answered, now)
+        except DocumentError as error:
+            if error.slug != "already-answered":
+                raise
 
     return add
 

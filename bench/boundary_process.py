@@ -23,7 +23,7 @@ from rtshcua.adapters.boundary_process import BoundaryProcess
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.onboard.ports import Boundary, Dispatch
+from rtshcua.onboard.ports import Boundary, Command
 from rtshcua.wire.request import CONTINGENCY_LINK
 from rtshcua.wire.response import Answer, decode
 from virtual import case
@@ -64,7 +64,7 @@ def dispatched(of: Loaded, request: bytes) -> float:
     permit, taken = asked(of.boundary, request)
     begin = perf_counter_ns()
     sent = of.executor.dispatch(permit, START.monotonic_us)
-    assert isinstance(sent, Dispatch), sent
+    assert isinstance(sent, Command), sent
     return taken + (perf_counter_ns() - begin) / 1e3
 
 

@@ -79,7 +79,7 @@ class Timed(VirtualVehicle):
     def begin(self, command: Command, now_us: int) -> None:
         """Send, and take the time."""
         if self._free and isinstance(self.frames, FrameSession):
-            self.frames.open(command, now_us)
+            self.frames.open(replace(command, not_after_us=now_us))
         events, frames = self.driver.begin(command, now_us)
         for frame in frames:
             self.link.sendto(frame, self.address)

@@ -22,7 +22,7 @@ from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import WRITTEN
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Append, Dispatch
+from rtshcua.onboard.ports import Append, Command
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import RemainingLatency
 from rtshcua.onboard.runtime.journal import Journal
@@ -56,7 +56,7 @@ def one(of: Loaded, recorder: Recorder, file: EvidenceFile) -> tuple[int, ...]:
     assert answer is not None
     dispatch = of.executor.dispatch(answer.permit, START.monotonic_us)
     end = perf_counter_ns()
-    assert isinstance(dispatch, Dispatch)
+    assert isinstance(dispatch, Command)
     return decided - begin, appended - decided, end - appended, end - begin
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 from rtshcua.model.durability import BUFFERED, SYNCED_FIRST
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard import ports
-from rtshcua.onboard.ports import Action, Dispatch, Ending, Event
+from rtshcua.onboard.ports import Action, Command, Ending, Event
 
 #: The longest that the loop waits for the vehicle before it steps the runtime again, in us of its clock;
 WAIT_US = 50_000
@@ -22,7 +22,7 @@ HELD_WAIT_US = 300
 class Stepped(Protocol):
     """The runtime, as far as the loop knows it."""
 
-    def react(self, now: Now, events: Sequence[Event]) -> Dispatch | None:
+    def react(self, now: Now, events: Sequence[Event]) -> Command | None:
         """Take in these events; a command of those that follow that may be sent before all else."""
         ...
 
@@ -63,7 +63,7 @@ class RunLoop:
         self._wait_us = wait_us
         self._held_wait_us = min(wait_us, held_wait_us)
         self._prepares = prepares
-        self._held: tuple[Dispatch, _Record] | None = None  # a command, and the record that it is held for
+        self._held: tuple[Command, _Record] | None = None  # a command, and the record that it is held for
         self._lines = sink.kept  # that were given to the sink
         self._failed: int | None = None  # the sink refused something, when so many lines had been given to it
         self._answers: list[Event] = []
@@ -101,22 +101,22 @@ class RunLoop:
             self._answers.append(ports.Noted(self._clock.now().monotonic_us, late))
         if self._held is None:
             return
-        dispatch, record = self._held
+        command, record = self._held
         if reason is not None:
-            self._refuse(dispatch, ports.WITHHELD)
+            self._refuse(command, ports.WITHHELD)
         elif self._recorded(record):
-            self._send(dispatch)
-        elif self._clock.now().monotonic_us > dispatch.not_after_us:
-            self._refuse(dispatch, "late")
+            self._send(command)
+        elif self._clock.now().monotonic_us > command.not_after_us:
+            self._refuse(command, "late")
 
-    def _act(self, actions: Sequence[Action], sent: Dispatch | None) -> Ending | None:
+    def _act(self, actions: Sequence[Action], sent: Command | None) -> Ending | None:
         ending: Ending | None = None
         record: _Record | None = _Record(self._lines, BUFFERED)
         for action in actions:
             match action:
                 case ports.Append():
                     record = self._append(action, record)
-                case Dispatch():
+                case Command():
                     if action is not sent:
                         self._dispatch(action, record)
                 case ports.Release():
@@ -144,15 +144,15 @@ class RunLoop:
             return record
         return _Record(given, max(record.durability, append.durability))
 
-    def _dispatch(self, dispatch: Dispatch, record: _Record | None) -> None:
+    def _dispatch(self, command: Command, record: _Record | None) -> None:
         """Send a command, or hold it until its record is kept. The one that was held is replaced."""
         self._held = None
-        if dispatch.needs_record and record is None:
-            self._refuse(dispatch, ports.WITHHELD)
-        elif not dispatch.needs_record or record is None or self._recorded(record):
-            self._send(dispatch)
+        if command.needs_record and record is None:
+            self._refuse(command, ports.WITHHELD)
+        elif not command.needs_record or record is None or self._recorded(record):
+            self._send(command)
         else:
-            self._held = dispatch, record
+            self._held = command, record
 
     def _recorded(self, record: _Record) -> bool:
         """Whether a record is as durable as it must be before anything is sent on it."""
@@ -164,15 +164,15 @@ class RunLoop:
         self._failed = self._lines
         self._answers.append(ports.EvidenceFailed(self._clock.now().monotonic_us, reason))
 
-    def _send(self, dispatch: Dispatch) -> None:
+    def _send(self, command: Command) -> None:
         """Look at the clock again: what is late is not sent."""
         now_us = self._clock.now().monotonic_us
-        if now_us > dispatch.not_after_us:
-            self._refuse(dispatch, "late")
+        if now_us > command.not_after_us:
+            self._refuse(command, "late")
             return
         self._held = None
-        self._vehicle.begin(dispatch.command, now_us)
+        self._vehicle.begin(command, now_us)
 
-    def _refuse(self, dispatch: Dispatch, reason: str) -> None:
+    def _refuse(self, command: Command, reason: str) -> None:
         self._held = None
-        self._answers.append(ports.Failed(self._clock.now().monotonic_us, dispatch.command.token, reason))
+        self._answers.append(ports.Failed(self._clock.now().monotonic_us, command.token, reason))

@@ -187,13 +187,21 @@ class Noted(Event, frozen=True):
 # ---------------------------------------------------------------- commands and actions
 
 
+#: the `not_after_us` of what is never too late
+ALWAYS: Final = (1 << 63) - 1
+
+
 class Command(Frozen, frozen=True):
-    """One bounded manoeuvre for the vehicle adapter; it exists only beside a permit.
+    """One bounded manoeuvre for the vehicle adapter, to be sent: the executor checked its permit in the same step.
 
     `kind` is a `MotionKind`. `path` is x0, y0, ... in local mm (east, north of declared home) with `geo` the same
     points as latitude, longitude in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s (0: the vehicle's
     own default). A HOLD succeeds after `hold_us` of observed holding; with 0 it goes on until another command
     replaces it.
+
+    `needs_record`: it is held until every `Append` before it is kept, and not sent when one cannot be written
+    (`withheld`), or another command replaces it; a fallback goes out at once, and even then. Whoever sends it looks at
+    the clock again: after `not_after_us` it is not sent, and `Failed` with reason `late` says so.
     """
 
     token: int
@@ -204,6 +212,8 @@ class Command(Frozen, frozen=True):
     altitude: int
     speed: int
     hold_us: int = 0
+    needs_record: bool = False
+    not_after_us: int = ALWAYS
 
 
 class Ending(StrEnum):
@@ -221,26 +231,13 @@ class Ending(StrEnum):
     EVIDENCE_LOST = "evidence-lost"  # nothing could be recorded any more
 
 
-class Dispatch(Frozen, frozen=True):
-    """Send `command`; the permit was checked by the executor in the same step.
-
-    Whoever sends it looks at the clock again: after `not_after_us` it is not sent, and `Failed` with reason `late`
-    says so. `needs_record`: it is held until every `Append` before it is kept, and not sent when one cannot be written
-    (`withheld`), or another command replaces it; a fallback goes out at once, and even then.
-    """
-
-    command: Command
-    not_after_us: int
-    needs_record: bool
-
-
 class Release(Frozen, frozen=True):
     """Stand down: send nothing more that moves the vehicle."""
 
 
 class Append(Frozen, frozen=True):
     """Append one evidence line (with its newline), of a class of `evidence.durability`. Stands before every action that
-    depends on it. A `Dispatch` is held for those before it in its step that are `awaited`: for buffered ones not at
+    depends on it. A `Command` is held for those before it in its step that are `awaited`: for buffered ones not at
     all, for written and synced ones until they are written, for those that are synced first until they are on the disk.
     """
 
@@ -276,7 +273,7 @@ class End(Frozen, frozen=True):
     ending: Ending
 
 
-Action = Dispatch | Release | Append | Announce | Expect | Reply | End
+Action = Command | Release | Append | Announce | Expect | Reply | End
 
 
 # ---------------------------------------------------------------- the other side
@@ -321,11 +318,11 @@ class Boundary(Protocol):
 class Dispatching(Protocol):
     """What turns permits into what is sent: the boundary's executor, here or elsewhere. Times are monotonic, us."""
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
         """What to send for a permit, or why nothing is sent."""
         ...
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
         ...
 

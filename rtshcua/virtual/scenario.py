@@ -27,7 +27,7 @@ from rtshcua.model.scenario import Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import Loaded, Mode
 from rtshcua.onboard.left import left_by
-from rtshcua.onboard.ports import Action, BoundaryKey, Dispatch, Ending, Event, Presented, Readings
+from rtshcua.onboard.ports import Action, BoundaryKey, Command, Ending, Event, Presented, Readings
 from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
@@ -271,7 +271,7 @@ class _Flight:
         heard = tuple([Heard(event.at_us, event.values) for event in events if isinstance(event, Readings)])
         self._turns.append(Turn(now.monotonic_us - START.monotonic_us, heard))
         for action in actions:
-            if isinstance(action, Dispatch) and not action.needs_record:
+            if isinstance(action, Command) and not action.needs_record:
                 self._reactions.append(Reaction(self._heard_us, at_us))
         self._schedule(self._triggers.turned(now, events, actions, at_us))
         self._heard_us = at_us

@@ -17,7 +17,7 @@ from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import Owed
-from rtshcua.onboard.ports import BoundaryKey, Dispatch
+from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.permit import SIZE, open_permit
@@ -156,10 +156,10 @@ def _executed(executor: Executor, kind: int, rest: bytes) -> bytes | Refusal:
     return _NONE
 
 
-def _permitted(ref: tuple[int, int, int], dispatch: Dispatch | Refusal) -> bytes | Refusal:
-    if isinstance(dispatch, Refusal):
-        return dispatch
-    return _PERMITTED.pack(*ref, dispatch.command.token, dispatch.not_after_us)
+def _permitted(ref: tuple[int, int, int], command: Command | Refusal) -> bytes | Refusal:
+    if isinstance(command, Refusal):
+        return command
+    return _PERMITTED.pack(*ref, command.token, command.not_after_us)
 
 
 def _ahead(executor: Executor, rest: bytes) -> bytes | Refusal:

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from msgspec.structs import replace
+
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import Stages
 from rtshcua.mavlink.signing import Verifier
@@ -106,7 +108,7 @@ class VirtualVehicle:
     def begin(self, command: Command, now_us: int) -> None:
         """Start a command."""
         if isinstance(self.frames, FrameSession) and self._free:
-            self.frames.open(command, now_us + 10 * SECOND)
+            self.frames.open(replace(command, not_after_us=now_us + 10 * SECOND))
         events, frames = self.driver.begin(command, now_us)
         self._send(frames, events)
         self._pending += events

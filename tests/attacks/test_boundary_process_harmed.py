@@ -45,7 +45,7 @@ from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import FORGED, OUT_OF_TURN, USED
 from rtshcua.onboard.enforcement.isolated import BEGIN, ENFORCE, LOAD, MAX_PART, PART, PRESENT, STATEMENT, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.response import Answer, Status
 
 pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
@@ -100,7 +100,7 @@ def test_a_permit_of_another_session_sends_nothing(tmp_path: Path) -> None:
     second = Held(tmp_path)
     of = second.loaded()
     assert of.executor.dispatch(permit, AT_US) is FORGED
-    assert isinstance(of.executor.dispatch(allowed(of), AT_US), Dispatch)
+    assert isinstance(of.executor.dispatch(allowed(of), AT_US), Command)
     second.process.close()
 
 
@@ -109,11 +109,11 @@ def test_steps_are_sent_in_their_turn_alone(held: Held) -> None:
     assert answer_to(of, request_for(of, step=2)) is Status.NOT_CURRENT
     first = allowed(of)
     second = allowed(of, step=1)
-    assert isinstance(of.executor.dispatch(first, AT_US), Dispatch)
+    assert isinstance(of.executor.dispatch(first, AT_US), Command)
     assert of.executor.dispatch(second, AT_US) is OUT_OF_TURN, "the first one runs"
     assert of.executor.dispatch(first, AT_US) is USED
     of.executor.ended()
-    assert isinstance(of.executor.dispatch(second, AT_US), Dispatch)
+    assert isinstance(of.executor.dispatch(second, AT_US), Command)
 
 
 def test_two_runtimes_at_one_socket_get_no_more_than_one(held: Held) -> None:
@@ -211,7 +211,7 @@ def test_no_path_keeps_an_answer_from_coming_in_time(tmp_path: Path) -> None:
         answer = answer_to(flown, request_for(flown, step=step))
         assert isinstance(answer, Answer), answer
         assert answer.outcome is Outcome.ALLOW
-        assert isinstance(flown.executor.dispatch(answer.permit, AT_US), Dispatch)
+        assert isinstance(flown.executor.dispatch(answer.permit, AT_US), Command)
         flown.executor.ended()
     assert not held.caller.lost
     held.process.close()
@@ -235,7 +235,7 @@ def up_to(held: Held, point: str) -> Loaded | None:
     if of is not None and number >= 4:
         permit = allowed(of)
         if number >= 5:
-            assert isinstance(of.executor.dispatch(permit, AT_US), Dispatch)
+            assert isinstance(of.executor.dispatch(permit, AT_US), Command)
         if number >= 6:
             of.executor.ended()
     return of
@@ -376,7 +376,7 @@ def test_put_back_to_what_it_was_its_file_forgets_what_was_opened(tmp_path: Path
     first = Held(tmp_path)
     of = first.loaded()
     permit = allowed(of)
-    assert isinstance(of.executor.dispatch(permit, AT_US), Dispatch)
+    assert isinstance(of.executor.dispatch(permit, AT_US), Command)
     first.process.close()
     path.write_bytes(before)
     second = Held(tmp_path)

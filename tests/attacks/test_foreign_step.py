@@ -8,7 +8,7 @@ from reference.world import START, allowed, answer_to, loaded, request_for
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import BACKWARDS, MISSION_OVER, OUT_OF_TURN
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.response import Answer, Status, decode
 from virtual.rows import rows
 
@@ -58,7 +58,7 @@ def test_a_step_out_of_turn_is_not_sent() -> None:
     of = loaded()
     first = allowed(of)
     second = allowed(of, step=1)
-    assert isinstance(of.executor.dispatch(second, AT), Dispatch)
+    assert isinstance(of.executor.dispatch(second, AT), Command)
     assert of.executor.dispatch(first, AT) is OUT_OF_TURN, "behind the one that runs"
     of.executor.ended()
     assert of.executor.dispatch(first, AT) is OUT_OF_TURN, "and behind the one that ran"
@@ -68,7 +68,7 @@ def test_two_steps_never_run_at_once() -> None:
     of = loaded()
     first = allowed(of)
     second = allowed(of, step=1)
-    assert isinstance(of.executor.dispatch(first, AT), Dispatch)
+    assert isinstance(of.executor.dispatch(first, AT), Command)
     assert of.executor.dispatch(second, AT) is OUT_OF_TURN
 
 
@@ -78,12 +78,12 @@ def test_no_step_follows_a_return_that_a_fallback_began() -> None:
     second = allowed(of, step=1)
     of.executor.dispatch(first, AT)
     home = allowed(of, 2, -1, 1)
-    assert isinstance(of.executor.dispatch(home, AT), Dispatch)
+    assert isinstance(of.executor.dispatch(home, AT), Command)
     assert of.executor.dispatch(second, AT) is MISSION_OVER
     hold = allowed(of, 2, -1, 0)
     assert of.executor.dispatch(hold, AT) is BACKWARDS
     again = allowed(of, 2, -1, 1)
-    assert isinstance(of.executor.dispatch(again, AT), Dispatch), "the same link may be tried again"
+    assert isinstance(of.executor.dispatch(again, AT), Command), "the same link may be tried again"
     chain = allowed(of, 1, 1, 0)
     assert of.executor.dispatch(chain, AT) is BACKWARDS, "from the contingency there is no way back"
 
@@ -94,10 +94,10 @@ def test_a_chain_never_goes_backwards() -> None:
     allowed(of, step=1)
     permits = {link: allowed(of, 1, 1, link) for link in range(3)}
     earlier = allowed(of, 1, 1, 0)
-    assert isinstance(of.executor.dispatch(permits[1], AT), Dispatch)
+    assert isinstance(of.executor.dispatch(permits[1], AT), Command)
     assert of.executor.dispatch(permits[0], AT) is BACKWARDS
     assert of.executor.dispatch(earlier, AT) is BACKWARDS
-    assert isinstance(of.executor.dispatch(permits[2], AT), Dispatch)
+    assert isinstance(of.executor.dispatch(permits[2], AT), Command)
 
 
 def test_a_hold_may_be_left_for_the_step_that_it_waited_for() -> None:
@@ -108,8 +108,8 @@ def test_a_hold_may_be_left_for_the_step_that_it_waited_for() -> None:
     second = allowed(of, step=1)
     for _ in range(2):
         hold = allowed(of, 2, -1, 0)
-        assert isinstance(of.executor.dispatch(hold, AT), Dispatch)
-    assert isinstance(of.executor.dispatch(second, AT), Dispatch)
+        assert isinstance(of.executor.dispatch(hold, AT), Command)
+    assert isinstance(of.executor.dispatch(second, AT), Command)
 
 
 ONE = loaded()

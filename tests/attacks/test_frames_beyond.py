@@ -33,7 +33,7 @@ def gate(autopilot: int, kind: MotionKind, *path: tuple[int, int]) -> FrameSessi
     made.observe(says(mavlink.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3)))
     made.observe(at(*A))
     geo = tuple(part for point in path for part in point)
-    made.open(Command(7, "skill", kind, geo, geo, 20_000, 0), 2 * AT)
+    made.open(Command(7, "skill", kind, geo, geo, 20_000, 0, not_after_us=2 * AT))
     return made
 
 
@@ -72,7 +72,7 @@ def test_home_may_drift_a_little_and_be_settled_anew_by_the_next_takeoff() -> No
         home = HOME + times * HOME_MOVES
         opened.observe(at(*A, home=home))
         assert isinstance(opened.seal(takeoff((home + 20_000) / 1_000), AT), bytes)
-        opened.open(Command(8, "takeoff", MotionKind.CLIMB, (), (), 20_000, 0), 2 * AT)
+        opened.open(Command(8, "takeoff", MotionKind.CLIMB, (), (), 20_000, 0, not_after_us=2 * AT))
 
 
 @pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4])
@@ -93,7 +93,7 @@ def test_no_corner_is_cut_by_sending_the_whole_path_at_once(autopilot: int) -> N
 def test_who_never_says_where_it_is_is_sent_to_the_first_point_alone() -> None:
     opened = FrameSession()
     opened.observe(says(mavlink.MAVLink_heartbeat_message(2, ARDUPILOT, 0, 0, 0, 3)))
-    opened.open(Command(7, "skill", MotionKind.COVER, (), (*A, *B), 20_000, 0), 2 * AT)
+    opened.open(Command(7, "skill", MotionKind.COVER, (), (*A, *B), 20_000, 0, not_after_us=2 * AT))
     assert isinstance(opened.seal(target(ARDUPILOT, A), AT), bytes)
     assert opened.seal(target(ARDUPILOT, B), AT) is OUT_OF_ORDER
 

@@ -8,7 +8,7 @@ from reference.world import SESSION_KEY, START, allowed, loaded
 from rtshcua.codec.frames import Codec
 from rtshcua.onboard.enforcement.frames import FORCED_ARMING, OURS
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.permit import open_permit
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
 from virtual.rows import rows
@@ -53,7 +53,7 @@ def test_a_forged_permit_lets_nothing_out(bit: int) -> None:
 
 def test_a_permit_lets_out_its_own_command() -> None:
     of = heard()
-    assert isinstance(of.executor.dispatch(allowed(of), AT), Dispatch)
+    assert isinstance(of.executor.dispatch(allowed(of), AT), Command)
     assert out(of) == {ARM, GUIDED}, "a take-off"
 
 
@@ -89,7 +89,7 @@ def test_a_standing_permit_lets_out_its_link_and_not_the_step_any_more() -> None
     of = heard()
     step = allowed(of)
     of.executor.dispatch(step, AT)
-    assert isinstance(of.executor.stand_in(step, CONTINGENCY_LINK, 2, AT + S), Dispatch)
+    assert isinstance(of.executor.stand_in(step, CONTINGENCY_LINK, 2, AT + S), Command)
     assert out(of, AT + S) == {LAND}
 
 
@@ -98,13 +98,13 @@ def test_what_ended_lets_nothing_out_and_what_was_replaced_ends_nothing() -> Non
     step = allowed(of)
     first = of.executor.dispatch(step, AT)
     second = of.executor.stand_in(step, FALLBACK_LINK, 0, AT)
-    assert isinstance(first, Dispatch)
-    assert isinstance(second, Dispatch)
+    assert isinstance(first, Command)
+    assert isinstance(second, Command)
     permitted = out(of)
     assert permitted
-    of.executor.ended(first.command.token)
+    of.executor.ended(first.token)
     assert out(of) == permitted
-    of.executor.ended(second.command.token)
+    of.executor.ended(second.token)
     assert out(of) == set()
 
 

@@ -13,7 +13,7 @@ from rtshcua.onboard.enforcement.frames import NOT_DOWN as FRAME_NOT_DOWN
 from rtshcua.onboard.enforcement.frames import NOT_LISTED, OURS
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import MALFORMED, NOT_AS_BEFORE, NOT_CONFIGURED, VALID_US, Owed
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode, open_preparation, seal
 from virtual.rows import rows
 
@@ -139,7 +139,7 @@ def test_a_permit_of_another_session_lets_nothing_out() -> None:
     assert opened is not None
     assert of.executor.prepare(seal(opened, bytes(32)), AT) is FORGED
     assert of.executor.prepare(allowed(of), AT) is FORGED, "nor does one for a step"
-    assert not isinstance(of.executor.dispatch(permit(of), AT), Dispatch), "nor this one for a step"
+    assert not isinstance(of.executor.dispatch(permit(of), AT), Command), "nor this one for a step"
 
 
 @pytest.mark.parametrize(("landed", "armed"), [(IN_AIR, True), (IN_AIR, False), (ON_GROUND, True), (0, False)])
@@ -157,7 +157,7 @@ def test_nothing_is_set_while_a_command_is_under_way() -> None:
     of = prepares({"FENCE_RADIUS": 300.0})
     early = permit(of)
     of.executor.prepare(early, AT)
-    assert isinstance(of.executor.dispatch(allowed(of), AT), Dispatch)
+    assert isinstance(of.executor.dispatch(allowed(of), AT), Command)
     assert sent(of, 300.0) is NOT_LISTED
     assert of.executor.prepare(permit(of), AT) is NOT_DOWN, "though it has not left the ground yet"
 

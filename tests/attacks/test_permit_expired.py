@@ -5,7 +5,7 @@ import pytest
 from reference.flat_case import S
 from reference.world import SESSION_KEY, START, allowed, loaded
 from rtshcua.onboard.enforcement.executor import FORGED, LAPSED, LATE, NOT_COVERED
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.permit import open_permit
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
 
@@ -20,7 +20,7 @@ def test_a_late_step_is_not_sent() -> None:
     assert AT < opened.not_after_us <= AT + 2 * S, "at most the deadline"
     assert of.executor.dispatch(permit, opened.not_after_us + 1) is LATE
     dispatch = of.executor.dispatch(permit, opened.not_after_us)
-    assert isinstance(dispatch, Dispatch)
+    assert isinstance(dispatch, Command)
     assert dispatch.not_after_us == opened.not_after_us, "whoever sends looks at the clock again"
 
 
@@ -37,9 +37,9 @@ def test_the_fallback_of_a_step_that_is_over_has_lapsed() -> None:
     of.executor.dispatch(step, AT)
     of.executor.ended()
     following = allowed(of, step=1)
-    assert isinstance(of.executor.dispatch(following, AT), Dispatch)
+    assert isinstance(of.executor.dispatch(following, AT), Command)
     assert of.executor.stand_in(step, FALLBACK_LINK, 0, AT) is LAPSED
-    assert isinstance(of.executor.stand_in(following, FALLBACK_LINK, 0, AT), Dispatch)
+    assert isinstance(of.executor.stand_in(following, FALLBACK_LINK, 0, AT), Command)
 
 
 def test_nothing_stands_behind_a_step_that_was_not_sent() -> None:
@@ -72,7 +72,7 @@ def test_landing_ends_what_stands() -> None:
     for kind in (FALLBACK_LINK, CONTINGENCY_LINK):
         assert of.executor.stand_in(step, kind, 0, AT) is LAPSED
     following = allowed(of, step=1)
-    assert isinstance(of.executor.dispatch(following, AT), Dispatch)
+    assert isinstance(of.executor.dispatch(following, AT), Command)
     assert of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT) is LAPSED, "that was another flight"
 
 
@@ -82,7 +82,7 @@ def test_the_contingency_stands_through_all_steps_of_a_flight() -> None:
     of.executor.dispatch(step, AT)
     of.executor.ended()
     of.executor.dispatch(allowed(of, step=1), AT)
-    assert isinstance(of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT + 3_600 * S), Dispatch)
+    assert isinstance(of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT + 3_600 * S), Command)
 
 
 def test_a_forged_permit_stands_for_nothing() -> None:

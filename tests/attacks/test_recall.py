@@ -27,7 +27,7 @@ from reference.world import (
 from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.enforcement.executor import MISSION_OVER
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Dispatch, Ending, LinkBack, LinkLost, Presented
+from rtshcua.onboard.ports import Command, Ending, LinkBack, LinkLost, Presented
 from rtshcua.wire import cose, names
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.response import Status
@@ -111,7 +111,7 @@ def test_after_it_the_boundary_decides_no_step_and_the_executor_sends_none() -> 
     assert of.executor.dispatch(permit, START.monotonic_us) is MISSION_OVER
     assert answer_to(of, request_for(of, step=1)) is Status.NOT_CURRENT
     home = allowed(of, 2, -1, 1)
-    assert isinstance(of.executor.dispatch(home, START.monotonic_us), Dispatch)
+    assert isinstance(of.executor.dispatch(home, START.monotonic_us), Command)
 
 
 def test_after_it_no_document_revives_the_mission() -> None:

@@ -4,7 +4,7 @@ from reference.world import START, Run, allowed, answer_to, loaded, request_for
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.executor import FORGED, USED, Commands, Executor
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.response import Answer
 
 
@@ -44,9 +44,9 @@ def test_what_fails_authentication_uses_no_id_up() -> None:
 def test_a_permit_sends_one_command_once() -> None:
     of = loaded()
     permit = allowed(of)
-    assert isinstance(of.executor.dispatch(permit, START.monotonic_us), Dispatch)
+    assert isinstance(of.executor.dispatch(permit, START.monotonic_us), Command)
     assert of.executor.dispatch(permit, START.monotonic_us) is USED
-    assert isinstance(of.executor.stand_in(permit, 1, 0, START.monotonic_us), Dispatch)
+    assert isinstance(of.executor.stand_in(permit, 1, 0, START.monotonic_us), Command)
     assert of.executor.stand_in(permit, 1, 0, START.monotonic_us) is USED
 
 

@@ -26,7 +26,7 @@ from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedGate
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.world import Simulation
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
@@ -227,7 +227,7 @@ def test_while_a_permit_is_in_force_what_it_covers_is_obeyed_alone(taken_over: T
     assert isinstance(answer, Answer)
     assert answer.permit, answer
     dispatch = of.executor.dispatch(answer.permit, taken_over.us)
-    assert isinstance(dispatch, Dispatch), dispatch
+    assert isinstance(dispatch, Command), dispatch
     before = taken_over.state()
     covered = {(400, 1.0, 0.0), (176, 1.0, 4.0)}
     uncovered = [each for each in hostile() if (getattr(each, "command", 0), getattr(each, "param1", 0.0),

@@ -25,7 +25,7 @@ from rtshcua.onboard.enforcement.isolated import (
 )
 from rtshcua.onboard.enforcement.load import Loaded, Mode
 from rtshcua.onboard.enforcement.preparation import Owed
-from rtshcua.onboard.ports import BoundaryKey, Dispatch
+from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.permit import SIZE
 from rtshcua.wire.preparation import MOST, Preparation
@@ -210,7 +210,7 @@ class BothExecutors:
         self._sealed = bytes(SIZE)  # the last permit that came, and when
         self._now_us = 0
 
-    def _both(self, what: str, one: Dispatch | Refusal, other: Dispatch | Refusal) -> Dispatch | Refusal:
+    def _both(self, what: str, one: Command | Refusal, other: Command | Refusal) -> Command | Refusal:
         same(what, one, other)
         self._counts["refused permits" if isinstance(one, Refusal) else "dispatches"] += 1
         self._look_ahead()
@@ -224,13 +224,13 @@ class BothExecutors:
                 same(f"ahead {kind} {link}", one, self._there.ahead(self._sealed, kind, link, frames, self._now_us))
                 self._counts["ahead"] += not isinstance(one, Refusal) and bool(frames)
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
         self._now_us = now_us
         if len(sealed) == SIZE:  # the call has no way to say how long one is
             self._sealed = sealed
         return self._both("dispatch", self._here.dispatch(sealed, now_us), self._there.dispatch(sealed, now_us))
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         there = self._there.stand_in(sealed, kind, link, now_us)
         return self._both("stand_in", self._here.stand_in(sealed, kind, link, now_us), there)
 

@@ -27,7 +27,7 @@ from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.executor import NOT_COVERED
 from rtshcua.onboard.enforcement.load import Loaded, Mode
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.permit import LINK_VALID_US, Permit, seal
 from rtshcua.wire.request import CONTINGENCY_LINK
@@ -102,10 +102,10 @@ def test_as_many_permits_as_one_session_dispatches(shadow: Shadow) -> None:
     of = both(shadow)
     at_us = START.monotonic_us
     used = allowed(of, CONTINGENCY_LINK, -1, 0)
-    assert isinstance(of.executor.dispatch(used, at_us), Dispatch)
+    assert isinstance(of.executor.dispatch(used, at_us), Command)
     for serial in range(2, MAX_DISPATCHED + 1):
         permit = seal(Permit(CONTINGENCY_LINK, -1, 0, serial, 0, 0, at_us + LINK_VALID_US), SESSION_KEY)
-        assert isinstance(of.executor.dispatch(permit, at_us), Dispatch)
+        assert isinstance(of.executor.dispatch(permit, at_us), Command)
     permit = seal(Permit(CONTINGENCY_LINK, -1, 0, MAX_DISPATCHED + 1, 0, 0, at_us + LINK_VALID_US), SESSION_KEY)
     assert of.executor.dispatch(permit, at_us) is NOT_COVERED
     again = of.executor.dispatch(used, at_us)

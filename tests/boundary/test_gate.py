@@ -8,6 +8,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from rtshcua.codec.frames import Codec
@@ -154,7 +155,7 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
     here, there = FrameSession(), InC(boundary)
     autopilot, home, now_us, left = random.choice(AUTOPILOTS), random.choice(HOMES), 1_000_000, 0
     command = opened = drawn_command(random, home)
-    here.open(command, now_us)
+    here.open(replace(command, not_after_us=now_us))
     there.open(command, home, now_us)
     here.close()
     there.close()
@@ -167,7 +168,7 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
         chance = random.random()
         if chance < 0.08:
             command = opened = drawn_command(random, home)
-            here.open(command, now_us + 500_000)
+            here.open(replace(command, not_after_us=now_us + 500_000))
             there.open(command, home, now_us + 500_000)
         elif chance < 0.1:
             here.close()

@@ -11,7 +11,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.executor import FORGED
 from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 
 
 def held(boundary: ctypes.CDLL) -> Caller:
@@ -34,7 +34,7 @@ def test_a_permit_of_the_bundle_before_sends_nothing(boundary: ctypes.CDLL) -> N
     permit = allowed(into(caller, sealed()))
     other = into(caller, sealed(mission=replace(MISSION, name="other")))
     assert other.executor.dispatch(permit, START.monotonic_us) is FORGED
-    assert isinstance(other.executor.dispatch(allowed(other), START.monotonic_us), Dispatch)
+    assert isinstance(other.executor.dispatch(allowed(other), START.monotonic_us), Command)
 
 
 def test_what_nothing_was_sent_of_may_be_loaded_again(boundary: ctypes.CDLL) -> None:
@@ -47,7 +47,7 @@ def test_what_nothing_was_sent_of_may_be_loaded_again(boundary: ctypes.CDLL) -> 
 def test_no_bundle_is_taken_while_one_flies(boundary: ctypes.CDLL) -> None:
     caller = held(boundary)
     made = into(caller, sealed())
-    assert isinstance(made.executor.dispatch(allowed(made), START.monotonic_us), Dispatch)
+    assert isinstance(made.executor.dispatch(allowed(made), START.monotonic_us), Command)
     refused = caller.load(sealed(), START)
     assert isinstance(refused, Refusal)
     assert refused.slug == "flies"

@@ -62,7 +62,7 @@ from rtshcua.onboard.enforcement.isolated import (
 )
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed, PreparationIssuer
-from rtshcua.onboard.ports import BoundaryKey, Dispatch, Opening
+from rtshcua.onboard.ports import BoundaryKey, Command, Opening
 from rtshcua.wire.boundary_chain import START as BEFORE
 from rtshcua.wire.document import DocumentError
 from rtshcua.wire.keys import Duty
@@ -422,7 +422,7 @@ class Together:
         one, other = self.permit()
         late = self.random.choice((0, 0, 0, 2 * LINK_VALID_US))
         sent = self.here.executor.dispatch(one, self.us + late)
-        if isinstance(sent, Dispatch) and sent.needs_record:
+        if isinstance(sent, Command) and sent.needs_record:
             self.standing = one, other
         self._sent(sent, self.there.executor.dispatch(other, self.us + late))
 
@@ -432,10 +432,10 @@ class Together:
         here = self.here.executor.stand_in(one, kind, link, self.us)
         self._sent(here, self.there.executor.stand_in(other, kind, link, self.us))
 
-    def _sent(self, one: Dispatch | Refusal, other: Dispatch | Refusal) -> None:
+    def _sent(self, one: Command | Refusal, other: Command | Refusal) -> None:
         same("a dispatch", one, other)
-        if isinstance(one, Dispatch):
-            self.command, self._on_ground = one.command, False
+        if isinstance(one, Command):
+            self.command, self._on_ground = one, False
             for _ in range(self.random.randrange(6)):
                 self.observe()
                 self.seal()

@@ -14,7 +14,7 @@ from reference.flat_case import GOTO, HOME, TAKEOFF
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import AfterSilence
 from rtshcua.onboard.enforcement.executor import Commands
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.onboard.runtime.controller import MissionController
 from rtshcua.onboard.runtime.dispatcher import Dispatcher
 from rtshcua.onboard.runtime.fallback import Fallback
@@ -63,8 +63,8 @@ def higher(of: Any) -> Any:
 def another_skill(of: Any) -> Any:
     """A link lands, whatever was permitted."""
 
-    def command(self: Any, kind: int, step: int, link: int, token: int) -> Any:
-        made = of(self, kind, step, link, token)
+    def command(self: Any, kind: int, *more: int) -> Any:
+        made = of(self, kind, *more)
         return made if kind == 0 else replace(made, kind=MotionKind.LAND)
 
     return command
@@ -74,7 +74,7 @@ def past_the_executor(of: Any) -> Any:
     """What is sent is not what the executor gave out."""
 
     def send(self: Any, now: Any, dispatch: Any, *more: Any) -> bool:
-        return bool(of(self, now, replace(dispatch) if isinstance(dispatch, Dispatch) else dispatch, *more))
+        return bool(of(self, now, replace(dispatch) if isinstance(dispatch, Command) else dispatch, *more))
 
     return send
 

@@ -17,8 +17,8 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     Action,
     AirState,
+    Command,
     Crashed,
-    Dispatch,
     End,
     Ending,
     Event,
@@ -43,7 +43,7 @@ class Ear(Recorder):
     def __init__(self, of: Recorder) -> None:
         super().__init__(lambda text: b"", of._public, lambda: bytes(32))
         self.heard: list[tuple[str, Ref, dict[str, Any]]] = []
-        self.passed: list[Dispatch] = []
+        self.passed: list[Command] = []
 
     def due(self, now: object) -> bool:
         return False  # seals change nothing that a search looks at
@@ -73,25 +73,25 @@ class Gate:
             raise AttributeError(name)
         return getattr(self._of, name)
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
         result = self._of.dispatch(sealed, now_us)
-        if isinstance(result, Dispatch):
+        if isinstance(result, Command):
             permit = open_permit(sealed, self._key)
             assert permit is not None, "forged"
-            assert permit.serial == result.command.token
+            assert permit.serial == result.token
             assert now_us <= permit.not_after_us, "late"
             assert result.not_after_us <= permit.not_after_us, "longer than permitted"
             self._ear.passed.append(result)
         return result
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         result = self._of.stand_in(sealed, kind, link, now_us)
-        if isinstance(result, Dispatch):
+        if isinstance(result, Command):
             permit = open_permit(sealed, self._key)
             assert permit is not None, "forged"
             assert permit.kind == STEP
             assert kind != STEP, "only links stand behind a permit"
-            assert permit.serial < result.command.token
+            assert permit.serial < result.token
             self._ear.passed.append(result)
         return result
 
@@ -154,7 +154,7 @@ class Watch:
 
     def after(self, of: Loaded, ear: Ear, event: Event | None, actions: Sequence[Action], now_us: int) -> None:
         """Check one step of the runtime."""
-        sent = [action for action in actions if isinstance(action, Dispatch)]
+        sent = [action for action in actions if isinstance(action, Command)]
         assert [id(each) for each in sent] == [id(each) for each in ear.passed], "sent past the executor"
         assert not (self.ending and actions), f"after the end: {list(map(type, actions))}"
         was_over = self.ending is not None
@@ -213,9 +213,9 @@ class Watch:
         assert not self.unstopped or waits, "left flying after a stop that failed"
 
     def _dispatched(
-        self, of: Loaded, dispatch: Dispatch, ref: Ref, said: dict[str, Any], fresh: set[Ref], now_us: int
+        self, of: Loaded, command: Command, ref: Ref, said: dict[str, Any], fresh: set[Ref], now_us: int
     ) -> None:
-        command, (kind, step, link) = dispatch.command, ref
+        kind, step, link = ref
         assert not self.released, "sent after standing down"
         assert self.flying is None, "two commands at once"
         assert command.token == said["token"]
@@ -228,12 +228,12 @@ class Watch:
             assert not self.homeward, "a step after a return or a landing began"
             assert not self.recalled, "a step after a recall"
             assert step > self.step, "a step again, or behind one that was sent"
-            assert dispatch.needs_record
+            assert command.needs_record
             invocation = of.bundle.mission.invocations[step]
             plan, contract = invocation.plan, invocation.contract
             bounds = (plan.kind, plan.path, plan.altitude, plan.speed)
             assert (command.kind, command.path, command.altitude, command.speed) == bounds, "not what was permitted"
-            assert dispatch.not_after_us <= now_us + contract.deadline_us
+            assert command.not_after_us <= now_us + contract.deadline_us
             self.step = step
         else:
             assert ref in fresh or self.allowed, "a link that nothing stands for"
@@ -241,7 +241,7 @@ class Watch:
             chain = policy.contingency if kind == 2 else of.bundle.mission.invocations[step].contract.fallback
             targets = [rule.target.skill for rule in policy.rules if rule.target is not None]  # no policy here has two
             contract = policy.contracts[chain[link].skill if link >= 0 else targets[0]]
-            assert dispatch.not_after_us <= now_us + LINK_VALID_US or ref not in fresh
+            assert command.not_after_us <= now_us + LINK_VALID_US or ref not in fresh
             self.homeward = self.homeward or contract.motion.kind in _HOMEWARD
         assert (command.skill, command.kind) == (contract.name, contract.motion.kind), "another skill"
         self.ours = True

@@ -143,7 +143,7 @@ class Recorded:
         self._sent(frames)
         while waiting and waiting[0][0] <= self.second:
             begun = waiting.pop(0)[1]
-            self._frames.open(begun, to_us + SECOND)
+            self._frames.open(replace(begun, not_after_us=to_us + SECOND))
             events, frames = self.driver.begin(begun, to_us)
             self._take(events)
             self._sent(frames)

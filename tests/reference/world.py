@@ -43,7 +43,6 @@ from rtshcua.onboard.ports import (
     AirState,
     Append,
     Command,
-    Dispatch,
     Ending,
     Event,
     Failed,
@@ -313,10 +312,10 @@ class Run:
             match action:
                 case Append():
                     self.lines.append(action.line)
-                case Dispatch():
+                case Command():
                     assert self.clock.now().monotonic_us <= action.not_after_us
-                    self.vehicle.begin(action.command, now.monotonic_us)
-                    sent.append(Sent(now.monotonic_us + 1_500, action.command.token))
+                    self.vehicle.begin(action, now.monotonic_us)
+                    sent.append(Sent(now.monotonic_us + 1_500, action.token))
                 case Release():
                     self.vehicle.released = True
         self.actions += actions
@@ -346,7 +345,7 @@ class Run:
 
 def dispatches(actions: Sequence[Action]) -> list[Command]:
     """The commands that were to be sent."""
-    return [action.command for action in actions if isinstance(action, Dispatch)]
+    return [action for action in actions if isinstance(action, Command)]
 
 
 def assert_audited(run: Run) -> None:
@@ -376,8 +375,8 @@ def assert_covered(run: Run) -> None:
                 step_allowed = (0, record["step"], -1) in allowed
                 any_allowed = any(kind == 0 for kind, _, _ in allowed)
                 assert key in allowed or (record["kind"] == 1 and step_allowed) or (record["kind"] == 2 and any_allowed)
-        elif isinstance(action, Dispatch):
-            tokens.append(action.command.token)
+        elif isinstance(action, Command):
+            tokens.append(action.token)
             assert allowed, "nothing is sent before a recorded decision"
     assert len(set(tokens)) == len(tokens)
     assert run.events.count("dispatched") == len(tokens)

@@ -45,7 +45,7 @@ from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Context, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.onboard.ports import Dispatch, Ending
+from rtshcua.onboard.ports import Command, Ending
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.document import DocumentError
 from rtshcua.wire.keys import Duty, SigningKey
@@ -120,7 +120,7 @@ def broken(of: Random) -> list[str]:
         if not isinstance(answer, Answer) or not answer.permit:
             break
         found.executor.ended()
-        if isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Dispatch):
+        if isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Command):
             wrong += judged(found, step, state)
     return wrong
 
@@ -295,7 +295,7 @@ def test_what_agents_may_do_flies() -> None:
         answer = answer_to(found, request_for(found, step=step.step))
         assert isinstance(answer, Answer)
         found.executor.ended()
-        assert isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Dispatch)
+        assert isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Command)
 
 
 def breaks(what: str, most: int = 400) -> bool:

@@ -50,7 +50,7 @@ from rtshcua.model.flat.situation import Context, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement import executor as executors
 from rtshcua.onboard.enforcement.load import Loaded, Mode
-from rtshcua.onboard.ports import Dispatch
+from rtshcua.onboard.ports import Command
 from rtshcua.wire import permit as permits
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.permit import Permit
@@ -169,7 +169,7 @@ class TakenOver:
         except LookupError:  # believed, and naming nothing
             self.hold(False, "a permit that nobody made")
         else:
-            if isinstance(found, Dispatch):
+            if isinstance(found, Command):
                 self.witness(found, chosen)
 
     def stand_in(self) -> None:
@@ -177,7 +177,7 @@ class TakenOver:
             return
         permit, kind = self.of.choice(self.permits), self.of.choice([FALLBACK_LINK, CONTINGENCY_LINK])
         found = self.loaded.executor.stand_in(permit, kind, self.of.randrange(-1, 4), self.now.monotonic_us)
-        if isinstance(found, Dispatch):
+        if isinstance(found, Command):
             self.hold(permit in self.sent, "a link stood in for a step that never flew")
 
     def signed(self) -> bytes:
@@ -227,7 +227,7 @@ class TakenOver:
         valid = asked.now.monotonic_us + meant.issued_at_us + meant.contract.validity_us - asked.now.utc_us
         self.admitted[permit] = meant, min(due, valid)
 
-    def witness(self, found: Dispatch, permit: bytes) -> None:
+    def witness(self, command: Command, permit: bytes) -> None:
         """Something was sent."""
         self.hold(permit in self.permits, "a permit that nobody made")
         self.hold(permit not in self.sent, "a permit was used twice")
@@ -235,7 +235,6 @@ class TakenOver:
         if permit not in self.admitted:
             return
         meant, until_us = self.admitted[permit]
-        command = found.command
         told = (command.skill, command.kind, command.path, command.altitude, command.speed)
         plan = meant.plan
         signed = (meant.contract.name, plan.kind, plan.path, plan.altitude, plan.speed)
@@ -298,7 +297,7 @@ def test_an_executor_that_believes_any_permit_is_noticed(monkeypatch: pytest.Mon
 def test_an_executor_that_does_not_look_at_the_time_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     dispatch = executors.Executor._dispatch
 
-    def whenever(self: executors.Executor, permit: Permit, now_us: int) -> Dispatch | Refusal:
+    def whenever(self: executors.Executor, permit: Permit, now_us: int) -> Command | Refusal:
         return dispatch(self, permit, min(now_us, permit.not_after_us))
 
     monkeypatch.setattr(executors.Executor, "_dispatch", whenever)

@@ -11,6 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
+from msgspec.structs import replace
+
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
@@ -176,7 +178,7 @@ class LinedVehicle(VirtualVehicle):
     def begin(self, command: Command, now_us: int) -> None:
         """Start a command."""
         if self._free:
-            self.frames.open(command, now_us + 10 * SECOND)
+            self.frames.open(replace(command, not_after_us=now_us + 10 * SECOND))
         self.connected.begin(command, now_us)
 
     def close(self) -> None:

@@ -18,19 +18,18 @@ from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.ports import Command, Dispatch
+from rtshcua.onboard.ports import ALWAYS, Command
 from rtshcua.wire import boundary_chain
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
 from rtshcua.wire.permit import AGAIN, Permit, open_permit
 from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
-#: a command but for its token
-_Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int]
+#: a command but for its token, and until when it may be sent
+_Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool]
 
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 _UNTOUCHED = DEGRADE - 1
-_ALWAYS = (1 << 63) - 1  # us
 
 # why a permit sends nothing
 FORGED: Final = Refusal("permit/forged", "it is not sealed with the key of this session")
@@ -76,16 +75,18 @@ class Commands:
             for number, link in enumerate(invocation.contract.fallback):
                 self._made[FALLBACK_LINK, step, number] = self._of_link(link)
 
-    def command(self, kind: int, step: int, link: int, token: int) -> Command:
-        """The command, under the token of its permit. A `link` of `-1 - rule` is the target of that degrade rule.
+    def command(self, kind: int, step: int, link: int, token: int, not_after_us: int = ALWAYS) -> Command:
+        """The command, under the token of its permit, and until when that is good.
+
+        A `link` of `-1 - rule` is the target of that degrade rule.
 
         Raises `LookupError` for one that the bundle does not have.
         """
         if kind == STEP:
-            return Command(token, *self._made[STEP, step, -1])
+            return Command(token, *self._made[STEP, step, -1], not_after_us)
         if kind == FALLBACK_LINK and link < 0 and (STEP, step, -1) in self._made:
-            return Command(token, *self._targets[link])
-        return Command(token, *self._made[kind, step if kind == FALLBACK_LINK else -1, link])
+            return Command(token, *self._targets[link], not_after_us)
+        return Command(token, *self._made[kind, step if kind == FALLBACK_LINK else -1, link], not_after_us)
 
     def links(self, step: int) -> list[tuple[int, int]]:
         """Kind and number of each link behind a step: its chain, then the contingency."""
@@ -95,7 +96,7 @@ class Commands:
     def _of_step(self, invocation: Invocation) -> _Made:
         plan, contract = invocation.plan, invocation.contract
         held_us = _hold_us(contract, invocation.arguments)
-        return contract.name, plan.kind, plan.path, self._geo(plan.path), plan.altitude, plan.speed, held_us
+        return contract.name, plan.kind, plan.path, self._geo(plan.path), plan.altitude, plan.speed, held_us, True
 
     def _of_link(self, link: Link) -> _Made:
         contract = self._policy.contracts[link.skill]
@@ -106,7 +107,7 @@ class Commands:
             path = link.arguments[cell : cell + 2]
         altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
         held_us = 0 if link.limit_us else _hold_us(contract, link.arguments)  # the link's own time counts
-        return contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us
+        return contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us, False
 
     def _geo(self, path: Sequence[int]) -> tuple[int, ...]:
         projection = self._policy.projection
@@ -153,21 +154,21 @@ class Executor:
         frames.chain = self._chain
         self._frames = frames
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
         """What to send for a permit at a monotonic time, or why nothing is sent."""
         permit = open_permit(sealed, self._key)
         return self._chained(FORGED if permit is None else self._dispatch(permit, now_us), now_us)
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
         return self._chained(self._stand_in(sealed, kind, link, now_us), now_us)
 
-    def _chained(self, found: Dispatch | Refusal, now_us: int) -> Dispatch | Refusal:
+    def _chained(self, found: Command | Refusal, now_us: int) -> Command | Refusal:
         if isinstance(found, Refusal):
             self._chain.add(Tag.REFUSED, boundary_chain.refused(found.slug, now_us))
         return found
 
-    def _stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+    def _stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         permit = self._standing_for(sealed, kind, link)
         return permit if isinstance(permit, Refusal) else self._dispatch(permit, now_us)
 
@@ -186,7 +187,7 @@ class Executor:
         if not fallback and link == permit.contingencies - 1:
             again = range(serial, serial + AGAIN)
             serial = next((each for each in again if each not in self._used), serial + AGAIN)
-        return Permit(kind, step, link, serial, 0, 0, _ALWAYS)
+        return Permit(kind, step, link, serial, 0, 0, ALWAYS)
 
     def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
         """Sign the frames of a link ahead, to be sent when no boundary is there any more: as far as the standing permit
@@ -247,11 +248,12 @@ class Executor:
             return NOT_COVERED
         return refusal
 
-    def _dispatch(self, permit: Permit, now_us: int) -> Dispatch | Refusal:
+    def _dispatch(self, permit: Permit, now_us: int) -> Command | Refusal:
         refusal = self._refuse(permit, now_us)
         if refusal is not None:
             return refusal
-        command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial)
+        until_us = permit.not_after_us
+        command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial, until_us)
         self._used.add(permit.serial)
         if permit.kind == STEP:
             self._step, self._serial, self._running = permit.step, permit.serial, True
@@ -261,8 +263,8 @@ class Executor:
         self._last = permit.serial
         payload = boundary_chain.sent(permit.kind, permit.step, permit.link, permit.serial, now_us)
         self._chain.add(Tag.SENT, payload)
-        self._frames.open(command, permit.not_after_us)
-        return Dispatch(command, permit.not_after_us, needs_record=permit.kind == STEP)
+        self._frames.open(command)
+        return command
 
     def ended(self, token: int | None = None) -> None:
         """The running step ended, however it did: the next may be sent.

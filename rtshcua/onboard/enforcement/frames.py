@@ -114,10 +114,9 @@ class Gate(Protocol):
 
 @dataclass(slots=True)
 class _Session:
-    """One permitted command, how late (monotonic us) its first frame may leave, and how far it got."""
+    """One permitted command, and how far it got."""
 
     command: Command
-    not_after_us: int
     begun: bool = False  # a frame of it left
     leg: int = -1  # the last point of its path that was sent
 
@@ -152,9 +151,9 @@ class FrameSession:
             raise RuntimeError("this link is signed already")
         self._signer = signer
 
-    def open(self, command: Command, not_after_us: int) -> None:
+    def open(self, command: Command) -> None:
         """Let out the frames of one command, in place of whatever was let out before."""
-        self._session, self._started = _Session(command, not_after_us), True
+        self._session, self._started = _Session(command), True
         self.prepared()
         if self._settled_amsl is None or command.kind == MotionKind.CLIMB:
             self._settled_amsl = self._home_amsl
@@ -289,7 +288,7 @@ class FrameSession:
             return NO_SESSION
         if not allow_list.carries_out(frame, session.command, self._autopilot, self._home_amsl):
             return NOT_COVERED
-        if not session.begun and now_us > session.not_after_us:
+        if not session.begun and now_us > session.command.not_after_us:
             return LATE
         point = allow_list.point_of(frame)
         if point is not None:

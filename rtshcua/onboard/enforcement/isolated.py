@@ -21,7 +21,7 @@ from rtshcua.onboard.enforcement import executor, frames, preparation
 from rtshcua.onboard.enforcement.ahead import NOT_AHEAD, Encode, FramesAhead
 from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
 from rtshcua.onboard.enforcement.executor import Ahead, Commands
-from rtshcua.onboard.ports import BoundaryKey, Command, Dispatch
+from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
 from rtshcua.wire.preparation import MAC_BYTES, Preparation
@@ -48,7 +48,6 @@ _SHOWN: Final = Struct(">qqqII")
 _STANDING: Final = Struct(">qBb")
 _PERMITTED: Final = Struct(">BhhQq")
 _SERIAL_BYTES: Final = 8
-_ALWAYS: Final = (1 << 63) - 1  # us
 
 #: what an answer that makes no sense, or none at all, comes to
 LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or answers what makes no sense")
@@ -280,31 +279,30 @@ class IsolatedExecutor:
         self._commands = commands
         self.frames = gate
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
         """What to send for a permit at a monotonic time, or why nothing is sent."""
         return self._permitted(self._caller(DISPATCH, _TIME.pack(now_us), sealed), sealed)
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
         answer = self._caller(STAND_IN, _STANDING.pack(now_us, kind, link), sealed)
         if not self._caller.lost:
             return self._permitted(answer, sealed)
-        command = self.frames.ahead.begin(kind, link)
-        return NOT_AHEAD if command is None else Dispatch(command, _ALWAYS, needs_record=False)
+        return self.frames.ahead.begin(kind, link) or NOT_AHEAD
 
-    def _permitted(self, answer: bytes | Refusal, sealed: bytes) -> Dispatch | Refusal:
+    def _permitted(self, answer: bytes | Refusal, sealed: bytes) -> Command | Refusal:
         if isinstance(answer, Refusal):
             return answer
         try:
             kind, step, link, serial, not_after_us = _PERMITTED.unpack(answer)
-            command: Command = self._commands.command(kind, step, link, serial)
+            command: Command = self._commands.command(kind, step, link, serial, not_after_us)
         except (struct_error, LookupError):
             return self._caller.lose()
         if kind == STEP:
             self.frames.ahead.stands(sealed, step)
         else:
             self.frames.ahead.flown()
-        return Dispatch(command, not_after_us, needs_record=kind == STEP)
+        return command
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
         """What may be set of the vehicle from now on, by a preparation permit, or why nothing may."""

@@ -6,7 +6,7 @@ from typing import Final
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Command, Dispatch, Dispatching, Frozen, Obeyed, Release
+from rtshcua.onboard.ports import Command, Dispatching, Frozen, Obeyed, Release
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
@@ -85,17 +85,16 @@ class Dispatcher:
         permit = self._standing[1]
         return self._send(now, self._executor.stand_in(permit, ref.kind, ref.link, now.monotonic_us), ref, lasting_us)
 
-    def _send(self, now: Now, dispatch: Dispatch | Refusal, ref: Ref, lasting_us: int | None) -> bool:
-        if isinstance(dispatch, Refusal):
-            self._journal.effect(now, "refused", ref, detail=dispatch.slug)
+    def _send(self, now: Now, command: Command | Refusal, ref: Ref, lasting_us: int | None) -> bool:
+        if isinstance(command, Refusal):
+            self._journal.effect(now, "refused", ref, detail=command.slug)
             return False
-        at_us, command = now.monotonic_us, dispatch.command
+        at_us = now.monotonic_us
         self.end(now, "replaced")
-        self._journal.add(dispatch)
+        self._journal.add(command)
         self.active = Active(ref, command, at_us, None if lasting_us is None else at_us + lasting_us)
         self.dispatched = self.used = True
-        token, skill = command.token, command.skill
-        self._journal.effect(now, "dispatched", ref, token=token, detail=skill)
+        self._journal.effect(now, "dispatched", ref, token=command.token, detail=command.skill)
         return True
 
     def sent(self, token: int, at_us: int) -> None:

@@ -7,7 +7,7 @@ from typing import Final
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Action, Append, Dispatch
+from rtshcua.onboard.ports import Action, Append, Command
 from rtshcua.wire.request import NOTHING, Ref
 
 #: how often a note of the same text leaves a record, in us: those between are counted
@@ -43,12 +43,12 @@ class Journal:
         self._again: dict[str, int] = {}  # and how often it was noted since
 
     @property
-    def reflex(self) -> Dispatch | None:
+    def reflex(self) -> Command | None:
         """The command that waits for no record, if it comes first of all that is done in this step: nothing that is
         told could keep it back, so that it may be sent before.
         """
         first = self._first
-        return first if isinstance(first, Dispatch) and not first.needs_record else None
+        return first if isinstance(first, Command) and not first.needs_record else None
 
     def add(self, action: Action) -> None:
         """Add something to be done."""
@@ -117,7 +117,7 @@ class Journal:
                 actions += entry()
             else:
                 actions.append(entry)
-        if not ended and self.recorder.due(now) and not any(isinstance(action, Dispatch) for action in actions):
+        if not ended and self.recorder.due(now) and not any(isinstance(action, Command) for action in actions):
             actions += self._seal(now)
         return actions
 

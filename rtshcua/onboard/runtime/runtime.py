@@ -13,7 +13,7 @@ from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Crashed, Dispatch, Ending, Event, Readings, Reply, TakenOver
+from rtshcua.onboard.ports import Action, Command, Crashed, Ending, Event, Readings, Reply, TakenOver
 from rtshcua.onboard.runtime.controller import MissionController
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.limits import Limits
@@ -65,7 +65,7 @@ class Runtime:
         self.react(now, events)
         return self.actions(now)
 
-    def react(self, now: Now, events: Sequence[Event]) -> Dispatch | None:
+    def react(self, now: Now, events: Sequence[Event]) -> Command | None:
         """The first half of a step: a command that is held for no record, and comes first of all that is to be done, so
         that it may be sent before the records are made. `actions` has it once more, in its place.
         """

@@ -11,7 +11,6 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
     Append,
     Command,
-    Dispatch,
     End,
     Ending,
     EvidenceFailed,
@@ -23,7 +22,9 @@ from rtshcua.onboard.ports import (
     Succeeded,
 )
 
-COMMAND = Command(7, "hover", 0, (), (), 0, 0)
+
+def command(token: int, not_after_us: int, *, needs_record: bool) -> Command:
+    return Command(token, "hover", 0, (), (), 0, 0, needs_record=needs_record, not_after_us=not_after_us)
 
 
 class World:
@@ -79,12 +80,12 @@ class World:
     def close(self) -> None:
         pass
 
-    def react(self, now: Now, events: Sequence[Any]) -> Dispatch | None:
+    def react(self, now: Now, events: Sequence[Any]) -> Command | None:
         self.events = list(events)
         self.doing = self.script.pop(0) if self.script else []
         done = [action for action in self.doing if not isinstance(action, Append)]
         first = done[0] if done else None
-        return first if isinstance(first, Dispatch) and not first.needs_record else None
+        return first if isinstance(first, Command) and not first.needs_record else None
 
     def actions(self, now: Now) -> Sequence[Any]:
         return self.doing
@@ -94,7 +95,7 @@ class World:
 
 
 def test_actions_are_carried_out_in_their_order() -> None:
-    actions = [Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, True), Append(b"2", WRITTEN), Release()]
+    actions = [Append(b"1", WRITTEN), command(7, 1_000, needs_record=True), Append(b"2", WRITTEN), Release()]
     world = World(actions)
     assert world.loop.turn() is None
     assert world.did == [b"1", ("begin", 7), b"2", "release"]
@@ -102,7 +103,7 @@ def test_actions_are_carried_out_in_their_order() -> None:
 
 
 def test_what_is_late_is_not_sent_and_the_runtime_is_told() -> None:
-    world = World([Dispatch(COMMAND, 999, False)])
+    world = World([command(7, 999, needs_record=False)])
     world.loop.turn()
     assert world.did == []
     world.loop.turn()
@@ -111,7 +112,7 @@ def test_what_is_late_is_not_sent_and_the_runtime_is_told() -> None:
 
 
 def test_what_could_not_be_recorded_is_withheld() -> None:
-    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, True)])
+    world = World([Append(b"1", WRITTEN), command(7, 1_000, needs_record=True)])
     world.full = True
     world.loop.turn()
     assert world.did == []
@@ -122,14 +123,14 @@ def test_what_could_not_be_recorded_is_withheld() -> None:
 
 
 def test_a_fallback_goes_out_even_when_nothing_can_be_recorded() -> None:
-    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False)])
+    world = World([Append(b"1", WRITTEN), command(7, 1_000, needs_record=False)])
     world.full = True
     world.loop.turn()
     assert world.did == [("begin", 7)]
 
 
 def test_a_record_that_failed_before_withholds_nothing_now() -> None:
-    world = World([Append(b"1", WRITTEN)], [Append(b"2", WRITTEN), Dispatch(COMMAND, 1_000, True)])
+    world = World([Append(b"1", WRITTEN)], [Append(b"2", WRITTEN), command(7, 1_000, needs_record=True)])
     world.full = True
     world.loop.turn()
     world.full = False
@@ -151,8 +152,7 @@ def test_the_end_comes_after_all_else_was_done() -> None:
     assert world.did == [b"last"]
 
 
-STEP = [Append(b"allowed", WRITTEN), Dispatch(COMMAND, 5_000, True), Append(b"dispatched", WRITTEN)]
-OTHER = Command(8, "return_home", 4, (), (), 0, 0)
+STEP = [Append(b"allowed", WRITTEN), command(7, 5_000, needs_record=True), Append(b"dispatched", WRITTEN)]
 
 
 def held(*script: Sequence[Any]) -> World:
@@ -196,7 +196,7 @@ def test_a_record_that_comes_when_it_is_too_late_changes_nothing() -> None:
 
 
 def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
-    world = held([Append(b"violated", WRITTEN), Dispatch(OTHER, 9_000, False)])
+    world = held([Append(b"violated", WRITTEN), command(8, 9_000, needs_record=False)])
     world.loop.turn()
     assert world.did == [("begin", 8), b"violated"]  # recorded when the frame is on its way
     world.kept = 9
@@ -205,7 +205,7 @@ def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
 
 
 def test_what_a_fallback_is_recorded_by_is_handed_over_whatever_becomes_of_its_frame() -> None:
-    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False), Append(b"2", WRITTEN)])
+    world = World([Append(b"1", WRITTEN), command(7, 1_000, needs_record=False), Append(b"2", WRITTEN)])
 
     def refuses(command: Command, now_us: int) -> None:
         raise RuntimeError("no vehicle")
@@ -217,13 +217,13 @@ def test_what_a_fallback_is_recorded_by_is_handed_over_whatever_becomes_of_its_f
 
 
 def test_a_fallback_does_not_pass_what_is_done_to_the_vehicle_before_it() -> None:
-    world = World([Release(), Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False)])
+    world = World([Release(), Append(b"1", WRITTEN), command(7, 1_000, needs_record=False)])
     world.loop.turn()
     assert world.did == ["release", b"1", ("begin", 7)]
 
 
 def test_the_runtime_looks_ahead_when_all_is_done() -> None:
-    world = World([Append(b"1", WRITTEN), Dispatch(COMMAND, 1_000, False)])
+    world = World([Append(b"1", WRITTEN), command(7, 1_000, needs_record=False)])
     world.loop.turn()
     assert world.did == [("begin", 7), b"1"]
     assert world.prepared == [(Now(1_000, 1_000, 0), 2)]
@@ -260,7 +260,7 @@ def test_a_failure_is_told_though_nothing_waits() -> None:
 
 @pytest.mark.parametrize("durability", [WRITTEN, SYNCED])
 def test_a_step_whose_record_is_to_be_written_or_synced_later_waits_until_it_is_written(durability: int) -> None:
-    world = World([Append(b"allowed", durability), Dispatch(COMMAND, 5_000, True)])
+    world = World([Append(b"allowed", durability), command(7, 5_000, needs_record=True)])
     world.slow = True
     world.loop.turn()
     assert world.did == [b"allowed"]
@@ -270,7 +270,7 @@ def test_a_step_whose_record_is_to_be_written_or_synced_later_waits_until_it_is_
 
 
 def test_a_step_whose_record_is_to_be_synced_first_waits_for_the_disk() -> None:
-    world = World([Append(b"allowed", SYNCED_FIRST), Dispatch(COMMAND, 5_000, True)])
+    world = World([Append(b"allowed", SYNCED_FIRST), command(7, 5_000, needs_record=True)])
     world.slow = True
     world.loop.turn()
     world.kept = 1
@@ -283,7 +283,7 @@ def test_a_step_whose_record_is_to_be_synced_first_waits_for_the_disk() -> None:
 
 def test_a_seal_before_it_makes_no_step_wait() -> None:
     seal = Append(b"seal", SYNCED_FIRST, awaited=False)
-    world = World([seal, Append(b"allowed", SYNCED), Dispatch(COMMAND, 5_000, True)])
+    world = World([seal, Append(b"allowed", SYNCED), command(7, 5_000, needs_record=True)])
     world.slow = True
     world.loop.turn()
     world.kept = 2
@@ -293,7 +293,7 @@ def test_a_seal_before_it_makes_no_step_wait() -> None:
 
 def test_a_step_whose_record_is_buffered_waits_for_nothing_but_is_withheld_where_no_record_is_taken() -> None:
     effects = [Append(effect, WRITTEN, awaited=False) for effect in (b"succeeded", b"replaced")]
-    step = [effects[0], Append(b"allowed", BUFFERED), effects[1], Dispatch(COMMAND, 5_000, True)]
+    step = [effects[0], Append(b"allowed", BUFFERED), effects[1], command(7, 5_000, needs_record=True)]
     world = World(step)
     world.slow = True
     world.loop.turn()

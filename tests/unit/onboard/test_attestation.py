@@ -12,7 +12,7 @@ from rtshcua.onboard.enforcement.executor import SESSION_OVER
 from rtshcua.onboard.enforcement.frames import NOT_COVERED, FrameSession
 from rtshcua.onboard.enforcement.frames import SESSION_OVER as GATE_OVER
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import BoundaryKey, Dispatch
+from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire import boundary_chain, preparation, response
 from rtshcua.wire.boundary_chain import Tag, following
 from rtshcua.wire.preparation import Preparation
@@ -104,15 +104,15 @@ def test_permits_are_chained_as_they_are_used() -> None:
     of = loaded()
     permit, before = allowed(of), of.attestation.digest
     sent = of.executor.dispatch(permit, NOW_US)
-    assert isinstance(sent, Dispatch)
-    digest = following(before, Tag.SENT, boundary_chain.sent(0, 0, -1, sent.command.token, NOW_US))
+    assert isinstance(sent, Command)
+    digest = following(before, Tag.SENT, boundary_chain.sent(0, 0, -1, sent.token, NOW_US))
     assert of.attestation.digest == digest
     of.executor.dispatch(permit, NOW_US)
     digest = following(digest, Tag.REFUSED, boundary_chain.refused("permit/used", NOW_US))
     assert of.attestation.digest == digest
     link = of.executor.stand_in(permit, 1, 0, NOW_US)
-    assert isinstance(link, Dispatch)
-    digest = following(digest, Tag.SENT, boundary_chain.sent(1, 0, 0, link.command.token, NOW_US))
+    assert isinstance(link, Command)
+    digest = following(digest, Tag.SENT, boundary_chain.sent(1, 0, 0, link.token, NOW_US))
     assert of.attestation.digest == digest
     of.executor.stand_in(b"", 1, 0, NOW_US)
     assert of.attestation.digest == following(digest, Tag.REFUSED, boundary_chain.refused("permit/forged", NOW_US))
@@ -142,7 +142,7 @@ def test_nothing_happens_after_the_end_was_signed() -> None:
     of = loaded()
     of.attestation.begin(KEY)
     first, sealed_ = allowed(of), preparation.seal(Preparation(1, False, NOW_US, ()), SESSION_KEY)
-    assert isinstance(of.executor.dispatch(first, NOW_US), Dispatch)
+    assert isinstance(of.executor.dispatch(first, NOW_US), Command)
     vehicle = Codec(1, 1)
     of.executor.frames.observe(vehicle.pack(HEARTBEAT), NOW_US)
     ours = Codec(1, 191)

@@ -47,7 +47,7 @@ LATEST = 2_000_000
 
 
 def command(kind: MotionKind, altitude: int = 20_000, speed: int = 4_000) -> Command:
-    return Command(7, "skill", kind, (0, 0, 1, 1), GEO, altitude, speed)
+    return Command(7, "skill", kind, (0, 0, 1, 1), GEO, altitude, speed, not_after_us=LATEST)
 
 
 def pack(message: Any, system: int = SYSTEM, component: int = OURS) -> bytes:
@@ -72,7 +72,7 @@ def session(autopilot: int, of: Command | None = None) -> FrameSession:
     made.observe(pack(height(HOME_AMSL + 5_000, 5_000), component=1))
     made.observe(pack(parameter("FENCE_TYPE", 3), component=1))
     if of is not None:
-        made.open(of, LATEST)
+        made.open(of)
     return made
 
 
@@ -223,7 +223,7 @@ def test_a_fence_passes_until_something_flies() -> None:
     gate = session(PX4)
     for message in BEFORE_FLIGHT:
         assert covers(gate, message), named(message)
-    gate.open(command(K.CLIMB), LATEST)
+    gate.open(command(K.CLIMB))
     gate.close()
     for message in BEFORE_FLIGHT:
         assert gate.seal(pack(message), NOW) is AFTER_START, named(message)
@@ -334,7 +334,7 @@ def test_heights_above_sea_follow_home_as_the_autopilot_tells_it() -> None:
 def test_without_homes_height_nothing_goes_above_sea() -> None:
     gate = FrameSession()
     gate.observe(pack(heartbeat(PX4), component=1))
-    gate.open(command(K.FLY), LATEST)
+    gate.open(command(K.FLY))
     assert not covers(gate, reposition())
     assert not covers(gate, reposition(z=20.0))
 
@@ -355,7 +355,7 @@ def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
     gate.observe(pack(heartbeat(ARDUPILOT), component=1))
     gate.observe(pack(heartbeat(PX4), component=1))
     gate.observe(pack(heartbeat(PX4), system=SYSTEM + 1, component=1))
-    gate.open(command(K.LAND), LATEST)
+    gate.open(command(K.LAND))
     assert covers(gate, long(176, 1, 9))
     assert gate.seal(pack(ALWAYS[0], system=SYSTEM + 1), NOW) is NOT_OURS
 
@@ -404,7 +404,7 @@ def test_a_command_begins_in_its_time_and_goes_on_after_it() -> None:
     assert gate.seal(land, LATEST + 1) is LATE
     assert gate.seal(land, LATEST) == land
     assert gate.seal(land, LATEST + 5_000_000) == land
-    gate.open(command(K.LAND), LATEST)
+    gate.open(command(K.LAND))
     assert gate.seal(land, LATEST + 5_000_000) is LATE, "another command begins anew"
 
 
@@ -413,7 +413,9 @@ def test_a_path_is_flown_point_after_point(autopilot: int) -> None:
     """Out of its order, a leg would lead through where nobody looked. A path may come by one place twice."""
     a, b, c = (100, 100), (200, 100), (200, 300)
     path = (a, b, a, c)
-    covering = Command(7, "skill", K.COVER, (), tuple(part for point in path for part in point), 20_000, 4_000)
+    covering = Command(
+        7, "skill", K.COVER, (), tuple(part for point in path for part in point), 20_000, 4_000, not_after_us=LATEST
+    )
 
     def to(point: tuple[int, int]) -> bytes:
         x, y = point
@@ -425,14 +427,14 @@ def test_a_path_is_flown_point_after_point(autopilot: int) -> None:
         assert isinstance(gate.seal(to(later), NOW), Refusal)
         assert gate.seal(to(point), NOW) == to(point)
     assert gate.seal(to(a), NOW) is OUT_OF_ORDER, "and never back"
-    gate.open(covering, LATEST)
+    gate.open(covering)
     assert gate.seal(to(c), NOW) is OUT_OF_ORDER
     assert gate.seal(to(a), NOW) == to(a)
 
 
 def test_one_command_at_a_time_and_none_after_the_end() -> None:
     gate = session(ARDUPILOT, command(K.LAND))
-    gate.open(command(K.HOLD), LATEST)
+    gate.open(command(K.HOLD))
     assert not covers(gate, long(176, 1, 9))
     assert covers(gate, long(176, 1, 17))
     gate.close()
@@ -527,7 +529,7 @@ def test_what_passes_is_signed_and_nothing_else() -> None:
     with pytest.raises(RuntimeError, match="signed already"):
         gate.sign_with(FakeSigner())
     gate.observe(pack(heartbeat(PX4), component=1))
-    gate.open(command(K.LAND), LATEST)
+    gate.open(command(K.LAND))
     land = pack(long(176, 1, 4, 6))
     assert gate.seal(land, NOW) == b"signed " + land
     assert gate.seal(pack(long(176, 1, 4, 5)), NOW) is NOT_COVERED
@@ -641,7 +643,7 @@ def test_another_vehicle_tells_nothing_of_where_this_one_is() -> None:
 
 def test_a_command_ends_a_preparation() -> None:
     gate = prepared(ARDUPILOT, "FENCE_RADIUS", 300.0)
-    gate.open(command(K.CLIMB), LATEST)
+    gate.open(command(K.CLIMB))
     assert not gate.stands(NOW)
     assert gate.seal(pack(setting("FENCE_RADIUS", 300.0)), NOW) is NOT_LISTED
     gate.close()

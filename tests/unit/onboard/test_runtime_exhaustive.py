@@ -17,7 +17,7 @@ from rtshcua.onboard.enforcement.executor import Commands, Executor
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
-    Dispatch,
+    Command,
     End,
     EvidenceFailed,
     Failed,
@@ -38,16 +38,16 @@ class Watched(Executor):
 
     def __init__(self, commands: Commands) -> None:
         super().__init__(SESSION_KEY, commands)
-        self.passed: list[Dispatch] = []
+        self.passed: list[Command] = []
 
-    def dispatch(self, sealed: bytes, now_us: int) -> Dispatch | Refusal:
+    def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
         return self._noted(super().dispatch(sealed, now_us))
 
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Dispatch | Refusal:
+    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         return self._noted(super().stand_in(sealed, kind, link, now_us))
 
-    def _noted(self, result: Dispatch | Refusal) -> Dispatch | Refusal:
-        if isinstance(result, Dispatch):
+    def _noted(self, result: Command | Refusal) -> Command | Refusal:
+        if isinstance(result, Command):
             self.passed.append(result)
         return result
 
@@ -109,8 +109,8 @@ def explore(situation: str, sequence: tuple[str, ...]) -> None:
     # From here on the link holds, and the vehicle does what it was told last.
     run.step(LinkBack(0))
     run.until_over(400)
-    sent = [action for action in run.actions if isinstance(action, Dispatch)]
-    assert [id(dispatch) for dispatch in sent] == [id(dispatch) for dispatch in executor.passed]
+    sent = [action for action in run.actions if isinstance(action, Command)]
+    assert [id(command) for command in sent] == [id(command) for command in executor.passed]
     assert_covered(run)
     assert_orderly(run)
 
@@ -131,7 +131,7 @@ def assert_orderly(run: Run) -> None:
     assert len(endings) == 1
     assert endings[0] == len(run.actions) - 1
     released = [number for number, action in enumerate(run.actions) if isinstance(action, Release)]
-    assert not any(isinstance(action, Dispatch) for number in released for action in run.actions[number:])
+    assert not any(isinstance(action, Command) for number in released for action in run.actions[number:])
 
 
 @pytest.mark.parametrize("situation", SITUATIONS)

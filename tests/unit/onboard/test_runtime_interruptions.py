@@ -11,7 +11,7 @@ from reference.world import TICK, FakeVehicle, Run, assert_audited, loaded, rene
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
-    Dispatch,
+    Command,
     Ending,
     EvidenceFailed,
     Failed,
@@ -208,12 +208,10 @@ def test_a_lost_disk_brings_the_vehicle_down_and_the_gap_is_recorded_once(situat
     assert run.ending is Ending.EVIDENCE_LOST
     assert run.events.count("gap") == 1
     assert not run.vehicle.airborne
-    after = [action for action in run.actions if isinstance(action, Dispatch)][sent:]
-    assert not any(dispatch.needs_record for dispatch in after), "nothing new is allowed any more"
+    after = [action for action in run.actions if isinstance(action, Command)][sent:]
+    assert not any(command.needs_record for command in after), "nothing new is allowed any more"
     assert all(
-        dispatch.needs_record
-        for dispatch in run.actions
-        if isinstance(dispatch, Dispatch) and dispatch.command.skill == "takeoff"
+        command.needs_record for command in run.actions if isinstance(command, Command) and command.skill == "takeoff"
     )
 
 

@@ -5,18 +5,19 @@ from functools import partial
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Append, Command, Dispatch, Release
+from rtshcua.onboard.ports import Append, Command, Release
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.wire.keys import Duty, SigningKey
 
 KEY = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
-DISPATCH = Dispatch(Command(7, "hover", 0, (), (), 0, 0), 1 << 40, True)
+COMMAND = Command(7, "hover", 0, (), (), 0, 0, needs_record=True)
 
 
 def at(us: int) -> Now:
@@ -39,7 +40,7 @@ def told(journal: Journal, us: int) -> list[tuple[Any, int]]:
 
 def test_an_epoch_that_is_over_is_sealed_in_a_step_that_sends_nothing(journal: Journal) -> None:
     assert told(journal, EPOCH_US - 1) == []
-    journal.add(DISPATCH)
+    journal.add(COMMAND)
     assert told(journal, EPOCH_US) == []
     journal.effect(at(EPOCH_US), "succeeded")
     assert told(journal, EPOCH_US) == [("succeeded", WRITTEN), ("seal", SYNCED_FIRST)]
@@ -61,7 +62,7 @@ def test_an_epoch_of_many_records_is_sealed_though_every_step_sends_something(jo
     lines: list[tuple[Any, int]] = []
     for number in range(EPOCH_RECORDS * 3):
         journal.effect(at(1), "said")
-        journal.add(DISPATCH)
+        journal.add(COMMAND)
         if number % in_a_step == in_a_step - 1:
             lines += told(journal, 1)
     seals = [number for number, (what, _) in enumerate(lines) if what == "seal"]
@@ -89,18 +90,18 @@ def test_a_command_that_waits_for_nothing_is_a_reflex(
     for action in before:
         journal.add(action)
     journal.effect(at(1), "violated")
-    dispatch = Dispatch(DISPATCH.command, 1 << 40, needs_record)
-    journal.add(dispatch)
-    assert (journal.reflex is dispatch) is is_reflex
+    command = replace(COMMAND, needs_record=needs_record)
+    journal.add(command)
+    assert (journal.reflex is command) is is_reflex
     taken = journal.take(at(1), ended=False)
-    assert dispatch in taken, "in its place among all that is to be done"
+    assert command in taken, "in its place among all that is to be done"
     assert journal.reflex is None
 
 
 def test_records_of_a_reflex_are_made_when_they_are_taken_and_not_before(journal: Journal) -> None:
     before = journal.recorder.count
     journal.effect(at(1), "violated")
-    journal.add(Dispatch(DISPATCH.command, 1 << 40, needs_record=False))
+    journal.add(replace(COMMAND, needs_record=False))
     assert journal.reflex is not None
     assert journal.recorder.count == before
     journal.take(at(1), ended=False)

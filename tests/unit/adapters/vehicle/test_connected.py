@@ -121,7 +121,7 @@ def test_what_is_sent_is_kept_and_told(link: ConnectedVehicle, vehicle: Peer) ->
     vehicle.beat()
     poll(link)
     hold, now_us = Command(9, "hover", MotionKind.HOLD, (), (), 0, 0), SystemClock().now().monotonic_us
-    link.frames.open(hold, now_us)  # type: ignore[attr-defined]
+    link.frames.open(hold)  # type: ignore[attr-defined]
     link.begin(hold, now_us)
     vehicle.beat()
     assert [event.token for event in poll(link) if isinstance(event, Sent)] == [9]

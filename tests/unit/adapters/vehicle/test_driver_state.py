@@ -65,8 +65,8 @@ class Bench:
         self.beat(*self.told)
 
     def begin(self, kind: MotionKind, *geo: int, altitude: int = 0) -> list[Event]:
-        command = Command(7, kind.name.lower(), kind, (0,) * len(geo), geo, altitude, 0)
-        self.frames.open(command, self.now_us + S)
+        command = Command(7, kind.name.lower(), kind, (0,) * len(geo), geo, altitude, 0, not_after_us=self.now_us + S)
+        self.frames.open(command)
         return self.driver.begin(command, self.now_us)[0]
 
     def beat(self, mode: int, armed: bool = False, status: int = 4) -> None:

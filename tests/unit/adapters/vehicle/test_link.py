@@ -21,7 +21,7 @@ def test_what_the_boundary_does_not_let_out_has_failed() -> None:
     target = Target("px4", keyed=False)
     assert target.driver.begin(LAND, 7) == ([Failed(7, 5, NO_SESSION.slug)], [])
     assert not [event for event in target.driver.tick(10_000_000)[0] if isinstance(event, Failed)], "told once"
-    target.frames.open(LAND, 20_000_000)
+    target.frames.open(LAND)
     target.now_us = 11_000_000
     target.receive(target.says(greeting("px4")[0]))  # its mode is known
     events, frames = target.driver.begin(LAND, 11_000_000)
@@ -31,7 +31,7 @@ def test_what_the_boundary_does_not_let_out_has_failed() -> None:
 
 def test_another_command_than_the_permitted_one_does_not_leave() -> None:
     target = Target("ardupilot", keyed=False)
-    target.frames.open(LAND, 20_000_000)
+    target.frames.open(LAND)
     assert target.driver.begin(HOLD, 7) == ([Failed(7, 6, NOT_COVERED.slug)], [])
 
 
@@ -39,7 +39,7 @@ def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
     target = Target("ardupilot", keyed=False)
     target.receive(target.says(mavlink.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3)))
     target.receive(target.says(mavlink.MAVLink_extended_sys_state_message(0, 2)))
-    target.frames.open(LAND, 1_000_000)
+    target.frames.open(LAND)
     assert len(target.driver.begin(LAND, 0)[1]) == 1
     target.frames.close()
     target.now_us = 1_500_000
@@ -54,7 +54,7 @@ def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
 
 def test_with_a_key_whatever_leaves_is_signed() -> None:
     target = Target("px4", keyed=True)
-    target.frames.open(LAND, 20_000_000)
+    target.frames.open(LAND)
     frames = target.driver.begin(LAND, 0)[1] + target.driver.tick(5_000_000)[1]
     peer = SignedLink(KEY, State(0, {}), UTC_US, 0)
     assert len(frames) > 1

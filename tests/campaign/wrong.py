@@ -138,17 +138,17 @@ def _record_for(needed: bool) -> Any:
 
 
 def _links_unwritten(of: Any) -> Any:
-    def send(self: Any, now: Any, dispatch: Any, ref: Any, lasting_us: Any) -> bool:
-        if ref.kind == STEP or isinstance(dispatch, Refusal):
-            return bool(of(self, now, dispatch, ref, lasting_us))
+    def send(self: Any, now: Any, command: Any, ref: Any, lasting_us: Any) -> bool:
+        if ref.kind == STEP or isinstance(command, Refusal):
+            return bool(of(self, now, command, ref, lasting_us))
         with patch.object(self._journal, "effect", lambda *given, **more: None):
-            return bool(of(self, now, dispatch, ref, lasting_us))
+            return bool(of(self, now, command, ref, lasting_us))
 
     return send
 
 
 def _never_late(of: Any) -> Any:
-    return lambda self, command, not_after_us: of(self, command, _ALWAYS)
+    return lambda self, command: of(self, replace(command, not_after_us=_ALWAYS))
 
 
 def _aged_from_arrival(of: Any) -> Any:

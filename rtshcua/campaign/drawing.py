@@ -11,7 +11,7 @@ The same campaign, number and tally give the same scenario, in whatever process,
 - How deep: each parameter as `RANGES` says, evenly, or evenly in its logarithm, in steps that a person would write.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import exp, log
 from random import Random
@@ -20,7 +20,10 @@ from typing import Any, Final
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import AfterStep, AtTime, Incident, Scenario, Start, When
+from rtshcua.wire.approval import confirms
 
 S: Final = 1_000_000
 FLAVOURS: Final = ("px4", "ardupilot")
@@ -161,6 +164,8 @@ class Space:
     kinds: frozenset[type[Fault]] = frozenset(faults.KINDS.values())
     read: tuple[str, ...] = ()
     """The messages that the policy reads its signals from: half of those that fall silent or stick are among these."""
+    answers: tuple[Incident, ...] = ()
+    """What people answer in every flight, besides what is drawn: `answers_of`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +201,24 @@ def draw(campaign: int, number: int, space: Space, tally: Tally) -> Drawn:
         wind_from_deg=10 * chance.randrange(36),
         gust_mm_s=chance.choice((0, 500, 1_000)),
     )
-    scenario = Scenario(f"flight {number} of campaign {campaign}", (flavour,), seed, seed, start, tuple(incidents), ())
+    name = f"flight {number} of campaign {campaign}"
+    scenario = Scenario(name, (flavour,), seed, seed, start, (*incidents, *space.answers), ())
     return Drawn(scenario, tuple(tries))
+
+
+#: when who is asked for an approval answers, after the step before was sent (or the start of the run)
+ANSWERS_US: Final = (1 * S, 5 * S)
+
+
+def answers_of(policy: Policy, mission: Mission) -> Iterator[Incident]:
+    """What people of every role that a `confirm` rule may ask about a step answer: that they approve of it."""
+    skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
+    for step, invocation in enumerate(mission.invocations):
+        for number, role in enumerate(policy.roles):
+            if confirms(policy, invocation, number):
+                when = AfterStep(step - 1, *ANSWERS_US) if step else AtTime(*ANSWERS_US)
+                fault = faults.Approval(0, role)
+                yield Incident(when, fault, incident_text(when, fault, skills))
 
 
 def _pair(chance: Random, space: Space, moments: Sequence[Moment], tally: Tally) -> tuple[type[Fault], Moment | None]:

@@ -25,7 +25,8 @@ _LARGEST: Final = 1 << 16
 class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What makes a campaign the same one: a flight of this number is drawn and flown alike wherever all of it is equal.
 
-    `bundle` is the SHA-256 of what is flown, `kinds` those of faults that are drawn, `version` that of this program.
+    `bundle` is the SHA-256 of what is flown, `kinds` those of faults that are drawn, `version` that of this program,
+    `approved` whether whoever is asked for an approval gives it.
     """
 
     mission: str
@@ -35,6 +36,7 @@ class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     flavours: tuple[str, ...]
     kinds: tuple[str, ...]
     version: str
+    approved: bool = False
 
 
 class Folder:

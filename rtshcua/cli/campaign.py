@@ -17,7 +17,7 @@ from rtshcua import __version__, library
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.campaign import campaign as flying
 from rtshcua.campaign.campaign import Order
-from rtshcua.campaign.drawing import FLAVOURS, Space
+from rtshcua.campaign.drawing import FLAVOURS, Space, answers_of
 from rtshcua.campaign.flights import Field, Flight
 from rtshcua.campaign.folder import Folder, Identity
 from rtshcua.campaign.results import Result
@@ -65,6 +65,9 @@ def campaign(
     fault: Annotated[
         list[str] | None, typer.Option(metavar="KIND", help="faults of this kind alone (repeatable) [default: all]")
     ] = None,
+    approve: Annotated[
+        bool, typer.Option("--approve", help="in every flight, whoever is asked for an approval gives it")
+    ] = False,
     at: Annotated[str | None, typer.Option(help="time of issue, such as 2026-01-31T08:00:00Z [default: now]")] = None,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="processes [default: one a core]")] = None,
     cluster: Annotated[
@@ -104,13 +107,13 @@ def campaign(
     field = Field.of(compiled.policy, compiled.mission, issued_us)
     identity = Identity(
         compiled.mission.name, issued_us, sha256(field.bundle).hexdigest(), seed, flavours,
-        tuple(sorted(kind.__name__ for kind in kinds)), __version__,
+        tuple(sorted(kind.__name__ for kind in kinds)), __version__, approve,
     )  # fmt: skip
     if begun is not None and begun != identity:
         return findings.end(_other(folder, begun, identity))
     if not as_json_:
         say(f"without faults first, on {' and '.join(flavours)}")
-    space = _space(field, compiled.policy, compiled.mission, flavours, kinds)
+    space = _space(field, compiled.policy, compiled.mission, flavours, kinds, approve)
     if isinstance(space, Refusal):
         return findings.end(space)
     try:
@@ -187,6 +190,7 @@ def _other(folder: Folder, begun: Identity, asked: Identity) -> Refusal:
         "kinds": "other kinds of faults",
         "version": "another version of this program",
         "issued_at_us": "another time of issue",
+        "approved": "another choice of `--approve`",
     }
     differ = [name for name in Identity.__struct_fields__ if getattr(begun, name) != getattr(asked, name)]
     what = " and ".join(words.get(name, f"another {name}") for name in differ)
@@ -195,25 +199,27 @@ def _other(folder: Folder, begun: Identity, asked: Identity) -> Refusal:
 
 
 def _space(
-    field: Field, policy: Policy, mission: Mission, flavours: tuple[str, ...], kinds: frozenset[type]
+    field: Field, policy: Policy, mission: Mission, flavours: tuple[str, ...], kinds: frozenset[type], approve: bool
 ) -> Space | Refusal:
     """What is drawn from: how long the mission takes where nothing goes wrong, on each kind of autopilot."""
     lasts = {}
-    roles = sorted({policy.roles[rule.approver] for rule in policy.rules if rule.approver >= 0})
+    roles = sorted({policy.roles[role] for rule in policy.rules for role in (rule.approver, rule.second) if role >= 0})
+    asked = tuple(answers_of(policy, mission))
+    answers = asked if approve else ()
     for each in flavours:
-        calm = field.fly(Flight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), (), ())))
+        calm = field.fly(Flight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), answers, ())))
         wrong = f"fails even if nothing goes wrong: {calm.failures[0].text}" if calm.failures else None
         if wrong is None and calm.ending != Ending.COMPLETED:
             wrong = f"ends as `{calm.ending}` even if nothing goes wrong"
         if wrong is not None:
             help = "see it with `rtshcua run`; a campaign looks for what faults do to a flight that is good without"
-            if roles:
-                help += ". Nobody approves anything in it: a step that a `confirm` rule holds up cannot be flown so"
+            if asked and not approve:
+                help += ". Nobody approves anything in it; with `--approve` whoever is asked does"
             return Refusal("not-flown", f"on {each} the mission {wrong}", help)
         lasts[each] = calm.flown_us
     skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
     read = sorted({source.message for signal in policy.signals for source in signal.sources})
-    return Space(skills, lasts, tuple(roles), flavours, kinds, tuple(read))
+    return Space(skills, lasts, tuple(roles), flavours, kinds, tuple(read), answers)
 
 
 def _imported(source: Path, folder: Folder) -> str:

@@ -100,7 +100,7 @@ def fly_one_again(line: dict[str, Any]) -> Result:
     field = Field.of(compiled.policy, compiled.mission, begun["issued_at_us"])
     kinds = _kinds(["link-silence", "wind"])
     assert isinstance(kinds, frozenset)
-    space = _space(field, compiled.policy, compiled.mission, FLAVOURS, kinds)
+    space = _space(field, compiled.policy, compiled.mission, FLAVOURS, kinds, False)
     assert not hasattr(space, "slug")
     made = drawn(Order(begun["seed"], 2, space), line["number"], {})
     return field.fly(Flight(line["number"], made.scenario, made.tries))
@@ -223,6 +223,32 @@ def test_a_mission_that_fails_without_faults_is_refused(
     code, _, err = run(capsys)
     assert code == ExitCode.TESTS
     assert "on px4 the mission fails even if nothing goes wrong: flew into the ground" in err
+
+
+def test_who_is_asked_for_an_approval_gives_it_in_every_flight_where_that_is_asked_for(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    """Two roles are asked before each of two orbits: without them the mission cannot be flown."""
+    asked = [f"1 s .. 5 s after goto {step} approve(role = {role})" for step in (2, 3) for role in ("chief", "safety")]
+    refused: list[Flight] = []
+
+    def fly(_: Field, flight: Flight) -> Result:
+        texts = [each.text for each in flight.scenario.incidents]
+        refused.extend([flight] * any(text.split()[-3:] == ["refuse(role", "=", "safety)"] for text in texts))
+        return replace(told(flight), ending="completed" if texts[-4:] == asked else "aborted")
+
+    flies(fly)
+    mission = str(Path(__file__).parents[3] / "examples" / "wind_farm" / "missions" / "near_look.rts")
+    made = ["campaign", mission, *AT, "-j", "1", "-o", "made", "--flights", "400"]
+    assert app.main(made) == ExitCode.TESTS
+    assert "with `--approve` whoever is asked does" in capsys.readouterr()[1]
+    assert app.main([*made, "--approve"]) == ExitCode.OK
+    endings = json.loads(Path("made/report.json").read_text())["endings"]
+    assert endings == {"px4": {"completed": 200}, "ardupilot": {"completed": 200}}
+    assert refused, "the second role is never drawn"
+    capsys.readouterr()
+    assert app.main(made) == ExitCode.USAGE
+    assert "another choice of `--approve`" in capsys.readouterr()[1]
 
 
 def test_fewer_flights_than_were_flown_are_reported_with_all_that_were(

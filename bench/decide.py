@@ -18,10 +18,9 @@ from msgspec.structs import replace
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference import flat_case as flat
-from rtshcua.decision.authority import authority
-from rtshcua.decision.case import PASSED, Case, situation
-from rtshcua.decision.decide import decide
+from rtshcua.decision.decide import PASSED, authority, decide
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation
+from rtshcua.decision.situation import environment, situation
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
@@ -135,10 +134,11 @@ def asked_of_authority(policy: PreparedPolicy, keys: list[Key]) -> Callable[[], 
         contract = policy.policy.contracts[skill]
         invocation = flat.invocation(0, 0, 0, plan, ALTITUDE)
         invocation = replace(invocation, skill=skill, role=role, contract=contract)
-        cases.append(Case(prepared(invocation, policy), policy, flat.context(invocation), sets, exact=True))
-    assert all(authority(case) is PASSED for case in cases)
+        one = prepared(invocation, policy)
+        cases.append((one, environment(sets, policy, one.arguments, one.phase)))
+    assert all(authority(*case) is PASSED for case in cases)
     turn = cycle(cases)
-    return lambda: authority(next(turn))
+    return lambda: authority(*next(turn))
 
 
 def prepared(invocation: Invocation, policy: PreparedPolicy) -> PreparedInvocation:

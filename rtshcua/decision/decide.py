@@ -1,38 +1,65 @@
 """The decision (paper: `admissible(I, S_t, t)`, eta): one pure function, wherever it is called from.
 
 The steps are those of design 4.1. The first that does not pass decides. They judge sets of situations, so that the same
-loop serves the checker, which asks what is possible, and the runtime, which asks about one situation.
+ones serve the checker, which asks what is possible, and the runtime, which asks about one situation: a set of one,
+which has exactly one verdict. (`boundary/decision` has them in the files decide, authority, timing and safety.)
+
+1: the request is for this vehicle and the policy in force, and within its own ranges. Signatures were verified once, at
+load; what is compared here is the digest that they cover.
+
+2: not used before, not issued in the future, and its validity (paper symbol `vw`) is not over. UTC is known to within
+an error, so each question has a third answer: the clock does not tell.
+
+3: the source may use the timing class, no `forbid` matches, and some `permit` does. An unknown `forbid` may match, so
+it defers; an unknown `permit` may not, so it does not count.
+
+3b: a `confirm` rule that matches, or may match, needs an approval by its role, or by two different people, one for
+each of its two roles. The approval (of two, the later one) moves the release (design 4.3). A refusal, or an approval
+that did not come within the rule's time after the release, denies.
+
+4: the decision means something in the mission's current phase (`vw`).
+
+5: what remains to be done fits before the deadline, `L_rem <= ddl - t`, with t since the release.
+
+6: the preconditions (`require`, paper symbol `pre`) and the assumptions (`assume`, `sc`) hold now.
+
+7: the vehicle's envelope, airspace and invariants over the planned volume, energy, and `degrade` rules. The invariants
+(`maintain`, `inv`) are evaluated with position and height ranging over the planned volume, with zones as they exist
+from now to the end of the contract's longest duration, everything else as it is now; a temporal monitor says what it
+says now.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, TypeAlias
 
-from rtshcua.decision.authority import authority, confirmation, integrity
-from rtshcua.decision.case import PASS, PASSED, Case, Found, Verdict, is_situation, situation
+from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.links import START, fallbacks
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.safety import safety
-from rtshcua.decision.safety import state as state_step
-from rtshcua.decision.timing import freshness, phase, timing, valid_until
-from rtshcua.decision.values import Sets
-from rtshcua.model.decision import Decision
-from rtshcua.model.flat.contract import Link
-from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.decision.situation import environment, is_situation, ranging, situation
+from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, TRUE, UNKNOWN, Sets, Span, Truth
+from rtshcua.model.decision import Decision, Decisive
+from rtshcua.model.flat.contract import Link, SourceKind, TimingClass
+from rtshcua.model.flat.policy import Rule
+from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 
-#: number and rule of each step; 3b has the number 3 and reasons of its own
-STEPS: tuple[tuple[int, Callable[[Case], Found]], ...] = (
-    (1, integrity),
-    (2, freshness),
-    (3, authority),
-    (3, confirmation),
-    (4, phase),
-    (5, timing),
-    (6, state_step),
-    (7, safety),
-)
-ADMITTED = (8, PASS)
 _ALLOW, _FALLBACK = Outcome.ALLOW, Outcome.FALLBACK  # an enumeration's attributes are slow to find
+
+
+class Verdict(NamedTuple):
+    """An outcome with its reason and the clause that decided."""
+
+    outcome: Outcome
+    reason: Reason
+    clause: Decisive
+
+
+#: Verdicts of a step in the order of the rule; `PASS`, if passing is possible, comes last.
+Found: TypeAlias = tuple[Verdict, ...]
+
+PASS = Verdict(Outcome.ALLOW, Reason.ADMITTED, None)
+PASSED: Found = (PASS,)
+_ADMITTED = (8, PASS)
 
 
 class Possible(NamedTuple):
@@ -48,10 +75,10 @@ def decide(
 ) -> Decision:
     """Decide on an invocation in one situation. Total: one outcome, whatever the state, the context and the time."""
     sets = situation(state, policy, now)
-    case = Case(invocation, policy, context, sets, exact=True)
-    step, (outcome, reason, clause) = _verdicts(case)[0]
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
+    step, (outcome, reason, clause) = _verdicts(invocation, policy, context, sets, at, exact=True)[0]
     if outcome is _ALLOW:
-        return Decision(outcome, reason, step, clause, None, None, valid_until(case, state))
+        return Decision(outcome, reason, step, clause, None, None, valid_until(invocation, state, context, sets, at))
     choice = next(fallbacks(invocation, sets, policy, START, exact=True)) if outcome is _FALLBACK else None
     link, target = (None, None) if choice is None else (choice.index, choice.link)
     return Decision(outcome, reason, step, clause, link, target, now.monotonic_us)
@@ -61,9 +88,9 @@ def possible(
     invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, context: Context
 ) -> frozenset[Possible]:
     """Every (outcome, reason, target) that some situation of the sets may have, and perhaps some that none has."""
-    exact = is_situation(sets, policy)
+    exact, at = is_situation(sets, policy), environment(sets, policy, invocation.arguments, invocation.phase)
     found: set[Possible] = set()
-    for _, (outcome, reason, _) in _verdicts(Case(invocation, policy, context, sets, exact)):
+    for _, (outcome, reason, _) in _verdicts(invocation, policy, context, sets, at, exact):
         if outcome is _FALLBACK:
             for choice in fallbacks(invocation, sets, policy, START, exact):
                 found.add(Possible(outcome, reason, None if choice is None else choice.link))
@@ -72,14 +99,347 @@ def possible(
     return frozenset(found)
 
 
-def _verdicts(case: Case) -> list[tuple[int, Verdict]]:
+def _verdicts(
+    invocation: PreparedInvocation, policy: PreparedPolicy, context: Context, sets: Sets, at: Environment, exact: bool
+) -> list[tuple[int, Verdict]]:
     """The verdicts that are possible, each with its step; a single situation has one."""
     verdicts: list[tuple[int, Verdict]] = []
-    for number, step in STEPS:
-        found = step(case)
+    for number, found in steps(invocation, policy, context, sets, at, exact):
         if found is not PASSED:
             verdicts += [(number, verdict) for verdict in found if verdict is not PASS]
             if found[-1] is not PASS:
                 return verdicts
-    verdicts.append(ADMITTED)
+    verdicts.append(_ADMITTED)
     return verdicts
+
+
+def steps(
+    invocation: PreparedInvocation, policy: PreparedPolicy, context: Context, sets: Sets, at: Environment, exact: bool
+) -> Iterator[tuple[int, Found]]:
+    """Number and verdicts of each step, made when they are asked for; 3b has the number 3 and reasons of its own.
+
+    `at` is the set of situations as conditions read it; `exact`: it has one only.
+    """
+    yield 1, integrity(invocation, policy, context)
+    yield 2, freshness(invocation, context, sets)
+    yield 3, authority(invocation, at)
+    yield 3, confirmation(invocation, context, at, sets.monotonic_us)
+    yield 4, phase(invocation, context)
+    yield 5, timing(invocation, context, at, sets.monotonic_us)
+    yield 6, state(invocation, at, exact)
+    yield 7, safety(invocation, at, exact)
+
+
+def concluded(verdicts: list[Verdict], doubt: Verdict | None, passes: bool) -> Found:
+    """The verdicts of a step, `doubt` after those that are certain of what they judge; it may also pass."""
+    if doubt is not None:
+        verdicts.append(doubt)
+    if passes:
+        verdicts.append(PASS)
+    return PASSED if passes and len(verdicts) == 1 else tuple(verdicts)
+
+
+# ---------------------------------------------------------------- 1: integrity
+
+_BINDING = (Verdict(Outcome.DENY, Reason.BINDING_MISMATCH, None),)
+_VEHICLE = (Verdict(Outcome.DENY, Reason.WRONG_VEHICLE, None),)
+_VERSION = (Verdict(Outcome.DENY, Reason.POLICY_VERSION, None),)
+_ARGUMENT = (Verdict(Outcome.DENY, Reason.ARGUMENT_RANGE, None),)
+
+
+def integrity(invocation: PreparedInvocation, policy: PreparedPolicy, context: Context) -> Found:
+    """Denies what differs from what was signed. An invocation prepared under another policy is of another version."""
+    if context.binding != invocation.invocation.binding:
+        return _BINDING
+    if context.vehicle != policy.policy.vehicle.identity:
+        return _VEHICLE
+    if context.policy_version != policy.policy.version or invocation.policy is not policy:
+        return _VERSION
+    return PASSED if invocation.misfit is None else _ARGUMENT
+
+
+# ---------------------------------------------------------------- 2: freshness
+
+_REPLAYED = Verdict(Outcome.DENY, Reason.REPLAYED, None)
+_FUTURE = Verdict(Outcome.DENY, Reason.ISSUED_IN_FUTURE, None)
+_EXPIRED = Verdict(Outcome.DENY, Reason.EXPIRED, None)
+_UNCERTAIN = Verdict(Outcome.DEFER, Reason.CLOCK_UNCERTAIN, None)
+
+
+def freshness(invocation: PreparedInvocation, context: Context, sets: Sets) -> Found:
+    """Valid from the moment of issue to its end, both included."""
+    issued = invocation.invocation.issued_at_us
+    end = issued + invocation.invocation.contract.validity_us
+    utc, (least, most) = sets.utc_us, sets.utc_error_us
+    low, high = utc[0] if len(utc) == 1 else (min(first for first, _ in utc), max(last for _, last in utc))
+    if context.consumed:
+        return (_REPLAYED,)
+    if issued <= low - most and high + most <= end:
+        return PASSED
+    verdicts: list[Verdict] = []
+    if issued > low + least:
+        verdicts.append(_FUTURE)
+        if issued > high + most:
+            return tuple(verdicts)
+    if high - least > end:
+        verdicts.append(_EXPIRED)
+        if low - most > end:
+            return tuple(verdicts)
+    if most:
+        verdicts.append(_UNCERTAIN)
+    if issued <= high - least and low + least <= end:
+        verdicts.append(PASS)
+    return tuple(verdicts)
+
+
+# ---------------------------------------------------------------- 3: authority
+
+#: the timing classes that a source may use: an agent never reacts, a reflex does nothing else
+CLASSES: dict[int, frozenset[int]] = {
+    SourceKind.AGENT: frozenset({TimingClass.SEMANTIC, TimingClass.TACTICAL}),
+    SourceKind.OPERATOR: frozenset({TimingClass.SEMANTIC, TimingClass.TACTICAL}),
+    SourceKind.ONBOARD: frozenset({TimingClass.TACTICAL}),
+    SourceKind.REFLEX: frozenset({TimingClass.REFLEX}),
+}
+
+_CLASS = (Verdict(Outcome.DENY, Reason.CLASS_NOT_PERMITTED, None),)
+_NOT_PERMITTED = Verdict(Outcome.DENY, Reason.NOT_PERMITTED, None)
+
+
+def authority(invocation: PreparedInvocation, at: Environment) -> Found:
+    """Denied when a `forbid` is true or no `permit` is, even where another `forbid` is unknown; then that defers."""
+    if invocation.invocation.contract.timing_class not in CLASSES[invocation.invocation.source]:
+        return _CLASS
+    candidates = invocation.candidates
+    verdicts: list[Verdict] = []
+    doubt: Verdict | None = None
+    unforbidden = True
+    for rule in candidates.forbids:
+        truth = rule.condition(at)
+        if truth == FALSE:
+            continue
+        if truth & TRUE:
+            verdicts.append(Verdict(Outcome.DENY, Reason.FORBIDDEN, rule.rule))
+            if truth == TRUE:
+                return tuple(verdicts)
+        if truth & UNKNOWN and doubt is None:
+            doubt = Verdict(Outcome.DEFER, Reason.FORBID_UNKNOWN, rule.rule)
+        unforbidden = unforbidden and truth & FALSE != 0
+    permitted = False
+    for rule in candidates.permits:
+        truth = rule.condition(at)
+        if truth == TRUE:
+            break
+        permitted = permitted or truth & TRUE != 0
+    else:
+        rules = candidates.permits  # none speaks of this skill, role and source at all, or no condition is met
+        verdicts.append(Verdict(Outcome.DENY, Reason.OUT_OF_SCOPE, rules[0].rule) if rules else _NOT_PERMITTED)
+        if not permitted:
+            return tuple(verdicts)
+    if unforbidden and not verdicts and doubt is None:
+        return PASSED
+    return concluded(verdicts, doubt, unforbidden)
+
+
+# ---------------------------------------------------------------- 3b: confirmation
+
+
+class Asked(NamedTuple):
+    """What became of a `confirm` rule that may match: whether it surely does, until when an answer is waited for
+    (monotonic us), whether somebody refused, and when grants that came in time were enough.
+    """
+
+    rule: Rule
+    certain: bool
+    end_us: int
+    refused: bool
+    granted_us: int | None
+
+
+def _asked(invocation: PreparedInvocation, context: Context, at: Environment) -> Iterator[Asked]:
+    """The `confirm` rules that may match."""
+    for rule, number, condition in invocation.candidates.confirms:
+        truth = condition(at)
+        if truth == FALSE:
+            continue
+        end_us, roles = context.released_us + rule.within_us, (rule.approver, rule.second)
+        answers = [each for each in context.approvals if each.rule == number and each.role in roles]
+        refused = not all(each.granted for each in answers)
+        times = [] if refused else _granted(rule, [each for each in answers if each.monotonic_us <= end_us])
+        yield Asked(rule, not truth & FALSE, end_us, refused, min(times, default=None))
+
+
+def _granted(rule: Rule, answers: Sequence[Approval]) -> list[int]:
+    """When grants that came in time were enough, monotonic us: one of the role, or those of two people."""
+    first = [each for each in answers if each.role == rule.approver]
+    if rule.second == -1:
+        return [each.monotonic_us for each in first]
+    return [
+        max(one.monotonic_us, other.monotonic_us)
+        for one in first
+        for other in answers
+        if other.role == rule.second and other.person != one.person
+    ]
+
+
+def confirmation(invocation: PreparedInvocation, context: Context, at: Environment, monotonic_us: Span) -> Found:
+    """Denied when any rule's answer denies, else deferred when any is awaited."""
+    verdicts: list[Verdict] = []
+    doubt: Verdict | None = None
+    passes = True
+    earliest, latest = monotonic_us
+    for rule, certain, end_us, refused, granted_us in _asked(invocation, context, at):
+        if granted_us is not None:
+            continue
+        awaited = not refused and earliest <= end_us
+        if refused:
+            verdicts.append(Verdict(Outcome.DENY, Reason.APPROVAL_REFUSED, rule))
+        elif latest > end_us:
+            verdicts.append(Verdict(Outcome.DENY, Reason.APPROVAL_TIMED_OUT, rule))
+        if not awaited and certain:
+            return tuple(verdicts)
+        if awaited and doubt is None:
+            doubt = Verdict(Outcome.DEFER, Reason.AWAITING_APPROVAL, rule)
+        passes = passes and not certain
+    if passes and not verdicts and doubt is None:
+        return PASSED
+    return concluded(verdicts, doubt, passes)
+
+
+def release(invocation: PreparedInvocation, context: Context, at: Environment) -> Span:
+    """When the step was released, monotonic us: an approval moves it."""
+    first = last = context.released_us
+    for _, certain, _, _, granted_us in _asked(invocation, context, at):
+        if granted_us is not None:
+            first, last = max(first, granted_us) if certain else first, max(last, granted_us)
+    return first, last
+
+
+# ---------------------------------------------------------------- 4: phase
+
+_EARLY = (Verdict(Outcome.DEFER, Reason.PHASE_NOT_REACHED, None),)
+_LATE = (Verdict(Outcome.DENY, Reason.PHASE_PASSED, None),)
+
+
+def phase(invocation: PreparedInvocation, context: Context) -> Found:
+    """Deferred while one of its phases is still to come, denied when none is."""
+    current = max(context.phase, -1) + 1  # the phases from the current one on; before the first, all are to come
+    coming = invocation.invocation.phases << 1 >> current
+    if coming & 1:
+        return PASSED
+    return _EARLY if coming >> 1 else _LATE
+
+
+# ---------------------------------------------------------------- 5: timing
+
+_NO_SLACK = Verdict(Outcome.FALLBACK, Reason.NO_SLACK, None)
+
+
+def timing(invocation: PreparedInvocation, context: Context, at: Environment, monotonic_us: Span) -> Found:
+    """What would come too late is not wanted: the vehicle falls back. A release still to come gains nothing."""
+    spare = invocation.invocation.contract.deadline_us - context.remaining_us
+    (earliest, latest), (released_first, released_last) = monotonic_us, release(invocation, context, at)
+    if max(latest - released_first, 0) <= spare:
+        return PASSED
+    return (_NO_SLACK, PASS) if max(earliest - released_last, 0) <= spare else (_NO_SLACK,)
+
+
+def valid_until(invocation: PreparedInvocation, state: State, context: Context, sets: Sets, at: Environment) -> int:
+    """The earliest of deadline, end of validity and the moment when something that was read is stale, monotonic us.
+    What a temporal monitor looked at counts as read; and what it says stands for `MAX_GAP` after its observation.
+
+    The end of validity is mapped from UTC with the clock's error taken off.
+    """
+    contract = invocation.invocation.contract
+    (now, _), ((utc, _),), (error, _) = sets.monotonic_us, sets.utc_us, sets.utc_error_us
+    end = invocation.invocation.issued_at_us + contract.validity_us
+    (released, _), valid = release(invocation, context, at), end - utc - error
+    left = (released - now if released < now else 0) + contract.deadline_us  # `min` is slow
+    if valid < left:
+        left = valid
+    if invocation.rests_us < left:
+        left = invocation.rests_us
+    values, ages = state.values, state.ages
+    for slot, stale in invocation.reads:
+        if 0 <= stale - ages[slot] < left and values[slot] is not None:
+            left = stale - ages[slot]
+    return now + left
+
+
+# ---------------------------------------------------------------- 6 and 7: state and safety
+
+_STATE_UNKNOWN, _SAFETY_UNKNOWN = Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN
+_TOO_FAST = (Verdict(Outcome.FALLBACK, Reason.ENVELOPE, None),)
+
+
+class Tally:
+    """A step that passes when all its conditions are true: false falls back, else unknown defers.
+
+    `exact` says that a single situation is judged, so that a mixed truth is one over the places of one volume, where
+    the condition must hold everywhere. Otherwise it is one over many situations, each with a volume of its own.
+    """
+
+    __slots__ = ("_doubt", "_exact", "_passes", "_unknown", "_verdicts")
+
+    def __init__(self, unknown: Reason, exact: bool) -> None:
+        self._unknown, self._exact = unknown, exact
+        self._verdicts: list[Verdict] = []
+        self._doubt: Verdict | None = None
+        self._passes = True
+
+    def fails(self, truth: Truth, reason: Reason, clause: Decisive) -> bool:
+        """Count a condition that is not simply TRUE; whether the step surely fails, so that no other needs a look."""
+        if self._exact:
+            truth = EVERYWHERE[truth]
+        if truth & FALSE:
+            self._verdicts.append(Verdict(Outcome.FALLBACK, reason, clause))
+        if truth & UNKNOWN and self._doubt is None:
+            self._doubt = Verdict(Outcome.DEFER, self._unknown, clause)
+        self._passes = self._passes and truth & TRUE != 0
+        return truth == FALSE
+
+    def found(self, failed: bool) -> Found:
+        """The verdicts, given whether some condition surely fails."""
+        if failed:
+            return tuple(self._verdicts)
+        if self._passes and not self._verdicts and self._doubt is None:
+            return PASSED
+        return concluded(self._verdicts, self._doubt, self._passes)
+
+
+def state(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found:
+    """Falls back on the first clause that is false, else defers on the first that is unknown."""
+    tally = Tally(_STATE_UNKNOWN, exact)
+    for guards in (invocation.require, invocation.assume):
+        for clause, condition in guards:
+            truth = condition(at)
+            if truth != TRUE and tally.fails(truth, Reason.STATE_VIOLATED, clause):
+                return tally.found(failed=True)
+    return tally.found(failed=False)
+
+
+def safety(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found:
+    """Falls back on the first condition that is false, else defers on the first that is unknown."""
+    tally = Tally(_SAFETY_UNKNOWN, exact)
+    policy, known = invocation.policy, invocation.policy.tables.known
+    if invocation.invocation.plan.speed > policy.policy.vehicle.speed:
+        return _TOO_FAST
+    volume = invocation.planner.volume(at.slots, known)
+    if policy.airspace is not None:
+        truth = policy.airspace.keeps(volume.place, at, invocation.lasts_us)
+        if truth != TRUE and tally.fails(truth, Reason.AIRSPACE, policy.airspace.airspace):
+            return tally.found(failed=True)
+    if invocation.maintain:
+        over = ranging(at, volume, known.height, invocation.lasts_us)
+        for clause, condition in invocation.maintain:
+            truth = condition(over)
+            if truth != TRUE and tally.fails(truth, Reason.INVARIANT, clause):
+                return tally.found(failed=True)
+    truth = invocation.energy.suffices(at.slots[known.battery], volume)
+    if truth != TRUE and tally.fails(truth, Reason.ENERGY, None):
+        return tally.found(failed=True)
+    for rule in invocation.candidates.degrades:
+        truth = NOT[rule.condition(at)]
+        if truth != TRUE and tally.fails(truth, Reason.DEGRADED, rule.rule):
+            return tally.found(failed=True)
+    return tally.found(failed=False)

@@ -7,11 +7,11 @@ the airspace already, as far as its position error tells, may always go home.
 
 from collections.abc import Iterator, Sequence
 
-from rtshcua.decision.case import environment, remembered, situation
 from rtshcua.decision.contracts import longest
 from rtshcua.decision.evaluate import NO_PHASE, Environment
 from rtshcua.decision.prepare import Choice as Choice
 from rtshcua.decision.prepare import PreparedInvocation, PreparedLink, PreparedPolicy
+from rtshcua.decision.situation import environment, remembered, situation
 from rtshcua.decision.values import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Sets, Truth
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now, State

@@ -8,10 +8,9 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import Environment, Tables, build, total
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.safety import ranging
+from rtshcua.decision.situation import environment, ranging, situation
 from rtshcua.decision.times import local_time, time_of_week
 from rtshcua.decision.tree import Node
 from rtshcua.decision.values import FALSE, TRUE, Value, point

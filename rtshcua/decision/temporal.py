@@ -25,9 +25,9 @@ it is enough to know the last us that belongs to it, one number for each truth t
 
 from typing import Final, NamedTuple
 
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.prepare import PreparedMonitor, PreparedPolicy
+from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.values import AND, FALSE, NOT, TRUE, UNKNOWN, Truth
 from rtshcua.model.flat.limits import MAX_GAP
 from rtshcua.model.flat.policy import MonitorKind

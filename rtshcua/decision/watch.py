@@ -13,11 +13,10 @@ from collections.abc import Iterator, Sequence
 from math import isqrt
 from typing import NamedTuple
 
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.flying import SECOND
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
-from rtshcua.decision.safety import ranging
+from rtshcua.decision.situation import environment, ranging, situation
 from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Volume, distance
 from rtshcua.decision.zones import Place, Sweep

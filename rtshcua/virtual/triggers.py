@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE, Condition, build
 from rtshcua.decision.prepare import PreparedPolicy
+from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.values import TRUE
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.scenario import AfterStep, AtTime, OnCondition, Scenario

@@ -21,7 +21,7 @@ from rtshcua.adapters.px4 import flavour as px4
 from rtshcua.adapters.vehicle import driver, effects, flavour, manoeuvre, messages, source_time, supervision
 from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.campaign.drawing import FLAVOURS
-from rtshcua.decision import case, prepare, safety
+from rtshcua.decision import decide, prepare, situation
 from rtshcua.decision.values import TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.modes import Px4Mode
@@ -303,9 +303,9 @@ WRONG: Final = (
     Wrong("aged-from-arrival", "What is reported counts as measured when it arrives.",
           ((source_time.SourceTime, "of", _aged_from_arrival),)),
     Wrong("stale-is-fresh", "A value does not become unknown when it is stale.",
-          ((case, "_situation", _stale_is_fresh),), (b"unknown", b'"defer"', *_FALLS)),
+          ((situation, "_situation", _stale_is_fresh),), (b"unknown", b'"defer"', *_FALLS)),
     Wrong("unknown-is-true", "A condition whose truth is not known passes.",
-          ((safety.Tally, "fails", _unknown_is_true),), (b'"defer"', b"/unknown")),
+          ((decide.Tally, "fails", _unknown_is_true),), (b'"defer"', b"/unknown")),
     Wrong("degrade-not-watched", "A degrade rule counts when a step is admitted, and no more while it runs.",
           ((supervisor, "watch", _without("degrade")),), (b'"violated"',)),
     Wrong("assume-not-watched", "What a step assumes counts when it is admitted, and no more while it runs.",

@@ -5,9 +5,9 @@ from typing import Any
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.decision.case import situation
 from rtshcua.decision.decide import decide, possible
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation
+from rtshcua.decision.situation import situation
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.mission import Invocation

@@ -2,9 +2,9 @@
 
 from msgspec.structs import astuple
 
-from rtshcua.decision.case import SINGLE
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.session import Session
+from rtshcua.decision.situation import SINGLE
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import DECIDED, Decision, in_words
 from rtshcua.ground.auditor.observed import Observed

@@ -7,9 +7,9 @@ that moment, and a monitor must not say what these truths rule out: not TRUE `fo
 
 from typing import Final
 
-from rtshcua.decision.case import SINGLE, environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.prepare import PreparedPolicy
+from rtshcua.decision.situation import SINGLE, environment, situation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.evidence.finding import Flaw
 from rtshcua.model.flat.policy import MonitorKind

@@ -96,7 +96,7 @@ def _approval(ground: Ground, mission: Mission, invocation: Invocation) -> int:
     prepared = prepare_invocation(invocation, ground.prepared, mission.phases)
     if isinstance(prepared, Refusal):
         return 0  # reported by the proofs
-    at = ground.case(prepared).at
+    at = ground.around(prepared)
     return max((each.rule.within_us for each in rules.confirms if each.condition(at) & TRUE), default=0)
 
 

@@ -6,10 +6,10 @@ Links skip most steps of design 4.1 (`decision.links`): their own `require`, and
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepare import PreparedInvocation, PreparedLink, PreparedPolicy
+from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.values import EVERYWHERE
 from rtshcua.evidence.records import Decision
 from rtshcua.ground.why.recorded import now_of, state_of

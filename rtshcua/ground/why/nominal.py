@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.nearest import Changes, nearest_in
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.temporal import lasting
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind

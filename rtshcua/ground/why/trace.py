@@ -6,20 +6,18 @@ It calls the very steps that `decide` calls, and the conditions that they call; 
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from rtshcua.decision.case import PASS, Case, situation
 from rtshcua.decision.contracts import longest
-from rtshcua.decision.decide import STEPS, decide
+from rtshcua.decision.decide import PASS, decide, steps
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.links import link_admissible
 from rtshcua.decision.nearest import Nearest, nearest
 from rtshcua.decision.prepare import Guards, PreparedInvocation, PreparedPolicy
-from rtshcua.decision.safety import ranging
+from rtshcua.decision.situation import environment, ranging, situation
 from rtshcua.decision.values import EVERYWHERE, Truth
 from rtshcua.model.decision import Decision, Decisive
 from rtshcua.model.flat.situation import Context, Now, State
 
-_AUTHORITY, _CONFIRMATION, _STATE, _SAFETY = 2, 3, 6, 7  # indexes into `STEPS`
-#: the steps in the order of `STEPS`, by the numbers and names of design 4.1
+#: the steps in their order, by the numbers and names of design 4.1
 NAMES = (
     ("1", "integrity"),
     ("2", "freshness"),
@@ -68,34 +66,35 @@ class Trace(NamedTuple):
 def trace(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, context: Context, now: Now) -> Trace:
     """Decide, and say how. Pure, and total as `decide` is."""
     decision = decide(invocation, state, policy, context, now)
-    case = Case(invocation, policy, context, situation(state, policy, now), exact=True)
-    steps: list[Traced] = []
+    sets = situation(state, policy, now)
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
+    traced: list[Traced] = []
     decided = False
-    for at, ((number, name), (_, step)) in enumerate(zip(NAMES, STEPS, strict=True)):
+    found = steps(invocation, policy, context, sets, at, exact=True)
+    for number, name in NAMES:
         if decided:
-            steps.append(Traced(number, name, None, ()))
+            traced.append(Traced(number, name, None, ()))
             continue
-        decided = step(case)[0] is not PASS
-        steps.append(Traced(number, name, not decided, tuple(_checks(at, case))))
+        decided = next(found)[1][0] is not PASS
+        traced.append(Traced(number, name, not decided, tuple(_checks(name, invocation, at))))
     chain = tuple(Tried(link.link.text, link_admissible(link, state, policy, now)) for link in invocation.chain)
-    return Trace(decision, tuple(steps), chain, nearest(decision, invocation, state, policy, now))
+    return Trace(decision, tuple(traced), chain, nearest(decision, invocation, state, policy, now))
 
 
-def _checks(step: int, case: Case) -> Iterator[Check]:
+def _checks(step: str, invocation: PreparedInvocation, at: Environment) -> Iterator[Check]:
     """The conditions of a step, in the order in which it looks at them."""
-    invocation, at = case.invocation, case.at
     candidates = invocation.candidates
-    if step == _AUTHORITY:
+    if step == "authority":
         for rule in (*candidates.forbids, *candidates.permits):
             yield Check("forbid" if rule in candidates.forbids else "permit", rule.rule, rule.condition(at))
-    elif step == _CONFIRMATION:
+    elif step == "confirmation":
         for rule in candidates.confirms:
             yield Check("confirm", rule.rule, rule.condition(at))
-    elif step == _STATE:
+    elif step == "state":
         yield from _clauses("require", invocation.require, at)
         yield from _clauses("assume", invocation.assume, at)
-    elif step == _SAFETY:
-        yield from _safety(case)
+    elif step == "safety":
+        yield from _safety(invocation, at)
 
 
 def _clauses(role: str, guards: Guards, at: Environment) -> Iterator[Check]:
@@ -103,8 +102,8 @@ def _clauses(role: str, guards: Guards, at: Environment) -> Iterator[Check]:
         yield Check(role, clause, EVERYWHERE[condition(at)])
 
 
-def _safety(case: Case) -> Iterator[Check]:
-    invocation, policy, at = case.invocation, case.policy, case.at
+def _safety(invocation: PreparedInvocation, at: Environment) -> Iterator[Check]:
+    policy = invocation.policy
     known = policy.tables.known
     volume = invocation.planner.volume(at.slots, known)
     through = longest(invocation.invocation.contract, policy.policy.vehicle)

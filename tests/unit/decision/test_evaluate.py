@@ -8,9 +8,9 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference import worlds
 from reference.naive_code import Leg, TooNear, World, truths
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.evaluate import Condition, build
 from rtshcua.decision.prepare import PreparedPolicy, prepare
+from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.tree import parse, scope_of
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Sets, point
 from rtshcua.model.flat.situation import Now, State

@@ -8,12 +8,12 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.asking import STEP, loaded, ready
 from reference.flat_case import BATTERY, HEIGHT, HOVER, INSPECT, NOW, WIND, M, S, apply, argument, clause, const
-from rtshcua.decision.case import is_situation, situation
 from rtshcua.decision.decide import decide, possible
 from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.links import choose_contingency, choose_fallback, link_admissible
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
+from rtshcua.decision.situation import is_situation, situation
 from rtshcua.decision.tree import InPhase, Monitored, Scope, monitored, parse, scope_of, slots_read
 from rtshcua.decision.values import Sets
 from rtshcua.decision.watch import watch

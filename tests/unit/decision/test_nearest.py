@@ -10,11 +10,11 @@ from reference import flat_case as flat
 from reference import worlds
 from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract
 from reference.flat_case import BATTERY, FIX, GOTO, HEIGHT, INSPECT, NOW, POSITION_X, WIND, M, clause, rule
-from rtshcua.decision.case import situation
 from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.nearest import Change, Changes, nearest, nearest_in
 from rtshcua.decision.prepare import PreparedInvocation
+from rtshcua.decision.situation import situation
 from rtshcua.decision.tree import parse, scope_of
 from rtshcua.decision.values import MISSING, point
 from rtshcua.model.decision import Decision

@@ -2,7 +2,7 @@
 
 from reference import flat_case as flat
 from reference.asking import POLICY
-from rtshcua.decision.case import situation
+from rtshcua.decision.situation import situation
 from rtshcua.decision.values import MISSING, PRESENT, Value
 from rtshcua.model.flat.situation import State
 from virtual.rows import rows

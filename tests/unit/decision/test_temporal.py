@@ -15,8 +15,8 @@ from reference.asking import loaded
 from reference.flat_case import WIND, M, S, apply, clause, const, signal
 from reference.naive_code import Leg, World, truths
 from reference.naive_temporal import History, says
-from rtshcua.decision.case import situation
 from rtshcua.decision.prepare import PreparedPolicy
+from rtshcua.decision.situation import situation
 from rtshcua.decision.temporal import initial, lasting, observe
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import MAX_GAP, MAX_MONITORS, MAX_WINDOW

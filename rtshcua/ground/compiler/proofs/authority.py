@@ -7,8 +7,7 @@ left for on board.
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from rtshcua.decision.authority import authority
-from rtshcua.decision.case import PASS, Case
+from rtshcua.decision.decide import PASS, authority
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.nearest import Changes, Offer, offer
 from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
@@ -38,19 +37,19 @@ class Unmet(NamedTuple):
 
 def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
     """Whether in some state of the vehicle a step is permitted and flown; reports it where in none it is."""
-    case = ground.case(invocation)
-    found = authority(case)
+    at = ground.around(invocation)
+    found = authority(invocation, at)
     if PASS in found or not found:
-        return not _degraded(ground, step, invocation, case)
+        return not _degraded(ground, step, invocation, at)
     # a forbid that some state makes false does not decide in the best case; what permits, or does not, comes last
-    forbids = (each.rule for each in invocation.candidates.forbids if not each.condition(case.at) & FALSE)
+    forbids = (each.rule for each in invocation.candidates.forbids if not each.condition(at) & FALSE)
     forbid = None if found[0].reason is Reason.CLASS_NOT_PERMITTED else next(forbids, None)
     if forbid is not None:
         ground.context.report.add(
             codes.FORBIDDEN,
             step.span,
             f"the policy `{ground.prepared.policy.name}` forbids this step",
-            help=_otherwise(ground, invocation, case, forbid),
+            help=_otherwise(ground, invocation, at, forbid),
             labels=[(ground.span(forbid), "by this rule")],
         )
         return False
@@ -60,13 +59,13 @@ def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: Prepared
         case Reason.NOT_PERMITTED:
             _not_permitted(ground, mission, step, invocation)
         case _:
-            _out_of_scope(ground, step, invocation, case)
+            _out_of_scope(ground, step, invocation, at)
     return False
 
 
-def _degraded(ground: Ground, step: Step, invocation: PreparedInvocation, case: Case) -> bool:
+def _degraded(ground: Ground, step: Step, invocation: PreparedInvocation, at: Environment) -> bool:
     """Whether a degrade holds, or is unknown, in every state; reports it."""
-    always = (each.rule for each in invocation.candidates.degrades if not each.condition(case.at) & FALSE)
+    always = (each.rule for each in invocation.candidates.degrades if not each.condition(at) & FALSE)
     rule = next(always, None)
     if rule is None or rule.target is None:
         return False
@@ -76,19 +75,19 @@ def _degraded(ground: Ground, step: Step, invocation: PreparedInvocation, case: 
         step.span,
         f"the policy `{policy.name}` flies `{policy.contracts[rule.target.skill].name}` in place of this step, "
         "whatever the state",
-        help=_otherwise(ground, invocation, case, rule),
+        help=_otherwise(ground, invocation, at, rule),
         labels=[(ground.span(rule), "by this rule")],
     )
     return True
 
 
-def _otherwise(ground: Ground, invocation: PreparedInvocation, case: Case, rule: Rule) -> str:
+def _otherwise(ground: Ground, invocation: PreparedInvocation, at: Environment, rule: Rule) -> str:
     """The nearest arguments for which a rule does not hold; where there are none, what else to change."""
     node = ground.prepared.compiler.when(rule)
-    changes = Changes(case.at, ground.prepared.tables)
+    changes = Changes(at, ground.prepared.tables)
     wanted = None if node is None else changes.find(hopeful(node, False), False)
     contract, policy = invocation.invocation.contract, ground.prepared.policy
-    offers = [offer(change, contract, policy, case.at) for change in wanted or ()]
+    offers = [offer(change, contract, policy, at) for change in wanted or ()]
     if not offers or not all(each.change.argument and each.options for each in offers):
         return "narrow the condition of the rule, or leave the step out"
     return _accepted({each.subject: "` or `".join(_words(each)) for each in offers})
@@ -134,9 +133,9 @@ def _not_permitted(ground: Ground, mission: MissionDecl, step: Step, invocation:
     )
 
 
-def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, case: Case) -> None:
+def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, at: Environment) -> None:
     """Explain by the permit that is nearest to permitting."""
-    permits = [_unmet(ground, permit, invocation, case.at) for permit in invocation.candidates.permits]
+    permits = [_unmet(ground, permit, invocation, at) for permit in invocation.candidates.permits]
     nearest = min(permits, key=len)
     report, flat = ground.context.report, invocation.invocation
     names = list(dict.fromkeys(name for unmet in nearest for name in unmet.parameters))

@@ -109,7 +109,7 @@ def _lacking(ground: Ground, invocation: PreparedInvocation, start: Place) -> Cl
             slots[signal.slot] = point(MAV_LANDED_STATE_IN_AIR if start.aloft else MAV_LANDED_STATE_ON_GROUND)
     there = at.over(slots, None, 0)
     for clause, condition in (*invocation.require, *invocation.assume):
-        if not condition(there) & TRUE and condition(ground.case(invocation).at) & TRUE:
+        if not condition(there) & TRUE and condition(ground.around(invocation)) & TRUE:
             return clause
     return None
 

@@ -105,7 +105,7 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
             return
         latest += approval(ground, invocation) + contract.deadline_us
         for clause in (*contract.require, *contract.assume):
-            at = ground.case(invocation).at
+            at = ground.around(invocation)
             window = _needed(ground, at, ground.prepared.compiler.node(clause, contract), True)
             if latest < window < NEVER:
                 ground.context.report.add(
@@ -124,7 +124,7 @@ def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[P
 
 def _forbidden(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
     """Whether a rule that defers while it is unknown must observe longer than the flight up to a step; reports it."""
-    at, compiler = ground.case(invocation).at, ground.prepared.compiler
+    at, compiler = ground.around(invocation), ground.prepared.compiler
     for rule in refusing(invocation):
         node = compiler.when(rule)
         window = 0 if node is None else _needed(ground, at, node, False)
@@ -145,7 +145,7 @@ def _unpermitted(ground: Ground, step: Step, invocation: PreparedInvocation, lat
     """Whether each permit that may cover a step must observe for longer than the flight up to its release; reports it.
     A step does not wait for a permit: it is denied.
     """
-    at, compiler = ground.case(invocation).at, ground.prepared.compiler
+    at, compiler = ground.around(invocation), ground.prepared.compiler
     permits = [permit.rule for permit in invocation.candidates.permits if permit.condition(at) & TRUE]
     nodes = [(rule, compiler.when(rule)) for rule in permits]
     needed = [(rule, 0 if node is None else _needed(ground, at, node, True)) for rule, node in nodes]

@@ -135,7 +135,7 @@ def _wind(ground: Ground, invocation: PreparedInvocation) -> int:
         for signal in policy.signals
         if signal.dimension == Dimension.SPEED.value and all(each.message in _WIND for each in signal.sources)
     ]
-    at = ground.case(invocation).at
+    at = ground.around(invocation)
 
     def goes_on(slot: int, wind: int) -> bool:
         values = list(at.slots)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Condition, Environment
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
-from rtshcua.decision.safety import ranging
+from rtshcua.decision.situation import ranging
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE
 from rtshcua.decision.values import Span as Utc
@@ -186,7 +186,7 @@ def _broken(
     """A clause of the contract that cannot hold over the planned volume, which leads along `legs`, or at the start."""
     over = ranging(at, volume, ground.prepared.tables.known.height, invocation.lasts_us)
     arguments, contract = invocation.invocation.arguments, invocation.invocation.contract
-    anywhere = ground.case(invocation).at
+    anywhere = ground.around(invocation)
 
     def can(condition: Condition, best: Condition | None, there: Environment, utc: Utc) -> bool:
         """Whether a clause can be true at a moment, and in the best case is nowhere false."""

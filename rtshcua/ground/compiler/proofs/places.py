@@ -89,7 +89,7 @@ def from_where(
 def planned(ground: Ground, invocation: PreparedInvocation, start: Place) -> tuple[Environment, Volume]:
     """Any state of a vehicle that is at `start`, and the volume that the step is planned to take from there."""
     known = ground.prepared.tables.known
-    at = ground.case(invocation).at
+    at = ground.around(invocation)
     slots = list(at.slots)
     slots[known.x], slots[known.y], slots[known.height] = point(start.x), point(start.y), point(start.height)
     return at.over(slots, None, 0), invocation.planner.volume(slots, known)

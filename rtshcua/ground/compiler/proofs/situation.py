@@ -3,9 +3,9 @@
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
-from rtshcua.decision.case import Case
 from rtshcua.decision.evaluate import Condition, Environment, build
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
+from rtshcua.decision.situation import environment
 from rtshcua.decision.tree import Node, where
 from rtshcua.decision.values import MISSING, Sets, Value
 from rtshcua.diagnostics.refusal import Refusal
@@ -20,7 +20,6 @@ from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.limits import WEEK
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Airspace, Rule
-from rtshcua.model.flat.situation import Context as Standing
 
 #: us since the epoch: later than any flight
 EVER = 1 << 53
@@ -88,12 +87,10 @@ class Ground:
             found = self.steps[invocation, phases] = prepare_invocation(invocation, self.prepared, phases)
         return found
 
-    def case(self, invocation: PreparedInvocation) -> Case:
-        """A step in any state."""
-        flat = invocation.invocation
-        policy = self.prepared.policy
-        standing = Standing(flat.binding, policy.vehicle.identity, policy.version, 0, 0, flat.phase, 0, ())
-        return Case(invocation, self.prepared, standing, self.sets(flat.issued_at_us), exact=False)
+    def around(self, invocation: PreparedInvocation) -> Environment:
+        """Any state around a step, for a condition."""
+        sets = self.sets(invocation.invocation.issued_at_us)
+        return environment(sets, self.prepared, invocation.arguments, invocation.phase)
 
     def environment(self, arguments: tuple[Value, ...], phase: int) -> Environment:
         """Arguments in any state, in a phase by its number among the policy's names, for a condition."""

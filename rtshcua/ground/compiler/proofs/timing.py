@@ -52,6 +52,6 @@ def prove(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedI
 
 def approval(ground: Ground, invocation: PreparedInvocation) -> int:
     """How long a step may wait for approvals."""
-    at = ground.case(invocation).at
+    at = ground.around(invocation)
     waits = [rule.rule.within_us for rule in invocation.candidates.confirms if rule.condition(at) & TRUE]
     return max(waits, default=0)

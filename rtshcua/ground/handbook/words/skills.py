@@ -29,7 +29,7 @@ _CLASSES: Final = {
     "tactical": "Tactical: it begins within seconds, or not at all.",
     "reflex": "Reflex: it begins at once, and only the vehicle itself may ask for it.",
 }
-#: of a skill that a chain ends in (decision/links.py and decision/safety.py)
+#: of a skill that a chain ends in (decision/links.py and decision/decide.py)
 AS_LINK: Final = (
     "As the last link of a chain it needs nothing: neither rules nor charge are asked. Asked for as a step, it is held "
     "against the rules (`degrade` too) and the charge as any other."

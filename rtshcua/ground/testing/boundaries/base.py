@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.authority import CLASSES
+from rtshcua.decision.decide import CLASSES
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.volume import HOME

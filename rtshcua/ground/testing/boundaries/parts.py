@@ -6,7 +6,7 @@ from typing import NamedTuple
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Condition, build
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
-from rtshcua.decision.safety import ranging
+from rtshcua.decision.situation import ranging
 from rtshcua.decision.values import EVERYWHERE, Truth
 from rtshcua.ground.testing.boundaries.scene import Scene
 from rtshcua.ground.testing.coverage.universe import AIRSPACE, ENERGY, ENERGY_TEXT, clauses_of

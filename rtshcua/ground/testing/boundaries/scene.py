@@ -5,10 +5,10 @@ from typing import NamedTuple, TypeAlias
 
 from msgspec.structs import replace
 
-from rtshcua.decision.case import environment, situation
 from rtshcua.decision.contracts import first_cell, misfit
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import PreparedInvocation
+from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.values import point
 from rtshcua.decision.volume import Planner, flown_at, near_home
 from rtshcua.model.flat.contract import PLACE, MotionKind

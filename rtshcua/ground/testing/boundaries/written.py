@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 
-from rtshcua.decision.case import SINGLE
+from rtshcua.decision.situation import SINGLE
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.testing.boundaries.scene import Value
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter

@@ -1,37 +1,19 @@
-"""One case to decide, everything that the steps read, as sets of values; and what a step answers: the verdicts that are
-possible. A single situation is a set of one, and has exactly one verdict.
-"""
+"""What is decided in, as sets of values: a single situation is a set of one."""
 
 from collections.abc import Sequence
 from itertools import repeat
 from operator import le
-from typing import NamedTuple, TypeAlias, TypeGuard, cast
+from typing import TypeGuard, cast
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, Seen
-from rtshcua.decision.values import FALSE, MAYBE, MISSING, PRESENT, TRUE, UNKNOWN, Sets, Span, Truth, Value
-from rtshcua.model.decision import Decisive
-from rtshcua.model.flat.situation import Context, Now, State
-from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.decision.prepare import PreparedPolicy, Seen
+from rtshcua.decision.values import FALSE, MAYBE, MISSING, PRESENT, TRUE, UNKNOWN, Sets, Truth, Value
+from rtshcua.decision.volume import Volume
+from rtshcua.model.flat.situation import Now, State
 
 #: what a single situation may say of a temporal monitor
 SINGLE = frozenset({TRUE, FALSE, UNKNOWN})
 _tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
-
-
-class Case:
-    """`release` is moved by an approval (step 3b); `utc` is the hull of all moments; `exact`: one situation."""
-
-    __slots__ = ("at", "context", "error", "exact", "invocation", "monotonic", "policy", "release", "utc")
-
-    def __init__(
-        self, invocation: PreparedInvocation, policy: PreparedPolicy, context: Context, sets: Sets, exact: bool
-    ) -> None:
-        self.invocation, self.policy, self.context, self.exact = invocation, policy, context, exact
-        _, self.monotonic, utc, self.error, _ = sets
-        self.at = environment(sets, policy, invocation.arguments, invocation.phase)
-        self.utc: Span = utc[0] if len(utc) == 1 else (min(low for low, _ in utc), max(high for _, high in utc))
-        self.release: Span = (context.released_us, context.released_us)
 
 
 def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
@@ -107,25 +89,8 @@ def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:
     return points and len(sets.utc_us) == 1 and all(low == high for low, high in spans)
 
 
-class Verdict(NamedTuple):
-    """An outcome with its reason and the clause that decided."""
-
-    outcome: Outcome
-    reason: Reason
-    clause: Decisive
-
-
-#: Verdicts of a step in the order of the rule; `PASS`, if passing is possible, comes last.
-Found: TypeAlias = tuple[Verdict, ...]
-
-PASS = Verdict(Outcome.ALLOW, Reason.ADMITTED, None)
-PASSED: Found = (PASS,)
-
-
-def concluded(verdicts: list[Verdict], doubt: Verdict | None, passes: bool) -> Found:
-    """The verdicts of a step, `doubt` after those that are certain of what they judge; it may also pass."""
-    if doubt is not None:
-        verdicts.append(doubt)
-    if passes:
-        verdicts.append(PASS)
-    return PASSED if passes and len(verdicts) == 1 else tuple(verdicts)
+def ranging(at: Environment, volume: Volume, height: int, through: int) -> Environment:
+    """The same, with position and height anywhere in a volume, at any time until `through` us from now."""
+    slots = list(at.slots)
+    slots[height] = volume.height
+    return at.over(slots, volume.place, through)

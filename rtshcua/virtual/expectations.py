@@ -5,14 +5,16 @@ reactions from the frames that left.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from math import inf
 from typing import Any, NamedTuple, assert_never
 
 import msgspec
 
+from rtshcua.decision.watch import WAY_HOME
 from rtshcua.model.flat.mission import Mission
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.outcome import Reason
 from rtshcua.model.scenario import (
     Decides,
     EndsInside,
@@ -101,22 +103,57 @@ def _found(what: Expected, flown: ScenarioFlown, judgement: Judgement, said: _Sa
             assert_never(what)
 
 
+class _Decided(NamedTuple):
+    """A decision, or what it comes to when a running step is broken off: the skill that flies then, why, by what."""
+
+    outcome: str
+    skill: str
+    reason: str
+    clause: str
+
+    def __str__(self) -> str:
+        return f"{self.outcome} of {self.skill or 'a link'} ({self.reason})"
+
+
 def _decided(what: Decides, said: _Said) -> tuple[bool, str]:
-    decisions = [record for record in said.records if record["type"] == "decision"]
-    for record in decisions:
-        if _is(what, said, record):
-            return True, _shown(said, record)
-    alike = [record for record in decisions if record["outcome"] == what.outcome] or decisions
-    return False, f"it decided {_listed(_shown(said, each) for each in alike) if alike else 'nothing'}"
+    decided = list(_decisions(said))
+    for each in decided:
+        if _is(what, each):
+            return True, str(each)
+    alike = [each for each in decided if each.outcome == what.outcome] or decided
+    return False, f"it decided {_listed(str(each) for each in alike) if alike else 'nothing'}"
 
 
-def _is(what: Decides, said: _Said, record: dict[str, Any]) -> bool:
+def _is(what: Decides, decided: _Decided) -> bool:
     return (
-        record["outcome"] == what.outcome
-        and (what.target is None or _skill(said, record) == what.target)
-        and (what.reason is None or record["reason"] == what.reason)
-        and (what.clause is None or record["clause"] == what.clause)
+        decided.outcome == what.outcome
+        and (what.target is None or decided.skill == what.target)
+        and (what.reason is None or decided.reason == what.reason)
+        and (what.clause is None or decided.clause == what.clause)
     )
+
+
+def _decisions(said: _Said) -> Iterator[_Decided]:
+    for number, record in enumerate(said.records):
+        if record["type"] == "decision":
+            yield _Decided(record["outcome"], _skill(said, record), record["reason"], record["clause"])
+        elif record.get("event") == "violated" and 0 <= record["step"] < len(said.mission.invocations):
+            later = (each for each in said.records[number:] if each.get("event") == "dispatched")
+            link = next((each["detail"] for each in later if each["kind"] != STEP), "")
+            for reason, clause in _watched(said, record["step"]):
+                if record["detail"] == clause or record["detail"].startswith(f"{clause}: "):
+                    yield _Decided("fallback", link, reason, clause)
+
+
+def _watched(said: _Said, step: int) -> Iterator[tuple[Reason, str]]:
+    """What must hold while a step runs, and why it would not be admitted if it did not."""
+    contract, policy = said.mission.invocations[step].contract, said.policy
+    yield from ((Reason.STATE_VIOLATED, each.text) for each in contract.assume)
+    yield from ((Reason.DEGRADED, each.text) for each in policy.rules if each.kind == RuleKind.DEGRADE)
+    yield from ((Reason.INVARIANT, each.text) for each in contract.maintain)
+    if policy.airspace is not None:
+        yield Reason.AIRSPACE, policy.airspace.text
+    yield Reason.ENERGY, WAY_HOME
 
 
 def _skill(said: _Said, record: dict[str, Any]) -> str:
@@ -137,10 +174,6 @@ def _skill(said: _Said, record: dict[str, Any]) -> str:
 def _first_word(text: str) -> str:
     found = _WORD.match(text)
     return "" if found is None else found[0]
-
-
-def _shown(said: _Said, record: dict[str, Any]) -> str:
-    return f"{record['outcome']} of {_skill(said, record) or 'a link'} ({record['reason']})"
 
 
 def _listed(words: Iterable[str]) -> str:

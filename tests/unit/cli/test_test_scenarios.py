@@ -63,6 +63,17 @@ def test_scenarios_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert all(float(case.get("time", "0")) > 0.01 for case in suite.iter("testcase")), "a flight takes its time"
 
 
+def test_the_example_of_the_reference_flies_as_it_expects(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "language.md").read_text(encoding="utf-8")
+    example = page.split("## Scenarios\n\n```rts\n")[1].split("```")[0]
+    fewer = example.replace("aboard px4, ardupilot", "aboard px4").replace("seeds  1 .. 20", "seeds  3")
+    assert fewer.count("aboard px4 ") == fewer.count("seeds  3 ") == 1
+    Path("flights.rts").write_text(fewer)
+    code, out, err = run(capsys)
+    assert (code, err) == (ExitCode.OK, "")
+    assert "1 scenario, 1 flight: all passed\n" in out
+
+
 def test_only_those_that_are_chosen_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "-k", "DROPOUT")
     assert (code, err) == (ExitCode.OK, "")

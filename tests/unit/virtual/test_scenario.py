@@ -368,6 +368,24 @@ def test_expectations(expected: Expected, met: bool) -> None:
     assert answer.found
 
 
+@pytest.mark.parametrize(
+    ("expected", "met"),
+    [
+        (Decides("fallback", "hover", "state/violated", "wind.speed < 10 m/s"), True),
+        (Decides("fallback", "hover"), True),
+        (Decides("fallback", "return_home"), False),
+        (Decides("fallback", "hover", "safety/degraded"), False),
+        (Decides("fallback", "hover", "state/violated", "link.quality >= 40 %"), False),
+        (Decides("fallback", "hover", "state/violated", "wind.speed"), False),
+    ],
+)
+def test_what_broke_a_running_step_off_can_be_expected(expected: Decides, met: bool) -> None:
+    gale = when(AfterStep(1, S, S), faults.WindStep(0, 14_000))
+    found = once("broken off by a gale", lambda: flown(scenario(gale)))
+    (answer,) = expectations(*_with(found, expected))
+    assert answer.met is met, answer
+
+
 def _with(found: ScenarioFlown, expected: Expected) -> tuple[ScenarioFlown, Any]:
     from dataclasses import replace
 

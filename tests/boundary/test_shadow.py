@@ -109,7 +109,7 @@ def test_all_flights_are_the_same_under_both(name: str, flavour: str, shadow: Sh
         (),
         ("gps-loss,at=60s",),
         ("battery,at=90s,level=15%",),
-        ("wind,at=50s,speed=14",),
+        ("wind,at=50s,speed=14m/s",),
         ("pilot,at=70s",),
     ):
         fly(name, flavour, *faults)

@@ -9,6 +9,7 @@ import stat
 import sys
 import sysconfig
 from collections.abc import Generator
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from itertools import count
@@ -19,6 +20,7 @@ from tempfile import TemporaryDirectory, gettempdir
 from typing import Any
 
 import pytest
+from _pytest.assertion import rewrite
 from hypothesis import settings
 from hypothesis.internal import charmap
 from hypothesis.internal.conjecture import providers
@@ -146,13 +148,39 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
     """
     every_character()
     gc.disable()
+    helper = rewriting_from_the_end(session.config)
     try:
         return (yield from collected(session))
     finally:
+        if helper is not None:
+            os.waitpid(helper, 0)
         gc.enable()
         gc.collect()
         gc.freeze()
         gc.set_threshold(20_000, 20, 20)
+
+
+def rewriting_from_the_end(config: pytest.Config) -> int | None:
+    """Begin a process that rewrites the assertions of test files, from the last one to the first that has byte code.
+
+    In a new checkout this takes half of the time of collecting, which one process does, from the first file on.
+    """
+    folders = [Path(each) for each in config.args]
+    if not config.option.processes or sys.dont_write_bytecode or not all(each.is_dir() for each in folders):
+        return None
+    if process := os.fork():
+        return process
+    with suppress(BaseException):  # whoever collects meets the same fault, and tells it
+        if controller := measuring(config):
+            controller.pause()
+        for file in sorted((file for each in folders for file in each.rglob("test_*.py")), reverse=True):
+            kept = rewrite.get_cache_dir(file.absolute()) / f"{file.stem}{rewrite.PYC_TAIL}"
+            if kept.exists():
+                break
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            digest, code = rewrite._rewrite_test(file.absolute(), config)
+            rewrite._write_pyc(config.stash[rewrite.assertstate_key], code, digest, kept)
+    os._exit(0)
 
 
 def collected(session: pytest.Session) -> Generator[None, object, object]:

@@ -78,7 +78,7 @@ class Processes:
         ):
             return None
         files = [[at for at, _ in group] for _, group in groupby(enumerate(session.items), lambda each: each[1].path)]
-        # flights in real time come last: half of the processes begin at that end, see `next_file`
+        # flights in real time come last: two of three processes begin at that end, see `next_file`
         files.sort(key=lambda each: "integration" in session.items[each[0]].path.parts)
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  one folder for all processes
         try:
@@ -192,9 +192,9 @@ def next_file(worker: Worker, files: list[list[int]]) -> list[int]:
     """The next file for a process, from the end that it works from until both ends meet.
 
     Flights in real time mostly wait. Were they all begun first, or last, the processors would have little to do
-    meanwhile; so half of the processes fly them, while the other half compute.
+    meanwhile; so two of three processes fly them, while the third computes.
     """
-    return files.pop(-1 if worker.number % 2 else 0) if files else []
+    return files.pop(-1 if worker.number % 3 else 0) if files else []
 
 
 def _end(workers: list[Worker]) -> None:

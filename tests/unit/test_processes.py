@@ -135,12 +135,12 @@ def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
     assert (tmp_path / "ended").read_text(encoding="utf-8").split() == ["over"] * 2
 
 
-def test_half_of_the_processes_begin_with_the_last_files() -> None:
-    files = [[0, 1], [2], [3, 4], [5]]
+def test_two_of_three_processes_begin_with_the_last_files() -> None:
+    files = [[0, 1], [2], [3, 4], [5], [6]]
     own, other = Pipe()
     with own, other:
-        given = [next_file(Worker(number, 0, own), files) for number in (0, 1, 2, 3, 4)]
-    assert given == [[0, 1], [5], [2], [3, 4], []]
+        given = [next_file(Worker(number, 0, own), files) for number in (0, 1, 2, 3, 4, 5)]
+    assert given == [[0, 1], [6], [5], [2], [3, 4], []]
 
 
 @pytest.mark.parametrize(

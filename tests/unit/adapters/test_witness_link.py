@@ -359,7 +359,7 @@ def test_strangers_are_not_heard(serve: Callable[..., Served], writer: Writer) -
             stranger.sendto(codec.pack(message), (HOST, port))
         until(client, seen(0))
         assert client.finish(PATIENCE_S) == []
-    assert [request.note for request in served.asked] == writer.log.notes[:1]
+    assert {request.note for request in served.asked} == set(writer.log.notes[:1]), "however often it was asked"
 
 
 def test_answers_that_are_none(writer: Writer) -> None:

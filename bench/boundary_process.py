@@ -20,12 +20,13 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.world import ROOT, ROOT_KEY, START, VEHICLE, loaded, renewed, request_for, sealed_again
 from rtshcua.adapters.boundary_process import BoundaryProcess
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.onboard.ports import Boundary, Command
+from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import CONTINGENCY_LINK
-from rtshcua.wire.response import Answer, decode
+from rtshcua.wire.response import decode
 from virtual import case
 from virtual.shipped import shipped
 
@@ -48,20 +49,20 @@ def isolated(caller: Caller, bundle: bytes) -> Loaded:
     return found
 
 
-def asked(boundary: Boundary, request: bytes) -> tuple[bytes, float]:
+def asked(of: Loaded, request: bytes) -> tuple[bytes, float]:
     """The permit of a request that must be allowed, and how long that took, us."""
     begin = perf_counter_ns()
-    answer = boundary.enforce(request)
+    answer = of.boundary.enforce(request)
     taken = perf_counter_ns() - begin
-    said = decode(answer)
-    assert isinstance(said, Answer), said
+    said = decode(answer, of.bundle.policy, of.invocations[0].invocation.contract)
+    assert isinstance(said, Decision), said
     assert said.permit, said
     return said.permit, taken / 1e3
 
 
 def dispatched(of: Loaded, request: bytes) -> float:
     """How long a link takes that is allowed and dispatched, us."""
-    permit, taken = asked(of.boundary, request)
+    permit, taken = asked(of, request)
     begin = perf_counter_ns()
     sent = of.executor.dispatch(permit, START.monotonic_us)
     assert isinstance(sent, Command), sent
@@ -100,11 +101,11 @@ def requests(folder: Path) -> bool:
             for of in steps:
                 of.append([])
             for _ in range(ROUNDS):
-                steps[0][block].append(asked(renewed(software).boundary, step)[1])
+                steps[0][block].append(asked(renewed(software), step)[1])
                 # nothing of it was sent, so it may be loaded again
                 assert isinstance(caller.load(bundle, START), bytes)
                 sleep(PAUSE_S)
-                steps[1][block].append(asked(apart.boundary, step)[1])
+                steps[1][block].append(asked(apart, step)[1])
         for _ in range(BLOCKS):
             pairs = []
             for _ in range(ROUNDS):

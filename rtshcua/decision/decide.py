@@ -78,10 +78,11 @@ def decide(
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     step, (outcome, reason, clause) = _verdicts(invocation, policy, context, sets, at, exact=True)[0]
     if outcome is _ALLOW:
-        return Decision(outcome, reason, step, clause, None, None, valid_until(invocation, state, context, sets, at))
+        until_us = valid_until(invocation, state, context, sets, at)
+        return Decision(outcome, reason, step, clause, None, None, until_us, context.consumed)
     choice = next(fallbacks(invocation, sets, policy, START, exact=True)) if outcome is _FALLBACK else None
     link, target = (None, None) if choice is None else (choice.index, choice.link)
-    return Decision(outcome, reason, step, clause, link, target, now.monotonic_us)
+    return Decision(outcome, reason, step, clause, link, target, now.monotonic_us, context.consumed)
 
 
 def possible(

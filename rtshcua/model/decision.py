@@ -20,7 +20,8 @@ class Decision(msgspec.Struct, frozen=True, gc=False):
     `target` is what flies on FALLBACK, `link` its index in the chain (`links.DEGRADE` for a degrade rule's); None when
     no link may fly, and for the other outcomes: a denied request must not steer the vehicle through its fallback. Where
     a link is asked for and may fly, it is the `target` of the ALLOW. `valid_until_us` (monotonic) bounds the permit of
-    an ALLOW; for the others it is the moment of the decision.
+    an ALLOW; for the others it is the moment of the decision. `consumed` is whether the step's id was used up before,
+    as `Context` has it. `permit`, if not empty, is what the boundary grants by the decision.
     """
 
     outcome: Outcome
@@ -30,3 +31,5 @@ class Decision(msgspec.Struct, frozen=True, gc=False):
     link: int | None
     target: Link | None
     valid_until_us: int
+    consumed: int = 0
+    permit: bytes = b""

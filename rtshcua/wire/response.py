@@ -1,24 +1,27 @@
 """Responses of `enforce`: a decision, with a permit where it grants one, or a refusal to decide.
 
 The body is one string of octets in a fixed layout, big-endian: status, outcome, reason number, step of section 4.1,
-clause number, target, `valid_until_us`, consumed, then the permit, if any, and last the digest of the boundary's own
-evidence after it (`boundary_chain`, paper symbol `d_ev`). In a refusal all but status and digest is 0.
+clause, target, `valid_until_us`, consumed, then the permit, if any, and last the digest of the boundary's own evidence
+after it (`boundary_chain`, paper symbol `d_ev`). In a refusal all but status and digest is 0.
+
+A clause is a number, counted through `shared_clauses`, then `own_clauses`; so is a target, of a link of the fallback
+chain, or `-1 - rule` for that of a degrade rule. Where a link was asked for, no target is said: it is that link.
 """
 
 from enum import IntEnum
 from struct import Struct
 from typing import Final
 
-import msgspec
-
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision, Decisive
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.policy import Airspace, Policy, Rule
-from rtshcua.model.outcome import REASON_NUMBERS, WIRE_REASONS, Outcome, Reason
+from rtshcua.model.outcome import REASON_NUMBERS, WIRE_REASONS, Outcome
 from rtshcua.wire import artefact, names
 from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.permit import SIZE
+from rtshcua.wire.request import DEGRADE
 
 #: `target` where the decision names none: less than `-1 - rule` for any rule
 NO_TARGET: Final = -(1 << 15) - 1
@@ -43,25 +46,6 @@ class Status(IntEnum):
 _DECIDED: Final = Status.DECIDED  # an enumeration's attributes are slow to find
 
 
-class Answer(msgspec.Struct, frozen=True):
-    """A decision as it crosses the boundary.
-
-    `clause` counts through `shared_clauses`, then `own_clauses`. `target` is the number of a link of the fallback
-    chain, or `-1 - rule` for the target of a degrade rule. `consumed` is what `decide` was told. `permit` is empty
-    unless one was granted. `evidence` is the boundary's digest after this answer, or an equal one before.
-    """
-
-    outcome: Outcome
-    reason: Reason
-    rule_step: int
-    clause: int
-    target: int
-    valid_until_us: int
-    consumed: int
-    permit: bytes = b""
-    evidence: bytes = bytes(DIGEST_BYTES)
-
-
 def shared_clauses(policy: Policy) -> tuple[Rule | Airspace, ...]:
     """What can decide any request, numbered by position: the rules, then the airspace if there is one."""
     return (*policy.rules, *(() if policy.airspace is None else (policy.airspace,)))
@@ -72,20 +56,20 @@ def own_clauses(contract: Contract) -> tuple[Clause, ...]:
     return (*contract.require, *contract.assume, *contract.maintain)
 
 
-def encode(answer: Answer, evidence: bytes | None = None) -> bytes:
-    """The octets of a decision, with its `evidence` or another in its place."""
+def encode(decision: Decision, clause: int, target: int, evidence: bytes) -> bytes:
+    """The octets of a decision, with the numbers of its clause and its target, and the boundary's digest."""
     body = _HEAD.pack(
         _DECIDED,
-        answer.outcome,
-        _REASONS[answer.reason._value_],
-        answer.rule_step,
-        answer.clause,
-        answer.target,
-        answer.valid_until_us,
-        answer.consumed,
+        decision.outcome,
+        _REASONS[decision.reason._value_],
+        decision.step,
+        clause,
+        target,
+        decision.valid_until_us,
+        decision.consumed,
     )
-    prefix = _WITH_PERMIT if answer.permit else _WITHOUT_PERMIT
-    return prefix + body + answer.permit + (answer.evidence if evidence is None else evidence)
+    prefix = _WITH_PERMIT if decision.permit else _WITHOUT_PERMIT
+    return prefix + body + decision.permit + evidence
 
 
 def encode_refusal(status: Status, evidence: bytes = bytes(DIGEST_BYTES)) -> bytes:
@@ -93,12 +77,14 @@ def encode_refusal(status: Status, evidence: bytes = bytes(DIGEST_BYTES)) -> byt
     return _WITHOUT_PERMIT + _HEAD.pack(status, 0, 0, 0, 0, 0, 0, 0) + evidence
 
 
-def decode(data: bytes) -> Answer | Status | Refusal:
-    """Read a response; a refusal to decide is its status. Raises nothing."""
+def decode(data: bytes, policy: Policy, contract: Contract | None) -> Decision | Status | Refusal:
+    """Read a response about a step of this contract, or a link of it (None: of the contingency); a refusal to decide is
+    its status. Raises nothing.
+    """
     prefix, head, start, end = _PERMITTED if len(data) == _PERMITTED_BYTES else _BARE
     if not data.startswith(prefix) or len(data) != end + DIGEST_BYTES:
         return Refusal("malformed", f"not a response of version {names.RESPONSE.version}")
-    status, outcome, reason, rule_step, clause, target, valid_until_us, consumed = _HEAD.unpack_from(data, head)
+    status, outcome, reason, step, clause, target, valid_until_us, consumed = _HEAD.unpack_from(data, head)
     if status != _DECIDED:
         refused = Status(status) if status < len(Status) else None
         if refused is None or data != encode_refusal(refused, data[end:]):
@@ -106,8 +92,33 @@ def decode(data: bytes) -> Answer | Status | Refusal:
         return refused
     if outcome >= len(_OUTCOMES) or reason >= len(WIRE_REASONS):
         return Refusal("malformed", "an outcome or a reason that there is not")
-    said, why = _OUTCOMES[outcome], WIRE_REASONS[reason]
-    return Answer(said, why, rule_step, clause, target, valid_until_us, consumed, data[start:end], data[end:])
+    try:
+        decisive, (link, flown) = _clause(clause, policy, contract), _target(target, policy, contract)
+    except LookupError:
+        return Refusal("malformed", "a clause or a target that there is not")
+    said, why, permit = _OUTCOMES[outcome], WIRE_REASONS[reason], data[start:end]
+    return Decision(said, why, step, decisive, link, flown, valid_until_us, consumed, permit)
+
+
+def _clause(number: int, policy: Policy, contract: Contract | None) -> Decisive:
+    """The clause of a number. Raises LookupError where there is none."""
+    if number == NO_CLAUSE:
+        return None
+    clauses = (*shared_clauses(policy), *(() if contract is None else own_clauses(contract)))
+    if number < 0:
+        raise LookupError(number)
+    return clauses[number]
+
+
+def _target(number: int, policy: Policy, contract: Contract | None) -> tuple[int | None, Link | None]:
+    """The target of a number, with its index in the chain. Raises LookupError where there is none."""
+    if number == NO_TARGET:
+        return None, None
+    index = max(number, DEGRADE)
+    link = policy.rules[-1 - number].target if number < 0 else None if contract is None else contract.fallback[number]
+    if link is None:
+        raise LookupError(number)
+    return index, link
 
 
 def _prefix(size: int) -> bytes:

@@ -25,13 +25,13 @@ from reference.world import (
     renewed,
     request_for,
 )
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire import cose, names
 from rtshcua.wire.keys import ANY, Duty, SigningKey
-from rtshcua.wire.response import Answer
 from virtual.rows import rows
 
 OF = low()
@@ -41,12 +41,12 @@ def fresh() -> Loaded:
     return renewed(OF)
 
 
-def asked(of: Loaded, **changed: object) -> Answer:
+def asked(of: Loaded, **changed: object) -> Decision:
     """What is decided about the step that must be confirmed, when its turn has come."""
     for step in (0, 1):
         answer_to(of, request_for(of, step=step))
     answer = answer_to(of, request_for(of, step=ASKED, **changed))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     return answer
 
 
@@ -226,7 +226,7 @@ def test_a_new_one_may_follow_one_that_expired() -> None:
     assert asked(of, now=now, released_us=now.monotonic_us).reason is Reason.AWAITING_APPROVAL, "it has expired"
     assert presented(of, approval(of, now=now), now).accepted
     answer = answer_to(of, request_for(of, step=ASKED, now=now, released_us=now.monotonic_us))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.ALLOW
 
 
@@ -245,7 +245,7 @@ def test_one_that_comes_after_the_time_to_answer_does_not_count() -> None:
         answer_to(of, request_for(of, step=step))
     assert presented(of, approval(of, now=now), now).accepted
     answer = answer_to(of, request_for(of, step=ASKED, now=now, released_us=released_us))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.reason is Reason.APPROVAL_TIMED_OUT
 
 

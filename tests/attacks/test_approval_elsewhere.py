@@ -27,9 +27,9 @@ from reference.world import (
 )
 from rtshcua.decision.session import InForce
 from rtshcua.ground.auditor.audit import audit
+from rtshcua.model.decision import Decision
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load, session
-from rtshcua.wire.response import Answer
 
 OF = low()
 OTHER = bytes([7]) * 16
@@ -76,7 +76,7 @@ def test_an_approval_names_the_mission_that_is_in_force() -> None:
     for step in range(ASKED):
         answer_to(taken, request_for(taken, step=step))
     answer = answer_to(taken, request_for(taken, step=ASKED))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.ALLOW
 
 

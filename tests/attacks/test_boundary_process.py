@@ -38,6 +38,7 @@ from rtshcua.cli.refused import Refused
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.ahead import NO_COPY
 from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, LOAD, LOST, OBSERVE, PART, SEAL, Caller
@@ -47,7 +48,7 @@ from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.permit import Permit, seal
 from rtshcua.wire.request import STEP, Request, encode
-from rtshcua.wire.response import Answer, Status, decode
+from rtshcua.wire.response import Status, decode
 from rtshcua.wire.statement import open_statement
 from virtual import case
 from virtual.shipped import shipped
@@ -86,14 +87,13 @@ class Held:
         self.loaded = loaded
         return loaded
 
-    def ask(self, step: int = 0, at: Now | None = None) -> Answer | Status | Refusal:
+    def ask(self, step: int = 0, at: Now | None = None) -> Decision | Status | Refusal:
         at = at or now()
         policy, invocation = self.loaded.bundle.policy, self.loaded.bundle.mission.invocations[step]
         state = State((None,) * policy.slots, (0,) * policy.slots, (4,) * len(policy.monitors))
         released = self.loaded.in_force.received_us(0)
-        return decode(
-            self.loaded.boundary.enforce(encode(Request(STEP, step, -1, invocation.binding, at, state, released, 0, 0)))
-        )
+        request = encode(Request(STEP, step, -1, invocation.binding, at, state, released, 0, 0))
+        return decode(self.loaded.boundary.enforce(request), policy, invocation.contract)
 
 
 @pytest.fixture
@@ -173,7 +173,7 @@ def test_no_permit_is_made_or_taken_over(held: Held, tmp_path: Path) -> None:
 def test_steps_have_their_turns(held: Held) -> None:
     assert held.ask(2) is Status.NOT_CURRENT
     first = held.ask(0)
-    assert isinstance(first, Answer)
+    assert isinstance(first, Decision)
     assert not first.permit, "nothing is known of the vehicle"
 
 
@@ -226,7 +226,7 @@ def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) 
     again = Held(tmp_path, issued=first.issued)
     for _ in range(2):
         again.load()
-        assert isinstance(again.ask(0), Answer)
+        assert isinstance(again.ask(0), Decision)
     again.process.close()
 
 
@@ -302,7 +302,7 @@ def test_nonsense_is_answered_and_changes_nothing(held: Held) -> None:
         assert answer
         assert answer[0] in (0, 1)
         assert not (kind == SEAL and answer[0] == 0)
-    assert isinstance(held.ask(0), (Answer, Status))
+    assert isinstance(held.ask(0), (Decision, Status))
 
 
 def test_the_longest_statement_comes_whole(tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ from reference.world import (
 )
 from rtshcua.adapters.boundary_process import PATIENCE_S, BoundaryError, BoundaryProcess, kept_file, program
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.outcome import Outcome
@@ -46,7 +47,7 @@ from rtshcua.onboard.enforcement.executor import FORGED, OUT_OF_TURN, USED
 from rtshcua.onboard.enforcement.isolated import BEGIN, ENFORCE, LOAD, MAX_PART, PART, PRESENT, STATEMENT, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.ports import Command
-from rtshcua.wire.response import Answer, Status
+from rtshcua.wire.response import Status
 
 pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
 AT_US = START.monotonic_us
@@ -143,7 +144,7 @@ def test_a_call_that_is_too_long_is_not_read_beyond_its_end(held: Held) -> None:
         for kind in (PART, LOAD, ENFORCE, PRESENT, 5, 11):
             assert held.process.call(bytes([kind]) + bytes(size - 1))[:1] in (b"\0", b"\1")
             held.process.call(bytes([PART, PRESENT]) + struct.pack(">I", 0))
-    assert isinstance(answer_to(of, request_for(of)), Answer)
+    assert isinstance(answer_to(of, request_for(of)), Decision)
 
 
 def test_half_a_bundle_is_none(held: Held) -> None:
@@ -209,7 +210,7 @@ def test_no_path_keeps_an_answer_from_coming_in_time(tmp_path: Path) -> None:
         if step == flat.INSPECTION_STEP:
             assert presented(flown, replacement(flown, step, worse)).slug == "malformed"
         answer = answer_to(flown, request_for(flown, step=step))
-        assert isinstance(answer, Answer), answer
+        assert isinstance(answer, Decision), answer
         assert answer.outcome is Outcome.ALLOW
         assert isinstance(flown.executor.dispatch(answer.permit, AT_US), Command)
         flown.executor.ended()
@@ -254,7 +255,7 @@ def test_killed_at_any_point_it_lets_nothing_out_and_has_what_it_kept(point: str
     again = second.loaded()
     answer = answer_to(again, request_for(again))
     if of is None:
-        assert isinstance(answer, Answer)
+        assert isinstance(answer, Decision)
         assert answer.permit
     else:
         assert answer is Status.NOT_CURRENT
@@ -383,7 +384,7 @@ def test_put_back_to_what_it_was_its_file_forgets_what_was_opened(tmp_path: Path
     again = second.loaded()
     assert again.executor.dispatch(permit, AT_US) is FORGED
     assert again.in_force.flight != of.in_force.flight
-    assert isinstance(answer_to(again, request_for(again)), Answer)
+    assert isinstance(answer_to(again, request_for(again)), Decision)
     second.process.close()
 
 

@@ -4,12 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.world import START, allowed, answer_to, loaded, request_for
+from reference.world import START, allowed, answer_to, loaded, read_answer, request_for
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import BACKWARDS, MISSION_OVER, OUT_OF_TURN
 from rtshcua.onboard.ports import Command
-from rtshcua.wire.response import Answer, Status, decode
+from rtshcua.wire.response import Status
 from virtual.rows import rows
 
 AT = START.monotonic_us
@@ -31,7 +32,7 @@ def test_a_deferred_step_that_was_passed_over_is_not_decided_any_more() -> None:
     of = loaded()
     blind = State((None,) * of.bundle.policy.slots, (0,) * of.bundle.policy.slots)
     deferred = answer_to(of, request_for(of, state=blind))
-    assert isinstance(deferred, Answer)
+    assert isinstance(deferred, Decision)
     assert deferred.outcome is Outcome.DEFER
     allowed(of, step=1)
     assert answer_to(of, request_for(of)) is Status.NOT_CURRENT
@@ -117,7 +118,7 @@ ONE = loaded()
 
 @given(st.binary(max_size=1200))
 def test_hostile_bytes_are_refused_and_remembered_nowhere(data: bytes) -> None:
-    assert decode(ONE.boundary.enforce(data)) is Status.MALFORMED
+    assert read_answer(ONE, data, ONE.boundary.enforce(data)) is Status.MALFORMED
 
 
 @given(st.data())
@@ -126,5 +127,5 @@ def test_a_changed_request_never_gets_more_than_an_answer(data: st.DataObject) -
     request = bytearray(request_for(of, *data.draw(st.sampled_from([(0, 0, -1), (1, 0, 0), (2, -1, 0)]))))
     for _ in range(data.draw(st.integers(1, 4))):
         request[data.draw(st.integers(0, len(request) - 1))] = data.draw(st.integers(0, 255))
-    answer = decode(of.boundary.enforce(bytes(request)))
-    assert isinstance(answer, Answer | Status)
+    answer = read_answer(of, bytes(request), of.boundary.enforce(bytes(request)))
+    assert isinstance(answer, Decision | Status)

@@ -9,12 +9,13 @@ from msgspec.structs import replace
 
 from reference.flat_case import CONTRACTS, MISSION, POLICY, TAKEOFF, WIND, M, S, apply, clause, const, signal
 from reference.world import START, FakeVehicle, answer_to, loaded, request_for
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.wire.response import Answer, Status
+from rtshcua.wire.response import Status
 from virtual.rows import rows
 
 BREEZE = clause("wind.speed < 8 m/s", apply(Op.LT, signal(WIND), const(8 * M)))
@@ -45,7 +46,7 @@ def claiming(of: Loaded, *monitors: int) -> bytes:
 def test_what_is_no_truth_of_each_monitor_is_no_request(monitors: tuple[int, ...]) -> None:
     of = armed()
     assert answer_to(of, claiming(of, *monitors)) is Status.MALFORMED
-    assert isinstance(answer_to(of, claiming(of, 1)), Answer), "nothing is remembered of it"
+    assert isinstance(answer_to(of, claiming(of, 1)), Decision), "nothing is remembered of it"
 
 
 @pytest.mark.parametrize(
@@ -59,7 +60,7 @@ def test_what_is_no_truth_of_each_monitor_is_no_request(monitors: tuple[int, ...
 def test_each_truth_is_decided_on(truth: int, outcome: Outcome, reason: Reason) -> None:
     of = armed()
     answer = answer_to(of, claiming(of, truth))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert (answer.outcome, answer.reason) == (outcome, reason)
 
 
@@ -67,7 +68,7 @@ def test_what_a_monitor_says_now_cannot_be_used_later() -> None:
     """The permit ends a second after the observation at the latest, however fresh the wind is."""
     of = armed()
     answer = answer_to(of, claiming(of, 1))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.valid_until_us <= START.monotonic_us + S
 
 

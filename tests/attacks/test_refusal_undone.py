@@ -29,6 +29,7 @@ from reference.world import (
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.auditor.audit import audit
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
@@ -38,7 +39,6 @@ from rtshcua.wire.binding import bind, binding_of
 from rtshcua.wire.document import sign_document
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.replacement import ReplacementDocument
-from rtshcua.wire.response import Answer
 
 OF = low()
 
@@ -72,7 +72,7 @@ def flown_to_the_inspection() -> Loaded:
 
 def asked(of: Loaded) -> tuple[Outcome, Reason]:
     answer = answer_to(of, request_for(of, step=ASKED))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     return answer.outcome, answer.reason
 
 
@@ -140,7 +140,7 @@ def test_the_step_behind_another_stays_refused() -> None:
     answer_to(of, request_for(of, step=2))
     assert presented(of, approval(of, step=3)).accepted
     answer = answer_to(of, request_for(of, step=3))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert (answer.outcome, answer.reason) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
 
 

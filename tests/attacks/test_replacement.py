@@ -26,6 +26,7 @@ from reference.world import (
     renewed,
     request_for,
 )
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind, SourceKind
 from rtshcua.model.flat.mission import Mission, Plan
 from rtshcua.model.flat.situation import Now
@@ -37,7 +38,7 @@ from rtshcua.wire.binding import bind, binding_of
 from rtshcua.wire.document import DocumentError, sign_document
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.replacement import MAX_REPLACEMENTS, ReplacementDocument, sign_replacement
-from rtshcua.wire.response import Answer, Status
+from rtshcua.wire.response import Status
 from virtual.rows import rows
 
 OF = low()
@@ -270,7 +271,7 @@ def test_what_a_step_was_approved_for_does_not_serve_what_takes_its_place() -> N
     for step in (0, 1):
         allowed(of, step=step)
     answer = answer_to(of, request_for(of, step=ASKED))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert (answer.outcome, answer.reason) == (Outcome.DEFER, Reason.AWAITING_APPROVAL)
     assert presented(of, approval(of)).accepted
 
@@ -291,7 +292,7 @@ def test_the_binding_of_what_was_replaced_is_worth_nothing() -> None:
     for step in (0, 1):
         allowed(of, step=step)
     answer = answer_to(of, old)
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert (answer.outcome, answer.reason) == (Outcome.DENY, Reason.BINDING_MISMATCH)
     assert answer_to(of, request_for(of, step=3)) is Status.UNKNOWN_STEP
 
@@ -301,7 +302,7 @@ def test_a_denied_step_whose_id_was_used_up_may_be_another() -> None:
     allowed(of)
     late = request_for(of, step=1, phase=2)
     denied = answer_to(of, late)
-    assert isinstance(denied, Answer)
+    assert isinstance(denied, Decision)
     assert (denied.outcome, denied.reason) == (Outcome.DENY, Reason.PHASE_PASSED)
     mission = of.bundle.mission
     assert presented(of, replacement(of, 1, replace(mission, issued_at_us=ISSUED + 1))).accepted

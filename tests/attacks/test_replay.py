@@ -1,18 +1,18 @@
 """A step that was admitted once, or a permit that was used once, is played again."""
 
 from reference.world import START, Run, allowed, answer_to, loaded, request_for
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.executor import FORGED, USED, Commands, Executor
 from rtshcua.onboard.ports import Command
-from rtshcua.wire.response import Answer
 
 
 def test_an_admitted_step_is_denied_the_second_time() -> None:
     of = loaded()
     allowed(of)
     answer = answer_to(of, request_for(of))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert (answer.outcome, answer.reason, answer.consumed) == (Outcome.DENY, Reason.REPLAYED, 1)
     assert answer.permit == b""
 
@@ -20,14 +20,14 @@ def test_an_admitted_step_is_denied_the_second_time() -> None:
 def test_a_step_that_was_flown_does_not_come_back_later() -> None:
     run = Run().until_flies("inspect_area")
     answer = answer_to(run.loaded, request_for(run.loaded, step=1, now=run.clock.now()))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.reason is Reason.REPLAYED
 
 
 def test_a_deferred_step_is_no_replay() -> None:
     of = loaded()
     blind = answer_to(of, request_for(of, state=State((None,) * of.bundle.policy.slots, (0,) * of.bundle.policy.slots)))
-    assert isinstance(blind, Answer)
+    assert isinstance(blind, Decision)
     assert blind.outcome is Outcome.DEFER
     allowed(of)
 
@@ -36,7 +36,7 @@ def test_what_fails_authentication_uses_no_id_up() -> None:
     """Else a forger could have the honest request refused."""
     of = loaded()
     forged = answer_to(of, request_for(of, binding=bytes(32)))
-    assert isinstance(forged, Answer)
+    assert isinstance(forged, Decision)
     assert forged.outcome is Outcome.DENY
     allowed(of)
 

@@ -23,6 +23,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedGate
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
@@ -30,7 +31,6 @@ from rtshcua.onboard.ports import Command
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.world import Simulation
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
-from rtshcua.wire.response import Answer
 
 pytestmark = pytest.mark.skipif(program() is None, reason="the boundary's program was not built")
 KEY = b"the key of the link, 32 octets.."
@@ -224,7 +224,7 @@ def test_nothing_that_no_permit_covers_is_obeyed(taken_over: TakenOver) -> None:
 def test_while_a_permit_is_in_force_what_it_covers_is_obeyed_alone(taken_over: TakenOver) -> None:
     of = taken_over.loaded
     answer = answer_to(of, request_for(of, now=taken_over.now, released_us=taken_over.us))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.permit, answer
     dispatch = of.executor.dispatch(answer.permit, taken_over.us)
     assert isinstance(dispatch, Command), dispatch

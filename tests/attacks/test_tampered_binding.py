@@ -6,9 +6,9 @@ from msgspec.structs import replace
 from reference.flat_case import INVOCATIONS, MISSION, POLICY
 from reference.world import MISSION_KEY, POLICY_KEY, Run, allowed, answer_to, loaded, request_for, sealed, try_load
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire import binding, bundle
-from rtshcua.wire.response import NO_TARGET, Answer
 from virtual.rows import rows
 
 
@@ -18,16 +18,16 @@ def test_a_step_under_another_binding_is_denied(bit: int) -> None:
     changed = bytearray(of.bundle.mission.invocations[0].binding)
     changed[bit // 8] ^= 1 << bit % 8
     answer = answer_to(of, request_for(of, binding=bytes(changed)))
-    assert isinstance(answer, Answer)
-    assert (answer.outcome, answer.reason, answer.rule_step) == (Outcome.DENY, Reason.BINDING_MISMATCH, 1)
+    assert isinstance(answer, Decision)
+    assert (answer.outcome, answer.reason, answer.step) == (Outcome.DENY, Reason.BINDING_MISMATCH, 1)
     assert answer.permit == b""
-    assert answer.target == NO_TARGET
+    assert answer.target is None
 
 
 def test_the_binding_of_another_step_is_not_this_ones() -> None:
     of = loaded()
     answer = answer_to(of, request_for(of, binding=of.bundle.mission.invocations[1].binding))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.reason is Reason.BINDING_MISMATCH
 
 
@@ -36,7 +36,7 @@ def test_links_are_bound_too(kind: int, step: int, link: int) -> None:
     of = loaded()
     allowed(of)
     answer = answer_to(of, request_for(of, kind, step, link, binding=bytes(32)))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert (answer.outcome, answer.reason) == (Outcome.DENY, Reason.BINDING_MISMATCH)
     assert answer.permit == b""
     allowed(of, kind, step, link)

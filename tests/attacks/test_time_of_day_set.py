@@ -6,11 +6,12 @@ from msgspec.structs import replace
 from reference.documents import MIN, approval, low, presented, recall
 from reference.flat_case import S
 from reference.world import START, answer_to, loaded, renewed, request_for
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.boundary import CLOCKS_PART_US
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.wire.response import Answer, Status
+from rtshcua.wire.response import Status
 
 OF, LOW = loaded(), low()
 
@@ -20,7 +21,7 @@ def after(us: int, *, said: int | None = None) -> Now:
     return Now(START.monotonic_us + us, START.utc_us + (us if said is None else said), START.utc_error_us)
 
 
-def asked(of: Loaded, now: Now) -> Answer | Status:
+def asked(of: Loaded, now: Now) -> Decision | Status:
     return answer_to(of, request_for(of, now=now, released_us=now.monotonic_us))
 
 
@@ -36,7 +37,7 @@ YEAR = 365 * 24 * 60 * MIN
 
 def test_what_has_expired_stays_expired() -> None:
     answer = asked(met(), after(YEAR))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.reason is Reason.EXPIRED
     assert asked(met(), after(YEAR, said=0)) is Status.MALFORMED
 
@@ -45,14 +46,14 @@ def test_what_has_expired_stays_expired() -> None:
 def test_the_time_of_day_goes_on_as_time_does(said: int) -> None:
     assert asked(met(), after(S, said=said)) is Status.MALFORMED
     answer = asked(met(), after(S))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.ALLOW
 
 
 @pytest.mark.parametrize("said", [S - CLOCKS_PART_US, S + CLOCKS_PART_US])
 def test_a_clock_may_be_off_a_little(said: int) -> None:
     answer = asked(met(), after(S, said=said))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.ALLOW
 
 
@@ -68,5 +69,5 @@ def test_an_old_document_is_not_made_good(document: object) -> None:
 def test_by_a_clock_that_does_not_know_nothing_is_granted() -> None:
     lost = replace(after(YEAR, said=0), utc_error_us=YEAR)
     answer = asked(met(), lost)
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.DEFER

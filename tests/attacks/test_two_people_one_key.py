@@ -9,11 +9,11 @@ from msgspec.structs import replace
 from reference.documents import ASKED, approval, low_mission, presented
 from reference.flat_case import CONFIRM_RULE, POLICY
 from reference.world import APPROVAL_KEY, ROOT, VEHICLE, answer_to, loaded, renewed, request_for
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.wire.keys import ANY, Duty, SigningKey
-from rtshcua.wire.response import Answer
 from rtshcua.wire.trust import RootError, TrustRoot
 
 SUPERVISOR = POLICY.roles.index("supervisor")
@@ -57,7 +57,7 @@ def flying(second: int) -> Loaded:
 
 def asked(of: Loaded) -> tuple[Outcome, Reason]:
     answer = answer_to(of, request_for(of, step=ASKED))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     return answer.outcome, answer.reason
 
 

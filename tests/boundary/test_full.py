@@ -21,6 +21,7 @@ from reference.world import (
     sealed,
 )
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.limits import MAX_ANSWERS, MAX_DISPATCHED
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind
@@ -31,7 +32,6 @@ from rtshcua.onboard.ports import Command
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.permit import LINK_VALID_US, Permit, seal
 from rtshcua.wire.request import CONTINGENCY_LINK
-from rtshcua.wire.response import Answer
 
 CROWD_SIZE, STEPS = 64, 33  # who answer twice about each step, and so more than is kept
 PEOPLE = [
@@ -92,7 +92,7 @@ def test_more_rules_than_answers_are_kept_ask_about_one_step(granted: int, shado
     for key, answer in ((PEOPLE[0], 1), (PEOPLE[1], granted)):
         assert presented(of, approval(of, 0, key, granted=answer)).slug == "accepted"
     answer_ = answer_to(of, request_for(of))
-    assert isinstance(answer_, Answer)
+    assert isinstance(answer_, Decision)
     expected = (Outcome.ALLOW, Reason.ADMITTED) if granted else (Outcome.DENY, Reason.APPROVAL_REFUSED)
     assert (answer_.outcome, answer_.reason) == expected
 

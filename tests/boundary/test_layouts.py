@@ -9,6 +9,7 @@ import pytest
 from boundary.layout import structs
 from boundary.mutants import damaged
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.limits import MAX_MONITORS, MAX_SLOTS, MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import WIRE_REASONS, Outcome
@@ -17,7 +18,7 @@ from rtshcua.wire.permit import Permit
 from rtshcua.wire.preparation import ParameterWrite, Preparation
 from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.request import Request
-from rtshcua.wire.response import NO_TARGET, Answer, Status
+from rtshcua.wire.response import NO_TARGET, Status
 
 KEY = bytes(range(32))
 STRUCTS = structs()
@@ -103,9 +104,8 @@ def test_answers_are_written_alike(c: ctypes.CDLL) -> None:
             decision = STRUCTS["rt_decision"](outcome, number, step, clause, target, until)
             out = ctypes.create_string_buffer(192)
             size = c.rt_test_answer(ctypes.byref(decision), ctypes.c_int64(consumed), sealed or None, out)
-            assert out.raw[:size] == response.encode(
-                Answer(outcome, reason, step, clause, target, until, consumed, sealed)
-            )
+            made = Decision(outcome, reason, step, None, None, None, until, consumed, sealed)
+            assert out.raw[:size] == response.encode(made, clause, target, bytes(32))
     for status in list(Status)[1:]:
         out = ctypes.create_string_buffer(192)
         size = c.rt_test_refusal(int(status), out)

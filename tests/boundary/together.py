@@ -33,7 +33,7 @@ from boundary.test_preparation import drawn_bits, fitting
 from reference import worlds
 from reference.documents import approval, cancellation, low_mission, recall, replacement
 from reference.flat_case import MIN, MISSION, POLICY, S, state
-from reference.world import MISSION_KEY, ROOT, ROOT_KEY, START, VEHICLE, request_for, sealed
+from reference.world import MISSION_KEY, ROOT, ROOT_KEY, START, VEHICLE, read_answer, request_for, sealed
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
 from rtshcua.adapters.files.replay import FileReplayStore
@@ -43,6 +43,7 @@ from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.mavlink.signing import EPOCH_US, MOST_AHEAD, UNIT_US, SignedLink, timestamp_in
 from rtshcua.mavlink.signing import State as LinkState
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.ahead import MOST
@@ -72,7 +73,7 @@ from rtshcua.wire.preparation import encode as encode_preparation
 from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.receipt import decode as read_receipt
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
-from rtshcua.wire.response import Answer, decode
+from rtshcua.wire.response import Status
 from virtual import case
 
 MAC, EVIDENCE = 32, 32
@@ -91,10 +92,9 @@ PIN = ROOT_KEY.verification().public
 SIGNED_ROOT = ROOT.sign(ROOT_KEY)
 
 
-def without_mac(answer: bytes) -> bytes:
+def without_mac(answer: bytes, said: Decision | Status | Refusal) -> bytes:
     """An answer of `enforce`, but for the MAC of a permit in it."""
-    said = decode(answer)
-    if not isinstance(said, Answer) or not said.permit:
+    if not isinstance(said, Decision) or not said.permit:
         return answer
     return answer[: -MAC - EVIDENCE] + answer[-EVIDENCE:]
 
@@ -396,14 +396,14 @@ class Together:
         if random.random() < 0.03:
             request = damaged(request, random)
         one, other = self.here.boundary.enforce(request), self.there.boundary.enforce(request)
-        same(f"enforce {request.hex()}", without_mac(one), without_mac(other))
-        said, theirs = decode(one), decode(other)
-        if isinstance(said, Answer) and isinstance(theirs, Answer) and said.permit:
+        said, theirs = read_answer(self.here, request, one), read_answer(self.here, request, other)
+        same(f"enforce {request.hex()}", without_mac(one, said), without_mac(other, theirs))
+        if isinstance(said, Decision) and isinstance(theirs, Decision) and said.permit:
             self.permits.append((said.permit, theirs.permit))
             self.counts["permits"] += 1
             if random.random() < 0.6:
                 self.dispatch()
-        self.counts[f"requests {said.outcome.name if isinstance(said, Answer) else said}"] += 1
+        self.counts[f"requests {said.outcome.name if isinstance(said, Decision) else said}"] += 1
 
     def permit(self) -> tuple[bytes, bytes]:
         """One that was granted, mostly the last; or one that neither sealed."""

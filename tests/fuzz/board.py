@@ -9,7 +9,6 @@ from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import ANY
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, encode
-from rtshcua.wire.response import decode
 from rtshcua.wire.trust import TrustRoot
 
 S = 1_000_000  # us
@@ -80,5 +79,5 @@ def ask(loaded: Loaded, utc_us: int) -> None:
 
 def answer(loaded: Loaded, request: bytes) -> None:
     """Any octets are answered, by octets that can be read."""
-    said = decode(loaded.boundary.enforce(request))
+    said = world.read_answer(loaded, request, loaded.boundary.enforce(request))
     assert not isinstance(said, Refusal), said

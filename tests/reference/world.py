@@ -32,6 +32,7 @@ from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
 from rtshcua.ground.auditor.audit import audit
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -57,7 +58,8 @@ from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.request import CONTINGENCY_LINK, Request, encode
-from rtshcua.wire.response import Answer, Status, decode
+from rtshcua.wire.request import decode as decode_request
+from rtshcua.wire.response import Status, decode
 from rtshcua.wire.trust import TrustRoot
 
 VEHICLE = POLICY.vehicle.identity
@@ -402,16 +404,24 @@ def request_for(of: Loaded, kind: int = 0, step: int = 0, link: int = -1, **chan
     return encode(replace(honest, **changed))
 
 
-def answer_to(of: Loaded, request: bytes) -> Answer | Status:
+def answer_to(of: Loaded, request: bytes) -> Decision | Status:
     """What the boundary answers."""
-    answer = decode(of.boundary.enforce(request))
+    answer = read_answer(of, request, of.boundary.enforce(request))
     assert not isinstance(answer, Refusal)
     return answer
+
+
+def read_answer(of: Loaded, request: bytes, answer: bytes) -> Decision | Status | Refusal:
+    """What the answer to a request says."""
+    policy, steps = of.bundle.policy, of.invocations
+    asked = decode_request(request, policy.slots, len(policy.monitors))
+    known = not isinstance(asked, Refusal) and 0 <= asked.step < len(steps)
+    return decode(answer, policy, steps[asked.step].invocation.contract if known else None)
 
 
 def allowed(of: Loaded, kind: int = 0, step: int = 0, link: int = -1) -> bytes:
     """The permit of a request that must be allowed."""
     answer = answer_to(of, request_for(of, kind, step, link))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.ALLOW, answer
     return answer.permit

@@ -40,6 +40,7 @@ from reference.world import (
 )
 from rtshcua.decision.checks import mission as mission_checks
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Context, State
@@ -52,7 +53,6 @@ from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.receipt import CANCELLATION, REPLACEMENT, Receipt
 from rtshcua.wire.receipt import decode as read_receipt
 from rtshcua.wire.request import CONTINGENCY_LINK
-from rtshcua.wire.response import Answer
 
 AGENT_SEED = b"\xa9" * 32
 AGENT = SigningKey.from_seed(AGENT_SEED, duty=Duty.MISSION, development=True)
@@ -117,7 +117,7 @@ def broken(of: Random) -> list[str]:
             wrong.append("it speaks as somebody else")
         state = told(of, step)
         answer = answer_to(found, request_for(found, step=step.step, state=state))
-        if not isinstance(answer, Answer) or not answer.permit:
+        if not isinstance(answer, Decision) or not answer.permit:
             break
         found.executor.ended()
         if isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Command):
@@ -205,16 +205,16 @@ def test_what_it_cancels_flies_the_contingency_and_no_step(of: Random) -> None:
         return
     for step in found.bundle.mission.invocations[: of.randrange(3)]:
         answer = answer_to(found, request_for(found, step=step.step))
-        if isinstance(answer, Answer) and answer.permit:
+        if isinstance(answer, Decision) and answer.permit:
             found.executor.ended()
             found.executor.dispatch(answer.permit, START.monotonic_us)
     receipt = read_receipt(found.boundary.present(cancellation(found, AGENT), START, 0))
     assert isinstance(receipt, Receipt)
     assert receipt.accepted, receipt
     for step in found.bundle.mission.invocations:
-        assert not isinstance(answer_to(found, request_for(found, step=step.step)), Answer)
+        assert not isinstance(answer_to(found, request_for(found, step=step.step)), Decision)
     links = [request_for(found, CONTINGENCY_LINK, -1, number) for number in range(len(POLICY.contingency))]
-    allowed = [answer for answer in (answer_to(found, link) for link in links) if isinstance(answer, Answer)]
+    allowed = [answer for answer in (answer_to(found, link) for link in links) if isinstance(answer, Decision)]
     assert len(allowed) == len(links)
     assert any(answer.permit for answer in allowed)
 
@@ -293,7 +293,7 @@ def test_what_agents_may_do_flies() -> None:
     assert isinstance(found, Loaded)
     for step in MISSION.invocations[:3]:
         answer = answer_to(found, request_for(found, step=step.step))
-        assert isinstance(answer, Answer)
+        assert isinstance(answer, Decision)
         found.executor.ended()
         assert isinstance(found.executor.dispatch(answer.permit, START.monotonic_us), Command)
 
@@ -316,7 +316,7 @@ def test_a_contract_that_may_be_loosened_is_noticed(monkeypatch: pytest.MonkeyPa
     assert isinstance(found, Loaded)
     step, state = found.bundle.mission.invocations[0], flat.state({HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0, BATTERY: 0})
     answer = answer_to(found, request_for(found, state=state))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert judged(found, step, state) != [], "it would fly, on an empty battery"
 
 

@@ -44,6 +44,7 @@ from reference.world import APPROVAL_KEY, START, VEHICLE, loaded, renewed
 from rtshcua.decision import decide
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.why.trace import NAMES
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import RuleKind
@@ -58,7 +59,7 @@ from rtshcua.wire.permit import Permit
 from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, Receipt
 from rtshcua.wire.receipt import decode as read_receipt
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, encode
-from rtshcua.wire.response import Answer, decode
+from rtshcua.wire.response import decode
 
 WINDY = clause("wind.speed > 15 m/s", apply(Op.GT, signal(WIND), const(15 * M)))
 POLICY = replace(flat.POLICY, rules=(*flat.POLICY.rules, flat.rule(RuleKind.FORBID, when=WINDY)))
@@ -140,8 +141,8 @@ class TakenOver:
         self.enforce(asked, meant)
 
     def enforce(self, asked: Request, meant: Invocation) -> None:
-        answer = decode(self.loaded.boundary.enforce(encode(asked)))
-        if isinstance(answer, Answer) and answer.permit:
+        answer = decode(self.loaded.boundary.enforce(encode(asked)), self.loaded.bundle.policy, meant.contract)
+        if isinstance(answer, Decision) and answer.permit:
             self.permits.append(answer.permit)
             if asked.kind == STEP:
                 self.judge(asked, meant, answer.permit)

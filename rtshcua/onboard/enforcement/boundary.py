@@ -27,7 +27,7 @@ from rtshcua.wire.permit import AGAIN, LINK_VALID_US, Permit, seal
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
 from rtshcua.wire.request import STEP, Ref, Request, decode
-from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, encode, encode_refusal
+from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Status, encode, encode_refusal
 
 #: how far UTC and monotonic time may part in a session, in us: more than a good clock is off, and less than matters
 CLOCKS_PART_US: Final = 3_000_000
@@ -106,22 +106,26 @@ class SoftwareBoundary:
         # nor was anything released before it was here
         if asked.kind == STEP and asked.released_us < self._in_force.received_us(asked.step):
             return self._refuse(Status.MALFORMED, request)
-        answer = self._step(asked) if asked.kind == STEP else self._link(asked, ref)
-        return encode(answer, self._chained(request, asked, answer))
+        if asked.kind == STEP:
+            decision = self._step(asked)
+            clause, target = self._clause(asked.step, decision), self._target(asked.step, decision)
+        else:
+            decision, clause, target = self._link(asked, ref), NO_CLAUSE, NO_TARGET
+        return encode(decision, clause, target, self._chained(request, asked, decision, clause, target))
 
     def _refuse(self, status: Status, request: bytes) -> bytes:
         payload = boundary_chain.undecided(status, sha256(request).digest())
         return encode_refusal(status, self._chain.add(Tag.UNDECIDED, payload))
 
-    def _chained(self, request: bytes, asked: Request, answer: Answer) -> bytes:
+    def _chained(self, request: bytes, asked: Request, decision: Decision, clause: int, target: int) -> bytes:
         """The digest of the boundary's own evidence, with this answer in it."""
-        reason = _REASONS[answer.reason._value_]
+        reason = _REASONS[decision.reason._value_]
         payload = boundary_chain.decided(
-            request, answer.outcome, reason, answer.rule_step, answer.target, answer.valid_until_us, answer.consumed
+            request, decision.outcome, reason, decision.step, target, decision.valid_until_us, decision.consumed
         )
         if asked.kind == STEP:
-            last, self._last = self._last, (asked.step, answer.outcome, reason, answer.clause, answer.target)
-            if last == self._last and not answer.permit:
+            last, self._last = self._last, (asked.step, decision.outcome, reason, clause, target)
+            if last == self._last and not decision.permit:
                 return self._chain.repeat(payload)
         return self._chain.add(Tag.DECIDED, payload)
 
@@ -167,36 +171,22 @@ class SoftwareBoundary:
             self._ahead_us = ahead_us
         return abs(ahead_us - self._ahead_us) <= CLOCKS_PART_US
 
-    def _step(self, asked: Request) -> Answer:
+    def _step(self, asked: Request) -> Decision:
         step, now = asked.step, asked.now
         prepared = self._in_force.invocations[step]
-        consumed = self._session.consumed(step)
         context = Context(
             asked.binding,
             self._vehicle,
             self._version,
-            consumed,
+            self._session.consumed(step),
             asked.released_us,
             asked.phase,
             asked.remaining_us,
             self._in_force.approvals(prepared.invocation, now),
         )
         decision = self._session.decide_step(step, asked.state, context, now)
-        return Answer(
-            decision.outcome,
-            decision.reason,
-            decision.step,
-            NO_CLAUSE if decision.clause is None else self._number(step, decision.clause),
-            self._target(prepared, decision),
-            decision.valid_until_us,
-            consumed,
-            self._permit(prepared, decision, now.monotonic_us),
-        )
-
-    def _target(self, prepared: PreparedInvocation, decision: Decision) -> int:
-        if decision.link is None:
-            return NO_TARGET
-        return decision.link if decision.link != DEGRADE else self._degrade(prepared, decision.target)
+        permit = self._permit(prepared, decision, now.monotonic_us)
+        return replace(decision, permit=permit) if permit else decision
 
     def _permit(self, prepared: PreparedInvocation, decision: Decision, now_us: int) -> bytes:
         not_after_us = decision.valid_until_us
@@ -208,27 +198,34 @@ class SoftwareBoundary:
         contingency = self._policy.policy.contingency
         return self._issuer.step(invocation.step, not_after_us, len(invocation.contract.fallback), len(contingency))
 
-    def _link(self, asked: Request, ref: Ref) -> Answer:
+    def _link(self, asked: Request, ref: Ref) -> Decision:
         decision = self._session.decide_link(ref, asked.binding, asked.state, asked.now)
-        until_us, permit = decision.valid_until_us, b""
-        if decision.target is not None:
-            if ref.link == DEGRADE:
-                prepared = self._in_force.invocations[ref.step]
-                ref = Ref(ref.kind, ref.step, self._degrade(prepared, decision.target))
-            permit = self._issuer.link(ref, until_us)
-        return Answer(decision.outcome, decision.reason, decision.step, NO_CLAUSE, NO_TARGET, until_us, 0, permit)
+        if decision.target is None:
+            return decision
+        if ref.link == DEGRADE:
+            ref = Ref(ref.kind, ref.step, self._degrade(ref.step, decision.target))
+        return replace(decision, permit=self._issuer.link(ref, decision.valid_until_us))
 
-    def _degrade(self, prepared: PreparedInvocation, target: Link | None) -> int:
+    def _clause(self, step: int, decision: Decision) -> int:
+        """The number of the clause that decided, in a response; a rule has its index in the policy."""
+        clause = decision.clause
+        if clause is None:
+            return NO_CLAUSE
+        number = self._own[step].get(clause)
+        return self._shared[clause] if number is None else number
+
+    def _target(self, step: int, decision: Decision) -> int:
+        """The number of the link that flies in place of a step."""
+        if decision.link is None:
+            return NO_TARGET
+        return decision.link if decision.link != DEGRADE else self._degrade(step, decision.target)
+
+    def _degrade(self, step: int, target: Link | None) -> int:
         """`-1 - rule` for the target of a degrade rule."""
-        for degrade in prepared.candidates.degrades:
+        for degrade in self._in_force.invocations[step].candidates.degrades:
             if degrade.rule.target == target:
                 return -1 - self._shared[degrade.rule]
         raise LookupError("no degrade rule has this target")
-
-    def _number(self, step: int, clause: Clause | Rule | Airspace) -> int:
-        """The number of a clause in a response; a rule has its index in the policy."""
-        number = self._own[step].get(clause)
-        return self._shared[clause] if number is None else number
 
     def _own_numbers(self) -> tuple[_Numbers, ...]:
         """By step, the numbers of its contract's clauses, behind those of what all steps share."""

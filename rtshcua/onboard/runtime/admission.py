@@ -6,9 +6,8 @@ from functools import partial
 from hashlib import sha256
 
 from rtshcua.decision.durability import confirmed, durability_of
-from rtshcua.model.decision import Decision, Decisive
+from rtshcua.model.decision import Decision
 from rtshcua.model.durability import WRITTEN
-from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome
@@ -19,7 +18,7 @@ from rtshcua.onboard.runtime.dispatcher import RemainingLatency
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.view import Decided
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP, Ref, Request, encode
-from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Answer, Status, decode, own_clauses, shared_clauses
+from rtshcua.wire.response import Status, decode
 
 #: how many decisions a display is shown
 SHOWN = 6
@@ -90,7 +89,6 @@ class Admission:
         self._loaded = loaded
         self._in_force = loaded.in_force
         self._policy = loaded.bundle.policy
-        self._shared = shared_clauses(self._policy)
         self._journal = journal
         self._queue = queue
         self._remaining = remaining
@@ -98,7 +96,7 @@ class Admission:
         self._last: tuple[int, tuple[object, ...]] | None = None
         self._repeated = 0
 
-    def ask(self, now: Now, state: State, ref: Ref) -> Answer | None:
+    def ask(self, now: Now, state: State, ref: Ref) -> Decision | None:
         """The boundary's answer about a step or link; None when it did not decide."""
         kind, step, link = ref
         released_us = self._queue.released_us or 0  # 0: nothing was released yet, and only the contingency may fly
@@ -107,17 +105,18 @@ class Admission:
         binding = self._in_force.bundle.policy_digest if invocation is None else invocation.binding
         request = Request(kind, step, link, binding, now, state, released_us, phase, remaining_us)
         asked_for = encode(request)
-        answer = decode(self._loaded.boundary.enforce(asked_for))
+        contract = None if invocation is None else invocation.contract
+        answer = decode(self._loaded.boundary.enforce(asked_for), self._policy, contract)
         if self._journal.look_at_boundary(now):
             return None
-        if not isinstance(answer, Answer):
+        if not isinstance(answer, Decision):
             digest = sha256(asked_for).hexdigest()
             text = f"{answer.name.lower()} {digest}" if isinstance(answer, Status) else answer.text
             self._journal.effect(now, "undecided", ref, detail=text)
             return None
         asked = invocation if kind == STEP else None
         if asked is not None:
-            last = (step, (answer.outcome, answer.reason, answer.clause, answer.target))
+            last = (step, (answer.outcome, answer.reason, answer.clause, answer.link, answer.target))
             if last == self._last and not answer.permit:
                 self._repeated += 1
                 return answer
@@ -135,27 +134,23 @@ class Admission:
         self._repeated = 0
 
     def _told(
-        self, asked: Request, ref: Ref, of: Invocation | None, answer: Answer, approvals: tuple[Approval, ...]
+        self, asked: Request, ref: Ref, of: Invocation | None, answer: Decision, approvals: tuple[Approval, ...]
     ) -> Iterable[Action]:
         """An answer as it is shown, announced and recorded; `of` is the step asked about, or whose link it is."""
-        now, contract, subject = asked.now, None if of is None else of.contract, self._subject(ref, of)
-        clause = self._clause(contract, answer.clause)
+        now, clause, subject = asked.now, answer.clause, self._subject(ref, of)
         outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, "" if clause is None else clause.text))
         why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
         yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
-        target = self._target(contract, answer.target)
-        link, until_us = None if target is None else max(answer.target, DEGRADE), answer.valid_until_us
-        decided = Decision(answer.outcome, answer.reason, answer.rule_step, clause, link, target, until_us)
         identity = b"" if of is None else of.invocation_id
         context = Context(
             asked.binding, self._loaded.vehicle, self._policy.version, answer.consumed, asked.released_us, asked.phase,
             asked.remaining_us, approvals,
         )  # fmt: skip
         durability = WRITTEN
-        if contract is not None and ref.kind == STEP:
-            durability = durability_of(contract, answer.outcome, confirmed=confirmed(context), kind=STEP)
-        line = partial(self._journal.recorder.decision, now, ref, identity, asked.state, context, decided, durability)
+        if of is not None and ref.kind == STEP:
+            durability = durability_of(of.contract, answer.outcome, confirmed=confirmed(context), kind=STEP)
+        line = partial(self._journal.recorder.decision, now, ref, identity, asked.state, context, answer, durability)
         yield from self._journal.record(line, now, durability, awaited=True)
 
     def _subject(self, ref: Ref, of: Invocation | None) -> str:
@@ -164,17 +159,3 @@ class Admission:
         if ref.kind == STEP:
             return call(self._policy, of)
         return "the target of a degrade rule" if ref.link == DEGRADE else of.contract.fallback[ref.link].text
-
-    def _clause(self, contract: Contract | None, number: int) -> Decisive:
-        """The clause that decided, found by its number."""
-        if number == NO_CLAUSE:
-            return None
-        shared = self._shared
-        if number < len(shared):
-            return shared[number]
-        return None if contract is None else own_clauses(contract)[number - len(shared)]
-
-    def _target(self, contract: Contract | None, number: int) -> Link | None:
-        if NO_TARGET < number < 0:
-            return self._policy.rules[-1 - number].target
-        return None if contract is None or number == NO_TARGET else contract.fallback[number]

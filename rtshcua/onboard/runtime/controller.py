@@ -12,6 +12,7 @@ While the link is down, and until fresh state came or its time is over, there is
 from typing import Final
 
 from rtshcua.decision.links import look_ahead
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.flat.situation import Now, State
@@ -28,7 +29,6 @@ from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
 from rtshcua.onboard.runtime.view import Stage, View
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
-from rtshcua.wire.response import Answer
 
 #: what is recorded where another step is asked for, in place of one that is not admitted
 REPLAN: Final = "replan"
@@ -216,7 +216,7 @@ class MissionController:
             self._fallback.hold(now, state)
         return False
 
-    def _start(self, now: Now, invocation: Invocation, answer: Answer) -> bool:
+    def _start(self, now: Now, invocation: Invocation, answer: Decision) -> bool:
         if not self.dispatcher.fly(now, answer.permit, Ref(STEP, invocation.step, -1), None):
             return self._inadmissible(now, invocation)
         prepared = self._loaded.invocations[invocation.step]

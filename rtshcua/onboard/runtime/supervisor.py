@@ -7,13 +7,13 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.session import may_ask_again
 from rtshcua.decision.values import FALSE, Truth
 from rtshcua.decision.watch import holding, watch
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.runtime.journal import Detail
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.seen import seen
-from rtshcua.wire.response import Answer
 
 _DURATION = "lasts longer than it may"
 _TIMING = 5  # the step of section 4.1 that holds a decision against its deadline
@@ -104,14 +104,14 @@ class RetryPolicy:
         return True
 
     @staticmethod
-    def may_wait(invocation: Invocation, answer: Answer, released_us: int, now_us: int) -> bool:
+    def may_wait(invocation: Invocation, answer: Decision, released_us: int, now_us: int) -> bool:
         """Whether asking again can help: not past the deadline, but for an approval, which has a time of its own.
 
         What passed the timing step is in time, also by a release that an approval moved.
         """
         if answer.reason is Reason.AWAITING_APPROVAL:
             return True
-        in_time = answer.rule_step > _TIMING or now_us < released_us + invocation.contract.deadline_us
+        in_time = answer.step > _TIMING or now_us < released_us + invocation.contract.deadline_us
         return in_time and may_ask_again(invocation, answer.outcome, answer.reason)
 
     def may_hold(self) -> bool:
@@ -119,7 +119,7 @@ class RetryPolicy:
         held, self._held = self._held, True
         return not held
 
-    def may_call(self, invocation: Invocation, answer: Answer) -> bool:
+    def may_call(self, invocation: Invocation, answer: Decision) -> bool:
         """Whether a replacement of the step is to be asked for, once: its mission says so, and it was not admitted."""
         called, wanted = self._called, invocation.on_inadmissible == OnInadmissible.REPLAN
         self._called = called or (wanted and answer.outcome is Outcome.FALLBACK)

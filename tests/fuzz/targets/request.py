@@ -11,7 +11,6 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, decode, encode
-from rtshcua.wire.response import decode as read
 from virtual.case import flat
 from virtual.shipped import shipped
 
@@ -93,5 +92,5 @@ def one(data: bytes) -> None:
     for request in requests:
         asked = decode(request, policy.slots, len(policy.monitors))
         assert isinstance(asked, Refusal) or encode(asked) == request
-        said = read(boundary.enforce(request))
+        said = reference.read_answer(of, request, boundary.enforce(request))
         assert not isinstance(said, Refusal), said

@@ -10,13 +10,13 @@ from msgspec.structs import replace
 from reference.documents import ASKED, approval, hand, low, low_mission
 from reference.flat_case import MISSION, OBSTACLE, M, S
 from reference.world import TICK, Run, assert_audited, loaded
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.ports import Announce, Ending, Presented, Reply, Said, Sent
 from rtshcua.onboard.runtime.admission import InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US, WINDOW, RemainingLatency
 from rtshcua.onboard.runtime.supervisor import RetryPolicy
-from rtshcua.wire.response import Answer
 from virtual.rows import rows
 
 TIMES = st.lists(st.integers(-10, 1 << 40), max_size=2 * WINDOW)
@@ -60,7 +60,7 @@ def test_latency_is_measured_until_the_first_frame_went_out() -> None:
 
 def waits(reason: Reason, outcome: Outcome, step: int, at_us: int, on: OnInadmissible = OnInadmissible.ABORT) -> bool:
     invocation = replace(MISSION.invocations[0], on_inadmissible=on)
-    answer = Answer(outcome, reason, step, -1, 0, 0, 0)
+    answer = Decision(outcome, reason, step, None, None, None, 0)
     return RetryPolicy.may_wait(invocation, answer, 0, at_us)
 
 

@@ -6,8 +6,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from reference.documents import approval, low, presented
-from reference.world import SESSION_KEY, START, allowed, loaded, request_for, sealed, try_load
+from reference.world import SESSION_KEY, START, allowed, loaded, read_answer, request_for, sealed, try_load
 from rtshcua.codec.frames import Codec
+from rtshcua.model.decision import Decision
 from rtshcua.onboard.enforcement.executor import SESSION_OVER
 from rtshcua.onboard.enforcement.frames import NOT_COVERED, FrameSession
 from rtshcua.onboard.enforcement.frames import SESSION_OVER as GATE_OVER
@@ -17,7 +18,6 @@ from rtshcua.wire import boundary_chain, preparation, response
 from rtshcua.wire.boundary_chain import Tag, following
 from rtshcua.wire.preparation import Preparation
 from rtshcua.wire.receipt import decode
-from rtshcua.wire.response import Answer
 from rtshcua.wire.statement import Statement, open_statement
 from virtual import case
 
@@ -63,10 +63,10 @@ def test_an_answer_carries_the_digest_with_itself_in_it() -> None:
     of = loaded()
     before, asked = of.attestation.digest, request_for(of)
     octets = of.boundary.enforce(asked)
-    answer = response.decode(octets)
-    assert isinstance(answer, Answer)
-    payload = boundary_chain.decided(asked, answer.outcome, 0, answer.rule_step, -1, answer.valid_until_us, 0)
-    assert answer.evidence == octets[-32:] == of.attestation.digest == following(before, Tag.DECIDED, payload)
+    answer = read_answer(of, asked, octets)
+    assert isinstance(answer, Decision)
+    payload = boundary_chain.decided(asked, answer.outcome, 0, answer.step, -1, answer.valid_until_us, 0)
+    assert octets[-32:] == of.attestation.digest == following(before, Tag.DECIDED, payload)
 
 
 def test_a_request_that_is_refused_is_chained_by_its_digest() -> None:

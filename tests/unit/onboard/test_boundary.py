@@ -4,12 +4,15 @@ from msgspec.structs import replace
 
 from reference.flat_case import BATTERY, HOVER, INVOCATIONS, MISSION, OBSTACLE, POLICY, RULES, M
 from reference.world import START, FakeVehicle, Run, allowed, answer_to, loaded, request_for
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.executor import LAPSED
 from rtshcua.wire.permit import LINK_VALID_US
-from rtshcua.wire.response import Answer, Status, own_clauses, shared_clauses
+from rtshcua.wire.request import DEGRADE
+from rtshcua.wire.response import Status, shared_clauses
 
 
 def state(**values: int | None) -> State:
@@ -22,10 +25,10 @@ def test_a_degrade_target_is_admitted_while_its_rule_matches() -> None:
     of = loaded()
     allowed(of)
     no = answer_to(of, request_for(of, 1, 0, -1))
-    assert isinstance(no, Answer)
+    assert isinstance(no, Decision)
     assert (no.outcome, no.reason, no.permit) == (Outcome.FALLBACK, Reason.STATE_VIOLATED, b"")
     low = answer_to(of, request_for(of, 1, 0, -1, state=state(battery=2_000)))
-    assert isinstance(low, Answer)
+    assert isinstance(low, Decision)
     assert (low.outcome, low.valid_until_us) == (Outcome.ALLOW, START.monotonic_us + LINK_VALID_US)
     assert low.permit
 
@@ -33,11 +36,11 @@ def test_a_degrade_target_is_admitted_while_its_rule_matches() -> None:
 def test_a_refusal_names_its_target_and_its_clause() -> None:
     of = loaded()
     answer = answer_to(of, request_for(of, state=state(battery=2_000)))
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.FALLBACK
-    assert answer.target == -len(RULES), "the degrade rule is the last one"
-    clauses = (*shared_clauses(of.bundle.policy), *own_clauses(of.bundle.mission.invocations[0].contract))
-    assert clauses[answer.clause].text == "battery > 35 %"
+    assert (answer.link, answer.target) == (DEGRADE, RULES[-1].target), "the degrade rule is the last one"
+    assert isinstance(answer.clause, Clause)
+    assert answer.clause.text == "battery > 35 %"
 
 
 def test_the_airspace_has_a_number_if_there_is_one() -> None:

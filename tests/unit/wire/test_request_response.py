@@ -5,21 +5,63 @@ from msgspec.structs import replace
 
 from reference import flat_case
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire import artefact, cbor, names, permit, response
 from rtshcua.wire.permit import SIZE, Permit
-from rtshcua.wire.response import Answer, Status
+from rtshcua.wire.request import DEGRADE
+from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Status
 from virtual.rows import rows
 
-ANSWER = Answer(Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, 4, 1, 9_000, 0, b"p" * SIZE, b"d" * 32)
+POLICY, CONTRACT = flat_case.POLICY, flat_case.CONTRACTS[flat_case.INSPECT]
+CLAUSE, EVIDENCE = len(response.shared_clauses(POLICY)), b"d" * 32
+ANSWER = Decision(
+    Outcome.FALLBACK, Reason.STATE_VIOLATED, 6, CONTRACT.require[0], 1, CONTRACT.fallback[1], 9_000, 0, b"p" * SIZE
+)
+
+
+def read(data: bytes, contract: Contract | None = CONTRACT) -> Decision | Status | Refusal:
+    return response.decode(data, POLICY, contract)
+
+
+def written(answer: Decision, clause: int = NO_CLAUSE, target: int = NO_TARGET) -> bytes:
+    return response.encode(answer, clause, target, EVIDENCE)
 
 
 @pytest.mark.parametrize("answer", [ANSWER, replace(ANSWER, permit=b"")])
-def test_an_answer_with_and_without_a_permit_is_read_back(answer: Answer) -> None:
-    assert response.decode(response.encode(answer)) == answer
-    other = response.encode(answer, b"e" * 32)
-    assert response.decode(other) == replace(answer, evidence=b"e" * 32)
-    assert other == response.encode(answer)[:-32] + b"e" * 32  # it stands last
+def test_an_answer_with_and_without_a_permit_is_read_back(answer: Decision) -> None:
+    octets = written(answer, CLAUSE, 1)
+    assert read(octets) == answer
+    assert octets.endswith(answer.permit + EVIDENCE)
+
+
+def test_the_target_of_a_degrade_rule_is_read_back() -> None:
+    rule = next(number for number, rule in enumerate(POLICY.rules) if rule.kind == RuleKind.DEGRADE)
+    target = POLICY.rules[rule].target
+    assert read(written(ANSWER, rule, -1 - rule)) == replace(
+        ANSWER, clause=POLICY.rules[rule], link=DEGRADE, target=target
+    )
+
+
+@rows(
+    ("clause", "target", "contract"),
+    [
+        (NO_CLAUSE - 1, NO_TARGET, CONTRACT),
+        (CLAUSE + len(response.own_clauses(CONTRACT)), NO_TARGET, CONTRACT),
+        (CLAUSE, NO_TARGET, None),  # a link of the contingency has no contract of its own
+        (NO_CLAUSE, len(CONTRACT.fallback), CONTRACT),
+        (NO_CLAUSE, 0, None),
+        (NO_CLAUSE, -1, CONTRACT),  # the first rule is none that degrades
+        (NO_CLAUSE, -1 - len(POLICY.rules), CONTRACT),
+        (NO_CLAUSE, NO_TARGET - 1, CONTRACT),
+    ],
+)
+def test_a_clause_or_a_target_that_there_is_not_is_refused(clause: int, target: int, contract: Contract | None) -> None:
+    refused = read(written(ANSWER, clause, target), contract)
+    assert isinstance(refused, Refusal)
+    assert refused.text == "a clause or a target that there is not"
 
 
 def test_clauses_are_numbered_from_the_rules_over_the_airspace_to_the_contract() -> None:
@@ -33,21 +75,28 @@ def test_clauses_are_numbered_from_the_rules_over_the_airspace_to_the_contract()
 @given(
     st.sampled_from(list(Outcome)),
     st.sampled_from(list(Reason)),
-    st.integers(-(1 << 15) - 1, 1 << 16),
+    st.integers(NO_CLAUSE, CLAUSE + len(response.own_clauses(CONTRACT)) - 1),
+    st.integers(0, len(CONTRACT.fallback) - 1),
+    st.integers(-(1 << 63), (1 << 63) - 1),
     st.just(b"") | st.binary(min_size=SIZE, max_size=SIZE),
 )
-def test_what_is_encoded_is_read_back(outcome: Outcome, reason: Reason, number: int, permit: bytes) -> None:
-    answer = Answer(outcome, reason, 1, number, number, abs(number), 1, permit)
-    assert response.decode(response.encode(answer)) == answer
+def test_what_is_encoded_is_read_back(
+    outcome: Outcome, reason: Reason, clause: int, target: int, until_us: int, permit: bytes
+) -> None:
+    decisive = (
+        None if clause == NO_CLAUSE else (*response.shared_clauses(POLICY), *response.own_clauses(CONTRACT))[clause]
+    )
+    answer = Decision(outcome, reason, 1, decisive, target, CONTRACT.fallback[target], until_us, 1, permit)
+    assert read(written(answer, clause, target)) == answer
 
 
 @pytest.mark.parametrize("status", [status for status in Status if status])
 def test_a_refusal_is_its_status(status: Status) -> None:
-    assert response.decode(response.encode_refusal(status)) is status
-    assert response.decode(response.encode_refusal(status, b"e" * 32)) is status
+    assert read(response.encode_refusal(status)) is status
+    assert read(response.encode_refusal(status, b"e" * 32)) is status
 
 
-PLAIN = response.encode(Answer(Outcome.ALLOW, Reason.ADMITTED, 8, -1, -2, 0, 0))
+PLAIN = written(Decision(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, None, 0))
 REFUSAL = response.encode_refusal(Status.NOT_CURRENT)
 
 
@@ -64,7 +113,7 @@ def changed(data: bytes, at: int, octet: int) -> bytes:
         (PLAIN + b"\0", "not a response of version 2"),
         (PLAIN[:-1], "not a response of version 2"),
         (PLAIN + b"p" * SIZE, "not a response of version 2"),
-        (response.encode(ANSWER)[:-1], "not a response of version 2"),
+        (written(ANSWER)[:-1], "not a response of version 2"),
         (cbor.encode(("rtshcua/response", 1, bytes(53))), "not a response of version 2"),
         (artefact.wrap(names.RESPONSE, 1), "not a response of version 2"),
         (changed(PLAIN, 1, len(Outcome)), "an outcome or a reason that there is not"),
@@ -74,14 +123,14 @@ def changed(data: bytes, at: int, octet: int) -> bytes:
     ],
 )
 def test_what_is_no_response_says_why(data: bytes, text: str) -> None:
-    read = response.decode(data)
-    assert isinstance(read, Refusal)
-    assert text in read.text
+    refused = read(data)
+    assert isinstance(refused, Refusal)
+    assert text in refused.text
 
 
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_without_an_exception(data: bytes) -> None:
-    assert isinstance(response.decode(data), Refusal)
+    assert isinstance(read(data), Refusal)
 
 
 KEY = bytes(range(32))

@@ -24,7 +24,7 @@ typedef struct {
     bool known;
 } rt_value;
 
-/* case.py: one situation; what is missing, stale or beyond all sense is not known */
+/* situation.py: one situation; what is missing, stale or beyond all sense is not known */
 typedef struct {
     const rt_prepared_policy *policy;
     rt_value slots[RT_MAX_SLOTS];
@@ -78,6 +78,9 @@ rt_truth rt_zone_along(const rt_prepared_policy *policy, uint32_t zone, rt_list 
 /* Whether a volume is inside a zone, at any moment from now to `through_us` from now. */
 rt_truth rt_zone_holds(const rt_situation *situation, uint32_t zone, const rt_volume *volume, int64_t through_us);
 
+/* Whether a volume is in the airspace, of which there is one. */
+rt_truth rt_airspace_keeps(const rt_situation *situation, const rt_volume *volume, int64_t through_us);
+
 /* times.py: over the moments low..high of UTC */
 rt_truth rt_time_of_day(const rt_vehicle *vehicle, int64_t start, int64_t end, int64_t low, int64_t high, int64_t error);
 rt_truth rt_time_of_week(const rt_vehicle *vehicle, rt_list windows, int64_t low, int64_t high, int64_t error);
@@ -102,10 +105,7 @@ static inline int rt_pushes(int64_t op) {
 rt_truth rt_evaluate(rt_list code, const rt_environment *at);
 rt_truth rt_matches(const rt_rule *rule, const rt_environment *at);
 
-/* safety.py: whether a volume is in the airspace, of which there is one */
-rt_truth rt_airspace_keeps(const rt_situation *situation, const rt_volume *volume, int64_t through_us);
-
-/* authority.py, timing.py, safety.py: a step that does not pass says so */
+/* decide.py */
 typedef struct {
     rt_prepared_invocation *invocation;
     const rt_policy *policy;
@@ -117,17 +117,7 @@ typedef struct {
     int64_t released_us; /* moved by an approval */
 } rt_case;
 
-bool rt_step_integrity(rt_case *one, rt_decision *decision);
-bool rt_step_freshness(rt_case *one, rt_decision *decision);
-bool rt_step_authority(rt_case *one, rt_decision *decision);
-bool rt_step_confirmation(rt_case *one, rt_decision *decision);
-bool rt_step_phase(rt_case *one, rt_decision *decision);
-bool rt_step_timing(rt_case *one, rt_decision *decision);
-bool rt_step_state(rt_case *one, rt_decision *decision);
-bool rt_step_safety(rt_case *one, rt_decision *decision);
-int64_t rt_valid_until(const rt_case *one);
-
-/* decide.py: the decision is for this reason, and says which clause (RT_NO_CLAUSE); false, for a step to return */
+/* The decision is for this reason, and says which clause (RT_NO_CLAUSE); false, for a step to return */
 bool rt_found(rt_decision *decision, int64_t reason, int64_t clause);
 /* The number of a rule that decides: where several are the same, that of the last. */
 int64_t rt_rule_number(const rt_prepared_invocation *invocation, uint32_t rule);

@@ -71,3 +71,14 @@ rt_truth rt_zone_holds(const rt_situation *situation, uint32_t number, const rt_
     int64_t utc = situation->utc_us;
     return rt_and(truth, rt_zone_exists(&policy->policy->vehicle, zone, utc, utc + through_us, situation->error_us));
 }
+
+rt_truth rt_airspace_keeps(const rt_situation *situation, const rt_volume *volume, int64_t through_us) {
+    const rt_airspace *airspace = &situation->policy->policy->airspace;
+    rt_list inside = airspace->inside, outside = airspace->outside;
+    rt_truth truth = RT_TRUE;
+    int64_t zone;
+    while (rt_next_int(&inside, &zone)) truth = rt_and(truth, rt_zone_holds(situation, (uint32_t)zone, volume, through_us));
+    while (rt_next_int(&outside, &zone))
+        truth = rt_and(truth, rt_not(rt_zone_holds(situation, (uint32_t)zone, volume, through_us)));
+    return truth;
+}

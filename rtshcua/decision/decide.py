@@ -2,7 +2,7 @@
 
 The steps are those of design 4.1. The first that does not pass decides. They judge sets of situations, so that the same
 ones serve the checker, which asks what is possible, and the runtime, which asks about one situation: a set of one,
-which has exactly one verdict. (`boundary/decision` has them in the files decide, authority, timing and safety.)
+which has exactly one verdict.
 
 1: the request is for this vehicle and the policy in force, and within its own ranges. Signatures were verified once, at
 load; what is compared here is the digest that they cover.

@@ -323,6 +323,9 @@ _REPOSITION: Final = 192
 _MM: Final = 11.132  # in 1e-7 degree
 #: mm: how far from its target it may stand, for all that its reports tell: half a metre, and its estimator's error
 _SAME_MM: Final = 2_000
+#: where PX4 says that it will stop (`Navigator::calculate_breaking_stop`): MPC_ACC_HOR, and what it adds for the jerk
+_TOLD_BRAKING_MM_S2: Final = 3_000
+_TOLD_DELAY_S: Final = 0.6
 _REQUEST_MESSAGE, _HEARTBEAT = 512, 0
 _ASKS: Final = frozenset({401, 511, _REQUEST_MESSAGE})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
@@ -423,9 +426,7 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
         lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
         then = flown.samples[bisect_left(times, since_us)]
-        stands = then.in_air and (
-            (_is_still(then) and _ends_at(last, then)) or _stops(last, then, flown.samples, times)
-        )
+        stands = then.in_air and (_ends_at(last, then) or _stops(last, then, flown.samples, times))
         stood = excuses.paused_at(since_us) and stands
         as_lost = _flies_as_lost(flown, motion, times, since_us, max(since_us, frame.sent_us - within_us))
         cause = "crossed" if crossed else "unseen" if stood or as_lost else "ground" if lands else None
@@ -435,17 +436,22 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
 
 
 def _ends_at(last: tuple[Frame, frozenset[MotionKind]] | None, sample: Sample) -> bool:
-    """Whether what stands still there has come to the end of what it was told: to stop there, to climb, or a leg."""
+    """Whether a pause there ends what it was told where that ends: to stop, to climb, or a leg, whose end is no farther
+    ahead than PX4 says that it will stop.
+    """
     if last is None:
         return False
     frame, kinds = last
     if kinds in ({MotionKind.HOLD}, {MotionKind.CLIMB}):
-        return True
+        return _is_still(sample)
     message = dialect.MAVLink(None).decode(bytearray(frame.octets))
     if getattr(message, "command", None) != _REPOSITION:
         return False
     north, east = (message.x - sample.latitude) * _MM, (message.y - sample.longitude) * _MM
-    return hypot(north, east * cos(radians(sample.latitude / 1e7))) <= _SAME_MM
+    left = hypot(north, east * cos(radians(sample.latitude / 1e7)))
+    speed = sample.speed_mm_s
+    ahead = 0 if _is_still(sample) else speed * (speed / _TOLD_BRAKING_MM_S2 / 2 + _TOLD_DELAY_S)
+    return abs(left - ahead) <= _SAME_MM
 
 
 def _stops(

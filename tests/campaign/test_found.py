@@ -170,6 +170,18 @@ def test_a_pause_where_a_leg_had_ended_is_excused() -> None:
     assert {each.cause for each in judge(was).exceptions} == {"unseen"}
 
 
+@pytest.mark.parametrize(
+    ("at_s", "ending", "causes"), [(17.4, "stood-down", set()), (17.8, "completed", {"unseen"})], ids=["seen", "unseen"]
+)
+def test_a_pause_that_stops_it_at_the_target_of_its_leg_is_excused(at_s: float, ending: str, causes: set[str]) -> None:
+    """The place at which it says that it will stop is the one that it flies to: no report tells. A moment before, it is
+    told from it.
+    """
+    was = flown(of("px4", at(at_s, PAUSE)))
+    assert next(each for each in was.samples if each.at_us >= at_s * S).speed_mm_s > 2_000, "it has come to its end"
+    assert (was.ending, slugs(was), {each.cause for each in judge(was).exceptions}) == (ending, set(), causes)
+
+
 def test_a_target_that_is_told_late_is_waited_for_before_a_restart_takes_the_flight_for_its_own() -> None:
     mute = at(15.5, faults.MessageSilence(0, "POSITION_TARGET_GLOBAL_INT", 2_300_000))
     was = flown(of("px4", at(13, faults.RuntimeKilled(0, 3 * S)), at(14, GOTO), mute))

@@ -43,7 +43,10 @@ from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 
-_ALLOW, _FALLBACK = Outcome.ALLOW, Outcome.FALLBACK  # an enumeration's attributes are slow to find
+# an enumeration's attributes are slow to find
+_ALLOW, _FALLBACK, _ADMITTED = Outcome.ALLOW, Outcome.FALLBACK, Reason.ADMITTED
+#: the `step` of a decision that all steps passed
+_PASSED_ALL = 8
 
 
 class Verdict(NamedTuple):
@@ -59,7 +62,6 @@ Found: TypeAlias = tuple[Verdict, ...]
 
 PASS = Verdict(Outcome.ALLOW, Reason.ADMITTED, None)
 PASSED: Found = (PASS,)
-_ADMITTED = (8, PASS)
 
 
 class Possible(NamedTuple):
@@ -76,13 +78,14 @@ def decide(
     """Decide on an invocation in one situation. Total: one outcome, whatever the state, the context and the time."""
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
-    step, (outcome, reason, clause) = _verdicts(invocation, policy, context, sets, at, exact=True)[0]
-    if outcome is _ALLOW:
-        until_us = valid_until(invocation, state, context, sets, at)
-        return Decision(outcome, reason, step, clause, None, None, until_us, context.consumed)
-    choice = next(fallbacks(invocation, sets, policy, START, exact=True)) if outcome is _FALLBACK else None
-    link, target = (None, None) if choice is None else (choice.index, choice.link)
-    return Decision(outcome, reason, step, clause, link, target, now.monotonic_us, context.consumed)
+    for step, found in steps(invocation, policy, context, sets, at, exact=True):
+        if found is not PASSED and found[0] is not PASS:
+            outcome, reason, clause = found[0]
+            choice = next(fallbacks(invocation, sets, policy, START, exact=True)) if outcome is _FALLBACK else None
+            link, target = (None, None) if choice is None else (choice.index, choice.link)
+            return Decision(outcome, reason, step, clause, link, target, now.monotonic_us, context.consumed)
+    until_us = valid_until(invocation, state, context, sets, at)
+    return Decision(_ALLOW, _ADMITTED, _PASSED_ALL, None, None, None, until_us, context.consumed)
 
 
 def possible(
@@ -91,27 +94,18 @@ def possible(
     """Every (outcome, reason, target) that some situation of the sets may have, and perhaps some that none has."""
     exact, at = is_situation(sets, policy), environment(sets, policy, invocation.arguments, invocation.phase)
     found: set[Possible] = set()
-    for _, (outcome, reason, _) in _verdicts(invocation, policy, context, sets, at, exact):
-        if outcome is _FALLBACK:
-            for choice in fallbacks(invocation, sets, policy, START, exact):
-                found.add(Possible(outcome, reason, None if choice is None else choice.link))
-        else:
-            found.add(Possible(outcome, reason, None))
+    for _, verdicts in steps(invocation, policy, context, sets, at, exact):
+        for verdict in verdicts:
+            if verdict.outcome is _FALLBACK:
+                for choice in fallbacks(invocation, sets, policy, START, exact):
+                    found.add(Possible(_FALLBACK, verdict.reason, None if choice is None else choice.link))
+            elif verdict is not PASS:
+                found.add(Possible(verdict.outcome, verdict.reason, None))
+        if verdicts[-1] is not PASS:
+            break
+    else:
+        found.add(Possible(_ALLOW, _ADMITTED, None))
     return frozenset(found)
-
-
-def _verdicts(
-    invocation: PreparedInvocation, policy: PreparedPolicy, context: Context, sets: Sets, at: Environment, exact: bool
-) -> list[tuple[int, Verdict]]:
-    """The verdicts that are possible, each with its step; a single situation has one."""
-    verdicts: list[tuple[int, Verdict]] = []
-    for number, found in steps(invocation, policy, context, sets, at, exact):
-        if found is not PASSED:
-            verdicts += [(number, verdict) for verdict in found if verdict is not PASS]
-            if found[-1] is not PASS:
-                return verdicts
-    verdicts.append(_ADMITTED)
-    return verdicts
 
 
 def steps(
@@ -257,8 +251,9 @@ class Asked(NamedTuple):
     granted_us: int | None
 
 
-def _asked(invocation: PreparedInvocation, context: Context, at: Environment) -> Iterator[Asked]:
+def _asked(invocation: PreparedInvocation, context: Context, at: Environment) -> list[Asked]:
     """The `confirm` rules that may match."""
+    asked: list[Asked] = []
     for rule, number, condition in invocation.candidates.confirms:
         truth = condition(at)
         if truth == FALSE:
@@ -267,7 +262,8 @@ def _asked(invocation: PreparedInvocation, context: Context, at: Environment) ->
         answers = [each for each in context.approvals if each.rule == number and each.role in roles]
         refused = not all(each.granted for each in answers)
         times = [] if refused else _granted(rule, [each for each in answers if each.monotonic_us <= end_us])
-        yield Asked(rule, not truth & FALSE, end_us, refused, min(times, default=None))
+        asked.append(Asked(rule, not truth & FALSE, end_us, refused, min(times, default=None)))
+    return asked
 
 
 def _granted(rule: Rule, answers: Sequence[Approval]) -> list[int]:
@@ -310,6 +306,8 @@ def confirmation(invocation: PreparedInvocation, context: Context, at: Environme
 def release(invocation: PreparedInvocation, context: Context, at: Environment) -> Span:
     """When the step was released, monotonic us: an approval moves it."""
     first = last = context.released_us
+    if not invocation.candidates.confirms:
+        return first, last
     for _, certain, _, _, granted_us in _asked(invocation, context, at):
         if granted_us is not None:
             first, last = max(first, granted_us) if certain else first, max(last, granted_us)

@@ -26,7 +26,7 @@ from rtshcua.wire.boundary_chain import BoundaryChain, Tag
 from rtshcua.wire.permit import AGAIN, LINK_VALID_US, Permit, seal
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
-from rtshcua.wire.request import STEP, Ref, Request, decode
+from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref, Request, decode
 from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Status, encode, encode_refusal
 
 #: how far UTC and monotonic time may part in a session, in us: more than a good clock is off, and less than matters
@@ -108,7 +108,8 @@ class SoftwareBoundary:
             return self._refuse(Status.MALFORMED, request)
         if asked.kind == STEP:
             decision = self._step(asked)
-            clause, target = self._clause(asked.step, decision), self._target(asked.step, decision)
+            clause = NO_CLAUSE if decision.clause is None else self._clause(asked.step, decision.clause)
+            target = NO_TARGET if decision.link is None else self._target(asked.step, decision.link, decision.target)
         else:
             decision, clause, target = self._link(asked, ref), NO_CLAUSE, NO_TARGET
         return encode(decision, clause, target, self._chained(request, asked, decision, clause, target))
@@ -202,26 +203,19 @@ class SoftwareBoundary:
         decision = self._session.decide_link(ref, asked.binding, asked.state, asked.now)
         if decision.target is None:
             return decision
-        if ref.link == DEGRADE:
-            ref = Ref(ref.kind, ref.step, self._degrade(ref.step, decision.target))
+        if ref.kind == FALLBACK_LINK:
+            ref = Ref(ref.kind, ref.step, self._target(ref.step, ref.link, decision.target))
         return replace(decision, permit=self._issuer.link(ref, decision.valid_until_us))
 
-    def _clause(self, step: int, decision: Decision) -> int:
+    def _clause(self, step: int, clause: Clause | Rule | Airspace) -> int:
         """The number of the clause that decided, in a response; a rule has its index in the policy."""
-        clause = decision.clause
-        if clause is None:
-            return NO_CLAUSE
         number = self._own[step].get(clause)
         return self._shared[clause] if number is None else number
 
-    def _target(self, step: int, decision: Decision) -> int:
-        """The number of the link that flies in place of a step."""
-        if decision.link is None:
-            return NO_TARGET
-        return decision.link if decision.link != DEGRADE else self._degrade(step, decision.target)
-
-    def _degrade(self, step: int, target: Link | None) -> int:
-        """`-1 - rule` for the target of a degrade rule."""
+    def _target(self, step: int, link: int, target: Link | None) -> int:
+        """The number of a link of a step, in a response; `-1 - rule` for the target of a degrade rule."""
+        if link != DEGRADE:
+            return link
         for degrade in self._in_force.invocations[step].candidates.degrades:
             if degrade.rule.target == target:
                 return -1 - self._shared[degrade.rule]

@@ -53,16 +53,12 @@ def test_what_is_handed_in_flies_once(ground: Any, place: Path) -> None:
     again.until("waiting")
     said = hand_in(place, (ground.folder / handed).read_bytes())
     assert said.slug == "replayed", said
-    assert again.end().code == 5, again.stderr
-    if program() is None:
-        return
     for marker in Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("replay/vehicle-quad-07/*"):
         marker.unlink()
-    forgetful = ground.run(base, *words, "--wait-for", "8s")
-    forgetful.until("waiting")
-    said = hand_in(place, (ground.folder / handed).read_bytes())
-    assert said.slug == "boundary-replayed", "what the run forgot, the boundary did not"
-    assert forgetful.end().code == 5, forgetful.stderr
+    if program() is not None:
+        said = hand_in(place, (ground.folder / handed).read_bytes())
+        assert said.slug == "boundary-replayed", "what the run forgot, the boundary did not"
+    assert again.end().code == 5, again.stderr
 
 
 def test_ctrl_c_ends_the_wait(ground: Any, place: Path) -> None:

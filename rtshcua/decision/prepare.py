@@ -257,8 +257,8 @@ class PreparedPolicy:
     """A policy that was found well-formed, compiled. `limits` has one entry a slot; `bounds` is the same by column: the
     ages at which slots are stale, the least and the most values. `monitors` are in order.
 
-    `seen` is the last single situation that was asked about, remembered to be quick: no answer depends on it, and
-    nothing else is ever changed.
+    `seen` is the last single situation that was asked about, remembered to be quick, as planners remember their last
+    start and zones the last box: no answer depends on it, and nothing else is ever changed.
     """
 
     policy: Policy

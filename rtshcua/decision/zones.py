@@ -19,6 +19,8 @@ from rtshcua.decision.values import ABSENT, AND, FALSE, PRESENT, TRUE, UNKNOWN, 
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 NO_BOX: Box = (0, 0, 0, 0)
+#: how far around a place a zone is compared ahead, mm: what a vehicle flies in a second or two
+AROUND = 10_000
 _UTC = LocalTime(0)
 
 
@@ -48,6 +50,18 @@ class Circle:
         reach_x, reach_y = max(-west, east), max(-south, north)
         reach = self._radius + isqrt(reach_x * reach_x + reach_y * reach_y) + 1
         return self._outside(x0, y0, x1, y1, reach)
+
+    def throughout(self, west: int, south: int, east: int, north: int) -> bool | None:
+        """Whether all of a box is inside; None where not all of it is on one side.
+
+        Outside only where `clear` says so of every leg in it whose own box reaches no further than `AROUND`. Its reach
+        counts half as much again at most, where the leg passes the centre: the length of 2 mm is rounded up to 3.
+        """
+        if self._holds(west, south, (0, 0, east - west, north - south)):
+            return True
+        reach = self._radius + isqrt(2 * AROUND * AROUND) + 2
+        dx, dy = max(west - self._x, self._x - east, 0), max(south - self._y, self._y - north, 0)
+        return False if 4 * (dx * dx + dy * dy) > 9 * reach * reach else None
 
     def _holds(self, x: int, y: int, box: Box) -> bool:
         """Whether a widened place is inside: its corner farthest from the centre is."""
@@ -79,11 +93,17 @@ class Area:
         bands = Bands(legs)
         self.clear, self.compared = bands.clear, bands.compared
 
+    def throughout(self, west: int, south: int, east: int, north: int) -> bool | None:
+        """Whether all of a box is inside; None where not all of it is on one side."""
+        if not self.clear(west, south, west, south, (0, 0, east - west, north - south)):
+            return None
+        return bool(self.contains(west, south))
+
 
 class PreparedZone:
     """A zone ready to be asked; `number` is its index in the policy, `times` is None where it exists at all times."""
 
-    __slots__ = ("banded", "ceiling", "floor", "number", "shape", "times")
+    __slots__ = ("banded", "ceiling", "floor", "number", "shape", "times", "vicinity")
 
     def __init__(self, number: int, zone: Zone, local: LocalTime = _UTC) -> None:
         self.number = number
@@ -91,6 +111,7 @@ class PreparedZone:
         self.banded = (zone.floor, zone.ceiling) != (LOWEST, HIGHEST)
         self.shape: Circle | Area = Circle(zone.data) if zone.shape == CIRCLE else Area(zone)
         self.times = Times(zone, local) if timed(zone) else None
+        self.vicinity = Vicinity(self)
 
     def along(self, path: tuple[int, ...], box: Box) -> Truth:
         """Whether the places of a sweep are inside, whatever their height."""
@@ -116,6 +137,47 @@ class PreparedZone:
         else:
             truth = FALSE if high <= self.floor or low >= self.ceiling else TRUE | FALSE
         return truth | UNKNOWN if gap else truth
+
+
+#: west, south, the least height, east, north, the greatest height; mm
+Bounds: TypeAlias = tuple[int, int, int, int, int, int]
+
+
+class Vicinity:
+    """A box around the places that a zone was asked about last, and what it says of every place in there, if that is
+    one answer: a vehicle that flies about is not compared with the outline again and again. No answer depends on it.
+    """
+
+    __slots__ = ("_answer", "_bounds", "_compared", "_zone")
+
+    def __init__(self, zone: PreparedZone) -> None:
+        self._zone = zone
+        self._bounds: Bounds = (0, 0, 0, -1, -1, -1)  # nothing is in it
+        self._answer: Truth | None = None
+        self._compared = False
+
+    def answer(self, bounds: Bounds) -> Truth | None:
+        """What the zone says of every place within these bounds; None where the place itself must be compared.
+
+        The box is compared when a second place lies in it: places far apart are compared themselves, and only that.
+        """
+        west, south, low, east, north, high = bounds
+        near = self._bounds
+        if west < near[0] or south < near[1] or low < near[2] or east > near[3] or north > near[4] or high > near[5]:
+            self._bounds = (west - AROUND, south - AROUND, low - AROUND, east + AROUND, north + AROUND, high + AROUND)
+            self._answer, self._compared = None, False
+        elif not self._compared:
+            self._answer, self._compared = self._compare(), True
+        return self._answer
+
+    def _compare(self) -> Truth | None:
+        west, south, low, east, north, high = self._bounds
+        vertical = self._zone.between(low, high)
+        if vertical == FALSE:
+            return FALSE
+        inside = self._zone.shape.throughout(west, south, east, north)
+        truth = FALSE if inside is False else vertical if inside else TRUE | FALSE
+        return truth if truth in (TRUE, FALSE) else None
 
 
 class Sweep:
@@ -147,17 +209,22 @@ class Place:
     It too remembers each zone's answer, so that a planned volume that did not change is not looked at again.
     """
 
-    __slots__ = ("_answers", "high", "located", "parts")
+    __slots__ = ("_answers", "_bounds", "high", "located", "parts")
 
     def __init__(self, parts: tuple[Part, ...], located: int = PRESENT, high: int = PRESENT) -> None:
         self.parts, self.located, self.high = parts, located, high
         self._answers: dict[int, Truth] = {}
+        self._bounds = None if located or high or len(parts) > 1 else _bounds(*parts[0])
 
     def inside(self, zone: PreparedZone) -> Truth:
         """Whether the places are inside a zone, at a time at which it exists."""
         answer = self._answers.get(zone.number)
         if answer is None:
-            answer = self._answers[zone.number] = self._inside(zone)
+            if self._bounds is not None:
+                answer = zone.vicinity.answer(self._bounds)
+            if answer is None:
+                answer = self._inside(zone)
+            self._answers[zone.number] = answer
         return answer
 
     def _inside(self, zone: PreparedZone) -> Truth:
@@ -171,6 +238,15 @@ class Place:
             else:
                 truth |= AND[vertical][sweep.within(zone) | (UNKNOWN if located else 0)]
         return truth
+
+
+def _bounds(sweep: Sweep, low: int, high: int) -> Bounds | None:
+    """What a part lies within; None where its box is too wide for `Circle.throughout`."""
+    west, south, east, north = box = sweep.box
+    if max(map(abs, box)) > AROUND:
+        return None
+    x, y = sweep.path[::2], sweep.path[1::2]
+    return (min(x) + west, min(y) + south, low, max(x) + east, max(y) + north, high)
 
 
 NOWHERE = Place(((Sweep((0, 0), NO_BOX), 0, 0),), ABSENT, ABSENT)

@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 from math import cos, pi, sin
+from random import Random
 
 import pytest
 from hypothesis import given
@@ -10,7 +11,7 @@ from msgspec.structs import replace
 
 from reference import outlines, worlds
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
-from rtshcua.decision.values import ABSENT, FALSE, MAYBE, PRESENT, TRUE, UNKNOWN
+from rtshcua.decision.values import ABSENT, AND, FALSE, MAYBE, PRESENT, TRUE, UNKNOWN
 from rtshcua.decision.zones import NOWHERE, Place, PreparedZone, Sweep
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
 from virtual.rows import rows
@@ -77,6 +78,63 @@ def test_a_widened_leg_and_a_circle(
     zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]
 ) -> None:
     check_circle(zone, a, b, box)
+
+
+METRE = 1_000
+
+
+def field(chance: Random) -> Zone:
+    """A zone as wide as what is flown in."""
+    floor, ceiling = chance.choice([(LOWEST, HIGHEST), (LOWEST, 20 * METRE), (5 * METRE, 40 * METRE)])
+    if chance.random() < 0.4:
+        radius = chance.randint(METRE, 70 * METRE)
+        return Zone("c", CIRCLE, floor, ceiling, (*place(chance, (0, 0), 60), radius * radius))
+    rings = [[(8 * METRE * x, 8 * METRE * y) for x, y in ring] for ring in outlines.rings(chance)]
+    return outlines.area([tuple(ring) for ring in rings], floor, ceiling)
+
+
+def place(chance: Random, near: tuple[int, int], metres: int) -> tuple[int, int]:
+    x, y = near
+    return x + chance.randint(-metres * METRE, metres * METRE), y + chance.randint(-metres * METRE, metres * METRE)
+
+
+@rows("seed", range(8))
+def test_what_a_zone_was_asked_before_changes_no_answer(seed: int) -> None:
+    chance = Random(seed)
+    for _ in range(60):
+        asked = PreparedZone(0, field(chance))
+        middle, height = place(chance, (0, 0), 100), chance.randint(-5 * METRE, 45 * METRE)
+        for _ in range(30):
+            at, reach = place(chance, middle, 9), chance.choice((0, 2 * METRE, 6 * METRE, 20 * METRE))
+            path = chance.choice((at, (*at, *place(chance, at, 9)), (*at, at[0], at[1] + 2)))
+            low, box = height + chance.randint(-12 * METRE, 12 * METRE), (-reach, -reach, reach, reach)
+            high = low + chance.randint(0, 9 * METRE)
+            exact = AND[asked.between(low, high)][asked.along(path, box)]
+            assert Place(((Sweep(path, box), low, high),)).inside(asked) == exact
+
+
+@rows(
+    ("north", "box"),
+    [
+        (111 * METRE, (-10 * METRE, -10 * METRE, 10 * METRE, 10 * METRE)),
+        (125 * METRE, (0, 0, 0, 40 * METRE)),
+    ],
+)
+def test_a_short_leg_past_a_circle_stays_in_doubt(north: int, box: tuple[int, int, int, int]) -> None:
+    """Its length of 2 mm counts as 3, and its box as if it reached to all sides."""
+    zone = PreparedZone(0, Zone("c", CIRCLE, LOWEST, HIGHEST, (0, 0, (60 * METRE) ** 2)))
+    for _ in range(3):
+        assert Place(((Sweep((-1, north, 1, north), box), 0, 0),)).inside(zone) == T | F
+
+
+def test_a_zone_is_compared_once_for_places_close_by(monkeypatch: pytest.MonkeyPatch) -> None:
+    zone = PreparedZone(0, polygon(0, 0, 90_000, 0, 90_000, 90_000, 0, 90_000))
+    compared: list[tuple[int, ...]] = []
+    along = PreparedZone.along
+    monkeypatch.setattr(PreparedZone, "along", lambda *asked: compared.append(asked[1]) or along(*asked))
+    for x in range(45_000, 50_000, 500):
+        assert Place(((Sweep((x, 45_000), (-1, -1, 1, 1)), 0, 0),)).inside(zone) == T
+    assert compared == [(45_000, 45_000)]
 
 
 @rows(

@@ -9,7 +9,7 @@ from rtshcua.cli.sources import examine
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.compiler.bounds import Bounds
+from rtshcua.ground.compiler.proofs.bounds import Bounds
 from rtshcua.ground.versions.raised import Compared, compare
 from rtshcua.model.flat.policy import Policy
 

@@ -8,7 +8,7 @@ from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.compiler.conditions import Conditions, Place
 from rtshcua.ground.compiler.files import Files
-from rtshcua.ground.compiler.fitted import applies
+from rtshcua.ground.compiler.lacking import applies
 from rtshcua.ground.compiler.zones import ZoneTable
 from rtshcua.model.durability import WORDS
 from rtshcua.model.flat.code import Clause

@@ -7,7 +7,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.compiler import fitted, local_time
+from rtshcua.ground.compiler import lacking
 from rtshcua.ground.compiler.files import Files, Joint
 from rtshcua.ground.compiler.plan import plan_of
 from rtshcua.ground.compiler.policy import LoweredPolicy
@@ -52,8 +52,8 @@ def lower_mission(
     tightened = Tightened(context, under, joint)
     invocations: list[Invocation] = []
     for number, phase, step in steps:
-        local_time.check_step(context, under.vehicle, step)
-        if not fitted.check_step(context, under.vehicle, step) or not _known(context, step, under):
+        own = () if step.overrides is None else step.overrides.clauses
+        if not lacking.check_step(context, under.vehicle, own) or not _known(context, step, under):
             continue
         skill = under.skills[step.skill.text]
         contract = tightened.contract(step)

@@ -14,7 +14,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import Type
 from rtshcua.ground.checker.well_known import WELL_KNOWN, read_by_all
-from rtshcua.ground.compiler import fitted, local_time
+from rtshcua.ground.compiler import lacking
 from rtshcua.ground.compiler.belonging import belongs
 from rtshcua.ground.compiler.conditions import Conditions
 from rtshcua.ground.compiler.contracts import Contracts
@@ -66,8 +66,7 @@ def lower_policy(
     if not _well_known(context, policy, read, files) or not belongs(context, policy, skills, vehicle, files):
         return None
     declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
-    fitted.check_policy(context, policy, vehicle, skills)
-    local_time.check_policy(context, policy, vehicle, skills, declared)
+    lacking.check_policy(context, policy, vehicle, skills, declared)
     table = Files(context.report, names)
     slots = Slots(context)
     well_known = [slots.of(name) for name in read]

@@ -16,11 +16,11 @@ from rtshcua.ground.checker.lookup import find_mission
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import collect
 from rtshcua.ground.checker.uses import with_uses
-from rtshcua.ground.compiler.bounds import Bounds, bounds_of, most
 from rtshcua.ground.compiler.closure import Imports, beside
 from rtshcua.ground.compiler.mission import lower_mission
 from rtshcua.ground.compiler.pins import Pins, claims
 from rtshcua.ground.compiler.policy import LoweredPolicy, lower_policy
+from rtshcua.ground.compiler.proofs.bounds import Bounds, bounds_of, most
 from rtshcua.ground.compiler.proofs.prove import prove_mission, prove_policy, refused
 from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.elaborate.elaborate import elaborate

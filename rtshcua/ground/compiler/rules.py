@@ -11,7 +11,7 @@ from rtshcua.ground.checker.uses import brought_about
 from rtshcua.ground.compiler.conditions import Conditions, Place
 from rtshcua.ground.compiler.contracts import Contracts, cells_of
 from rtshcua.ground.compiler.files import Files, shortened
-from rtshcua.ground.compiler.fitted import rule_applies
+from rtshcua.ground.compiler.lacking import rule_applies
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import LeftOut, Rule, RuleKind

@@ -134,7 +134,7 @@ def ambiguous(context: Context, mission: MissionDecl) -> bool:
         assert step.overrides is not None
         skill = context.symbols.skills.get(step.skill.text)
         arguments = {} if skill is None else context.arguments(skill)
-        for clause in (*step.overrides.require, *step.overrides.assume, *step.overrides.maintain):
+        for clause in step.overrides.clauses:
             for reference in references(clause.condition):
                 name = reference.name
                 if name in own and (name in arguments or name in context.symbols.signals):

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from rtshcua.ground.compiler.fitted import applies, rule_applies
+from rtshcua.ground.compiler.lacking import applies, rule_applies
 from rtshcua.ground.handbook.changes import Changes, changes
 from rtshcua.ground.handbook.model import (
     CaseTold,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.checker.symbols import collect
-from rtshcua.ground.compiler.bounds import Bounds
 from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.compiler.proofs.bounds import Bounds
 from rtshcua.ground.handbook.cases import Tried, starts_and_cases
 from rtshcua.ground.handbook.chapter import chapter, digest_of
 from rtshcua.ground.handbook.missions import mission_told

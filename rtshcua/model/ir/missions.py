@@ -23,6 +23,11 @@ class Overrides(Node):
     maintain: tuple[Clause, ...] = ()
     record: tuple[Name, ...] = ()
 
+    @property
+    def clauses(self) -> tuple[Clause, ...]:
+        """The step's own clauses."""
+        return (*self.require, *self.assume, *self.maintain)
+
 
 class Step(Node, kw_only=True):
     """`goto(bridge_a.entry, altitude = 20 m) on inadmissible abort { deadline 2 s }`."""

@@ -34,7 +34,7 @@ def check_overrides(context: Context, skill: SkillDecl, overrides: Overrides) ->
         one_of(context, codes.UNKNOWN_RECORD, name, RECORDS, "kind of evidence")
     _durable(context, skill, overrides)
     scope = context.scope_of(skill)
-    for clause in (*overrides.require, *overrides.assume, *overrides.maintain):
+    for clause in overrides.clauses:
         check_condition(scope, clause.condition)
 
 

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.loop import RunLoop
-from rtshcua.evidence.durability import WRITTEN
+from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Plan
 from virtual import case

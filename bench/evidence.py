@@ -20,8 +20,8 @@ from time import perf_counter_ns
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.store.writing import sync_data
 from rtshcua.evidence.chain import Recorder
-from rtshcua.evidence.durability import BUFFERED, SYNCED_FIRST, WORDS, WRITTEN
 from rtshcua.model.decision import Decision
+from rtshcua.model.durability import BUFFERED, SYNCED_FIRST, WORDS, WRITTEN
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey

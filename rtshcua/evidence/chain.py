@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any, Final, Protocol
 from urllib.parse import quote
 
-from rtshcua.evidence.durability import SYNC_US, SYNCED, WRITTEN
 from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, EpochKey
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.records import (
@@ -25,6 +24,7 @@ from rtshcua.evidence.records import (
     in_words,
 )
 from rtshcua.model.decision import Decision as Decided
+from rtshcua.model.durability import SYNC_US, SYNCED, WRITTEN
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.wire.keys import Duty, key_id
 from rtshcua.wire.request import NOTHING, Ref

@@ -11,5 +11,8 @@ SYNCED: Final = 2
 #: on the disk before what it permits goes out
 SYNCED_FIRST: Final = 3
 
+#: the time within which class 2 is on the disk, in us
+SYNC_US: Final = 1_000_000
+
 #: the word for each class, by number, as a `record` clause has it
 WORDS: Final = ("buffered", "written", "synced", "synced_first")

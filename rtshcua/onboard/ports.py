@@ -236,7 +236,7 @@ class Release(Frozen, frozen=True):
 
 
 class Append(Frozen, frozen=True):
-    """Append one evidence line (with its newline), of a class of `evidence.durability`. Stands before every action that
+    """Append one evidence line (with its newline), of a class of `model.durability`. Stands before every action that
     depends on it. A `Command` is held for those before it in its step that are `awaited`: for buffered ones not at
     all, for written and synced ones until they are written, for those that are synced first until they are on the disk.
     """
@@ -385,7 +385,7 @@ class EvidenceSink(Protocol):
         ...
 
     def append(self, line: bytes, durability: int) -> int:
-        """Take one line over, of a class of `evidence.durability`; it is written, or on the disk, once `kept`, or
+        """Take one line over, of a class of `model.durability`; it is written, or on the disk, once `kept`, or
         `synced`, reaches the number that is given back.
 
         Raises OSError when the line could not be written at once, or when more wait than may. It is not lost by that:
@@ -413,15 +413,3 @@ class Opening(StrEnum):
     REPLAYED = "replayed"  # opened before, also by a run that crashed; or it might have been
     OLD_POLICY = "old-policy"  # a higher version of its policy was in force there
     DAMAGED = "damaged"  # what was kept about it is there, and says nothing: nobody knows
-
-
-class ReplayStore(Protocol):
-    """Which missions were opened on this vehicle, and the versions of their policies: on disk before any flies."""
-
-    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
-        """Open the mission of this digest, under a version of a policy."""
-        ...
-
-    def give_back(self, digest: bytes) -> None:
-        """Nothing of the mission was sent: it may be opened again."""
-        ...

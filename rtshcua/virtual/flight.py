@@ -15,8 +15,8 @@ from rtshcua.adapters.packs import manoeuvres, packs_of
 from rtshcua.adapters.preparation import Preparations
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.chain import Recorder
-from rtshcua.evidence.durability import SYNCED_FIRST
 from rtshcua.ground.auditor.audit import Audit, Auditor
+from rtshcua.model.durability import SYNCED_FIRST
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now

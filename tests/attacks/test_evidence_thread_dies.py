@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.writer import EvidenceWriter
-from rtshcua.evidence.durability import WRITTEN
+from rtshcua.model.durability import WRITTEN
 
 
 class Breaking(EvidenceFile):

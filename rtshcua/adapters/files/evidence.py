@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Protocol
 
 from rtshcua.adapters.store.writing import open_existing, open_new, sync_data, sync_folder
-from rtshcua.evidence.durability import BUFFERED, SYNCED_FIRST
 from rtshcua.evidence.records import is_signed
+from rtshcua.model.durability import BUFFERED, SYNCED_FIRST
 
 #: as many buffered lines are written together at the latest
 MOST_BUFFERED = 256

@@ -1,4 +1,4 @@
-"""Which missions were opened on a vehicle: `ReplayStore` of `rtshcua.onboard.ports`, as files that survive a crash.
+"""Which missions were opened on a vehicle: files that survive a crash.
 
     <state folder>/replay/vehicle-<identity>/<digest>         one marker a mission: its expiry in us, UTC
     <state folder>/replay/vehicle-<identity>/floor            the latest expiry among markers that were pruned

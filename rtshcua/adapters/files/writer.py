@@ -8,8 +8,8 @@ from threading import Event, Thread
 from time import monotonic
 
 from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.evidence.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.evidence.records import is_signed
+from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 
 #: More lines than this that are not kept mean that the disk does not keep up, and evidence fails. They are not dropped,
 #: for the chain has no holes: it goes on, while the flight comes down, up to `TIMES_MOST` times as many.

@@ -11,10 +11,10 @@ from rtshcua.cli.showing.log import Names, detail_of
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import true_to, utc
 from rtshcua.cli.simulation import SIMULATED
-from rtshcua.evidence.durability import SYNCED
-from rtshcua.evidence.durability import WORDS as DURABILITIES
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Sealing, Signed
 from rtshcua.evidence.report import Report, Verdict
+from rtshcua.model.durability import SYNCED
+from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 from rtshcua.evidence.chain import Recorder
-from rtshcua.evidence.durability import SYNCED_FIRST, WRITTEN
+from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Command
 from rtshcua.wire.request import NOTHING, Ref

@@ -2,10 +2,10 @@
 
 from reference.documents import low
 from reference.world import START, Run, renewed
-from rtshcua.evidence.durability import WRITTEN
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Effect
 from rtshcua.evidence.witnessing.anchors import ANCHORED
+from rtshcua.model.durability import WRITTEN
 from rtshcua.onboard.ports import Anchored, Append
 
 

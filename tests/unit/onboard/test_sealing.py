@@ -9,8 +9,8 @@ from msgspec.structs import replace
 
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.chain import Recorder
-from rtshcua.evidence.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US
+from rtshcua.model.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Append, Command, Release
 from rtshcua.onboard.runtime.journal import Journal

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from reference.faulty_disk import FaultyDisk
 from rtshcua.adapters.files.evidence import MOST_BUFFERED, EvidenceFile
-from rtshcua.evidence.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
+from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
 
 
 def test_lines_are_appended(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from reference.faulty_disk import FaultyDisk, until
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.files.writer import TIMES_MOST, EvidenceWriter, Keeper
-from rtshcua.evidence.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
+from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ import pytest
 from reference.faulty_disk import FaultyDisk, until
 from rtshcua.adapters.files import telemetry
 from rtshcua.adapters.files.runs import RunFolder
-from rtshcua.evidence.durability import SYNCED_FIRST
 from rtshcua.mavlink import tlog
+from rtshcua.model.durability import SYNCED_FIRST
 
 UTC_US = 1_750_000_000_999_999  # 2025-06-15T15:06:40Z
 FRAME = bytes.fromhex("fd09000000010100000000000000020351040312d4")

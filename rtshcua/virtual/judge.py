@@ -321,8 +321,10 @@ _FENCE: Final = 1
 _NOWHERE: Final = 0x7FFFFFFF
 _REPOSITION: Final = 192
 _MM: Final = 11.132  # in 1e-7 degree
-#: mm: how far from its target it may stand, for all that its reports tell: half a metre, and its estimator's error
+#: mm: how far from its target it may stand, for all that its reports tell: a decimetre, and its estimator's error
 _SAME_MM: Final = 2_000
+#: us: so long after a frame arrived no report shows it yet: two at 10 Hz
+_SHOWS_US: Final = 200_000
 #: where PX4 says that it will stop (`Navigator::calculate_breaking_stop`): MPC_ACC_HOR, and what it adds for the jerk
 _TOLD_BRAKING_MM_S2: Final = 3_000
 _TOLD_DELAY_S: Final = 0.6
@@ -426,13 +428,19 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
         lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
         then = flown.samples[bisect_left(times, since_us)]
-        stands = then.in_air and (_ends_at(last, then) or _stops(last, then, flown.samples, times))
+        ends = _ends_at(last, then) or _ends_at(_obeyed(motion, since_us - _SHOWS_US), then)
+        stands = then.in_air and (ends or _stops(last, then, flown.samples, times))
         stood = excuses.paused_at(since_us) and stands
         as_lost = _flies_as_lost(flown, motion, times, since_us, max(since_us, frame.sent_us - within_us))
         cause = "crossed" if crossed else "unseen" if stood or as_lost else "ground" if lands else None
         crossed = crossed or (as_lost and frame.heard_us is not None)
         found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us, cause))
     return found, latest
+
+
+def _obeyed(motion: Motion, by_us: int) -> tuple[Frame, frozenset[MotionKind]] | None:
+    """Our last frame that had arrived by then: what a report could show at that time."""
+    return next((each for each in reversed(motion) if each[0].heard_us is not None and each[0].heard_us <= by_us), None)
 
 
 def _ends_at(last: tuple[Frame, frozenset[MotionKind]] | None, sample: Sample) -> bool:

@@ -18,8 +18,10 @@ MODE_US: Final = 5_000_000
 ARM_US: Final = 8_000_000
 #: mm: what rounding, and a height of home that moves a little, may make of a target, before it was reported
 SAME: Final = 3_000
-#: and after that: each target of each recorded flight was reported to the same digit until the next command came
-KEPT: Final = 500
+#: and after that: each target of each recorded flight was reported to the same digit until the next command came, and
+#: PX4 copies it from the setpoint that it was given; a pause near the end of a leg names a place as near as this to it
+KEPT: Final = 100
+KEPT_LEVEL: Final = 500
 #: mm: how far from where it is it may say that it takes off, or that it will come to stand;
 TAKES_OFF: Final = 20_000
 _STOPS: Final = 10_000
@@ -49,7 +51,9 @@ class ExpectedTarget:
 
     def as_reported(self, reported: Reported) -> "ExpectedTarget":
         """What is expected once it was reported: just that."""
-        return replace(self, latitude=reported[0], longitude=reported[1], amsl=reported[2], within=KEPT, level=KEPT)
+        return replace(
+            self, latitude=reported[0], longitude=reported[1], amsl=reported[2], within=KEPT, level=KEPT_LEVEL
+        )
 
     def is_given(self, reported: Reported) -> bool:
         """Whether a report is of a place that we gave, and that was not reported before."""

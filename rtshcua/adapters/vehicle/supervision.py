@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from rtshcua.adapters.vehicle.effects import STILL, apart
-from rtshcua.adapters.vehicle.flavour import KEPT, ExpectedProgress, ExpectedTarget
+from rtshcua.adapters.vehicle.flavour import KEPT, KEPT_LEVEL, ExpectedProgress, ExpectedTarget
 from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STOPPED, ObservedVehicle, Reported
 from rtshcua.model.flat.policy import Vehicle
 
@@ -238,7 +238,7 @@ class TargetWatch:
 
 
 def _same(one: Reported, other: Reported) -> bool:
-    return abs(one[2] - other[2]) <= KEPT and apart(*one[:2], *other[:2]) <= KEPT
+    return abs(one[2] - other[2]) <= KEPT_LEVEL and apart(*one[:2], *other[:2]) <= KEPT
 
 
 # ---------------------------------------------------------------- crashes

@@ -1,6 +1,6 @@
-"""That a flight was simulated, or faster than life: as its log tells it, right after the genesis."""
+"""That a flight was simulated, or faster than life: as its log tells it, before anything is decided."""
 
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Final
 
@@ -36,8 +36,7 @@ def with_simulated(report: Report, log: Path) -> Report:
 
 
 def simulated(log: Path) -> str | None:
-    """What the log says of it."""
+    """What the log says of it, among the effects that follow the genesis: the boundary's own statement comes first."""
     with open_regular(log) as file:
-        second = next(islice(lines(file), 1, None), b"")
-    record = read(second)
-    return record.detail if isinstance(record, Effect) and record.event == SIMULATED else None
+        effects = takewhile(lambda record: isinstance(record, Effect), map(read, islice(lines(file), 1, None)))
+        return next((each.detail for each in effects if isinstance(each, Effect) and each.event == SIMULATED), None)

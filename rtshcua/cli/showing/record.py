@@ -61,7 +61,7 @@ class Told:
 
     def _follow(self, record: Effect) -> None:
         asked = self.record
-        if record.event == SIMULATED and record.seq == 1:
+        if record.event == SIMULATED:
             self.simulated = record.detail
         if self.sent is not None or not isinstance(asked, Decision) or record.event != "dispatched":
             return

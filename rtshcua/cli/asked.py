@@ -13,7 +13,9 @@ SOURCE, SPECIFICATION = ".rts", ".json"
 
 
 def unfolded(paths: Sequence[Path]) -> tuple[Path, ...] | Refusal:
-    """The files that are meant, once each: of a folder all sources below it, but for hidden ones, in order."""
+    """The files that are meant, once each: of a folder all sources below it, but for hidden ones, in order. Raises
+    OSError for a folder that cannot be read, lest it is taken to hold none.
+    """
     files: dict[str, Path] = {}
     for path in paths:
         below = sorted(_below(path)) if path.is_dir() else [path]
@@ -54,6 +56,6 @@ def roots(names: Sequence[str], members: Sequence[Collection[str]]) -> tuple[int
 
 
 def _below(folder: Path) -> Iterable[Path]:
-    for place, folders, files in walk(folder):
+    for place, folders, files in walk(folder, every=True):
         folders[:] = [name for name in folders if not name.startswith(".")]
         yield from (Path(place, name) for name in files if name.endswith(SOURCE) and not name.startswith("."))

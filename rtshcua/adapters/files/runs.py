@@ -16,13 +16,16 @@ _PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz01234567
 
 
 def logs_of(given: Path) -> list[Path]:
-    """The logs that are meant: the file itself, that in the folder of a run, or those in all folders below."""
+    """The logs that are meant: the file itself, that in the folder of a run, or those in all folders below.
+
+    Raises OSError for a folder that cannot be read.
+    """
     if not given.is_dir():
         return [given]
     own = given / LOG
-    return (
-        [own] if own.is_file() else sorted(Path(place, LOG) for place, _, _ in walk(given) if Path(place, LOG).exists())
-    )
+    if own.is_file():
+        return [own]
+    return sorted(Path(place, LOG) for place, folders, files in walk(given, every=True) if LOG in (*folders, *files))
 
 
 class RunFolder:

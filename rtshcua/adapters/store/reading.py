@@ -114,16 +114,19 @@ def opened_folder(folder: Path, root: Path | None = None, *, make: int | None = 
         os.close(handle)
 
 
-def walk(folder: str | Path) -> Iterator[tuple[str, list[str], list[str]]]:
+def walk(folder: str | Path, *, every: bool = False) -> Iterator[tuple[str, list[str], list[str]]]:
     """Each folder from this one down, with the names of the folders and of all else in it, as of `os.walk`: what is
     taken out of the first is not gone into, no link is, nor what cannot be read. However deep they are: that one goes
     as deep into itself as they do, and a stranger's may be deeper.
+
+    With `every`, raises OSError for a folder that is there and cannot be read.
     """
+    passed_over = FileNotFoundError if every else OSError  # one that was removed meanwhile
     waiting = [os.fspath(folder)]
     while waiting:
         place = waiting.pop()
         folders, files = list[str](), list[str]()
-        with suppress(OSError), os.scandir(place) as entries:
+        with suppress(passed_over), os.scandir(place) as entries:
             for entry in entries:
                 (folders if _is_folder(entry) else files).append(entry.name)
         yield place, folders, files

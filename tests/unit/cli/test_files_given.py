@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+from errno import EACCES
 from pathlib import Path
 from typing import Any
 
@@ -108,3 +109,26 @@ def test_a_seal_says_what_it_is(log: Path, capsys: pytest.CaptureFixture[str]) -
     assert f"epoch 0 sealed, {json.loads(LINES[number])['records']} records" in out
     assert app.main(["why", str(log), "--record", str(len(LINES))]) == ExitCode.INPUT
     assert f"has no record {len(LINES)} that can be explained" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("check",), ("lint",), ("fmt", "--check"), ("test",), ("docs", "-o", "x.html"), ("verify-log", *ROOT),
+     ("archive", "add", *ROOT)],
+)  # fmt: skip
+def test_a_folder_that_cannot_be_read_is_not_passed_over(
+    words: tuple[str, ...], log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Else "no errors" would be said of what nobody looked at."""
+    Path("runs/fine.rts").write_text("role watch\n", encoding="utf-8")
+    locked, scanned = Path("runs/locked"), os.scandir
+    locked.mkdir()
+
+    def denied(path: Any) -> Any:
+        if Path(path) == locked:
+            raise PermissionError(EACCES, "Permission denied", str(path))
+        return scanned(path)
+
+    monkeypatch.setattr(os, "scandir", denied)
+    assert app.main([*words, "runs"]) == ExitCode.INPUT
+    assert capsys.readouterr().err.endswith("error: permission denied: `runs/locked`\n")

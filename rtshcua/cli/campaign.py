@@ -14,7 +14,6 @@ from typing import Annotated, Final
 import typer
 
 from rtshcua import __version__, library
-from rtshcua.adapters.store.reading import open_regular
 from rtshcua.campaign import campaign as flying
 from rtshcua.campaign.campaign import Order
 from rtshcua.campaign.drawing import FLAVOURS, Space, answers_of
@@ -28,7 +27,7 @@ from rtshcua.campaign.written import scenario_text
 from rtshcua.cli.faults import say, words_of
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
-from rtshcua.cli.sources import compile_sources
+from rtshcua.cli.sources import compile_sources, no_source
 from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -39,7 +38,6 @@ from rtshcua.model.scenario import Scenario, Start
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import Kind
 from rtshcua.virtual.flight import LATER_US
-from rtshcua.wire.names import BUNDLE
 
 app = typer.Typer(add_completion=False)
 
@@ -157,19 +155,7 @@ def _misused(source: Path, cluster: str | None, jobs: int | None) -> Refusal | N
         return Refusal("usage", "`--jobs` is for this machine, and `--cluster` for others")
     if cluster is not None and not _SCHEDULER.fullmatch(cluster):
         return Refusal("usage", f"`{cluster}` is no address of a Dask scheduler", "write it as `tcp://10.0.0.1:8786`")
-    if _is_bundle(source):
-        help = "give the source that it was compiled from (.rts), or the specification (.json)"
-        return Refusal("usage", f"`{source}` is a bundle, and no source", help)
-    return None
-
-
-def _is_bundle(path: Path) -> bool:
-    """Whether a file is a compiled bundle, of whatever version; one that cannot be read is told of where it is read."""
-    try:
-        with open_regular(path) as file:
-            return BUNDLE.name.encode() in file.read(2 * len(BUNDLE.name))
-    except OSError:
-        return False
+    return no_source(source)
 
 
 def _here(jobs: int) -> Workers:

@@ -13,7 +13,7 @@ from rtshcua.cli.bounds import bounds_dict, bounds_told
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.replacing import Replacing, replace_with
-from rtshcua.cli.sources import compile_sources
+from rtshcua.cli.sources import compile_sources, no_source
 from rtshcua.cli.stdout import out
 from rtshcua.cli.unlock import another_key, check_trusted, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
@@ -88,6 +88,9 @@ def compile(
         return findings.refuse(ExitCode.USAGE, "usage", f"{text} is none", help)
     if len({first is None, flight is None, not replaces}) > 1:
         return findings.refuse(ExitCode.USAGE, "usage", "`--replaces`, `--from` and `--flight` go together")
+    unfit = no_source(source)
+    if unfit is not None:
+        return findings.end(unfit)
     target = output or source.with_suffix(".replacement" if replaces else ".bundle")
     if not target.parent.is_dir():
         return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")

@@ -12,6 +12,7 @@ from pathlib import Path
 from msgspec import structs
 
 from rtshcua.adapters.simulator import Simulator, SimulatorError
+from rtshcua.cli.findings import exit_code
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.sources import read_sources
 from rtshcua.decision.prepare import PreparedPolicy
@@ -38,7 +39,10 @@ def chosen(text: str, issued_at_us: int) -> ScenarioFlight:
     program = read_sources([path]).program
     found = scenarios(program, dialect.load(), issued_at_us)
     if has_errors(found.diagnostics):
-        raise Refused(ExitCode.DIAGNOSTICS, "sources", f"`{path}` has errors", f"`rtshcua check {path}` shows them")
+        code = exit_code(found.diagnostics)
+        if code is ExitCode.INPUT:
+            raise Refused(code, "input", found.diagnostics[0].message, found.diagnostics[0].help)
+        raise Refused(code, "sources", f"`{path}` has errors", f"`rtshcua check {path}` shows them")
     names = [each.scenario.name for each in found.found]
     fits = [each for each in found.found if name in ("", each.scenario.name)]
     if len(fits) == 1:

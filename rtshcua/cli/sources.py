@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 from rtshcua import library
 from rtshcua.adapters.files.readable import Readable
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.pins import PROPOSED, Pins, policies_of
 from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
@@ -15,6 +17,7 @@ from rtshcua.ground.elaborate.settings import parse_settings
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.language.paths import shown
 from rtshcua.mavlink import dialect
+from rtshcua.wire.names import BUNDLE
 
 
 class Reading(NamedTuple):
@@ -87,3 +90,18 @@ def examine(reading: Reading, issued_at_us: int = 0) -> Checked:
     """Everything that is wrong with a program, and what its missions take at most."""
     checked = examine_program(reading.program, dialect.load(), issued_at_us)
     return replace(checked, diagnostics=reading.pointed(checked.diagnostics))
+
+
+def no_source(path: Path) -> Refusal | None:
+    """Why a path cannot be the source of a mission: it is a folder, or a compiled bundle, of whatever version. None
+    where it may be one, and where it cannot be read, which is told of where it is read.
+    """
+    if path.is_dir():
+        return Refusal("no-source", f"`{path}` is a folder, and no source", "name the file with the mission")
+    try:
+        with open_regular(path) as file:
+            compiled = BUNDLE.name.encode() in file.read(2 * len(BUNDLE.name))
+    except OSError:
+        return None
+    help = "give the source that it was compiled from (.rts), or the specification (.json)"
+    return Refusal("usage", f"`{path}` is a bundle, and no source", help) if compiled else None

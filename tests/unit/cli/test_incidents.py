@@ -84,6 +84,16 @@ def test_what_a_vehicle_starts_with_goes_to_its_process(source: Path) -> None:
     ]  # fmt: skip
 
 
+def test_a_file_that_is_not_there_is_bad_input(source: Path) -> None:
+    source.rename(source.with_name("flight.rts"))
+    with pytest.raises(Refused) as caught:
+        incidents(source, "")
+    assert (caught.value.code, str(caught.value)) == (
+        ExitCode.INPUT,
+        f"cannot read `{source}`: there is no such file",
+    )
+
+
 def test_what_no_run_can_have_is_refused_by_name(source: Path) -> None:
     assert "`at 4 s runtime_killed(for = 2 s)` goes wrong in virtual time alone" in refused(source, "killed")
     assert "the scenario says at what time it begins" in refused(source, "at its own time")

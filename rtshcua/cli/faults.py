@@ -33,7 +33,11 @@ _INPUT = {
     errno.ENOTEMPTY, errno.ENXIO, errno.EPERM,
 }  # fmt: skip
 
-_NO_KEYS = "`rtshcua keys init` makes a development root"
+#: what to do about what is not to be trusted, by slug
+_REMEDIES = {
+    "no-keys": "`rtshcua keys init` makes a development root",
+    "exposed": "`chmod 600` it; replace what others may have read: `rtshcua keys replace`, or another passphrase",
+}
 #: of what is refused for another reason than that it is not to be trusted, by slug
 _CODES = dict.fromkeys(("usage", "output", "no-approver", "several-approvers"), ExitCode.USAGE)
 _CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "outside", "since"), ExitCode.INPUT)
@@ -78,12 +82,12 @@ def misaddressed(option: str, error: "AddressError") -> ExitCode:
 
 def distrust(error: Untrusted, help: str = "", *, where: str = "") -> ExitCode:
     """Fails for something that is not to be trusted; `where` says what it was, before the text."""
-    return refuse(Refusal(error.slug, f"{where}{error}", help))
+    return refuse(Refusal(error.slug, f"{where}{error}", help or _REMEDIES.get(error.slug, "")))
 
 
 def untrusted(error: Untrusted) -> Refusal:
-    """What is not to be trusted, with what to do where it is that there are no keys at all."""
-    return Refusal(error.slug, str(error), _NO_KEYS if error.slug == "no-keys" else "")
+    """What is not to be trusted, with what to do about it where that is known."""
+    return Refusal(error.slug, str(error), _REMEDIES.get(error.slug, ""))
 
 
 def refuse(refusal: Refusal, code: ExitCode | None = None) -> ExitCode:
@@ -164,12 +168,21 @@ def barrier(command: Callable[[], int]) -> int:
     except Untrusted as error:
         return distrust(error)
     except Exception as error:  # noqa: BLE001  the barrier is the one place that may catch everything
+        if _interrupted(error):
+            return fail(ExitCode.INTERRUPTED, "interrupted")
         return _fault(error)
     finally:
         try:
             _flush()
         except OSError:
             _discard("stdout")
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether it came of Ctrl-C: what is interrupted may say so by an error of its own, as `__set_name__` does."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _fault(error: Exception) -> ExitCode:

@@ -128,10 +128,7 @@ def read_passphrase(path: Path) -> bytes:
     """
     with path.open("rb") as file:
         if why := exposed(file):
-            text = (
-                f"others may read the passphrase in `{path}`: {why}. `chmod 600 {path}`, or choose another passphrase"
-            )
-            raise KeyStoreError("exposed", text)
+            raise KeyStoreError("exposed", f"others may read the passphrase in `{path}`: {why}")
         data = file.read(_LONGEST + 1)
     if len(data) > _LONGEST:
         raise KeyStoreError("too-large", f"`{path}` is longer than any passphrase, {_LONGEST} octets")

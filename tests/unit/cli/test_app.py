@@ -192,6 +192,28 @@ def test_what_rises_becomes_one_line_and_a_code(
     assert capsys.readouterr().err.strip() == message
 
 
+def test_an_error_that_ctrl_c_caused_is_no_fault(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Named:
+        def __set_name__(self, owner: type, name: str) -> None:
+            raise KeyboardInterrupt
+
+    def imports() -> None:
+        type("Late", (), {"name": Named()})  # Python 3.11 makes a RuntimeError of it
+
+    def gives_up() -> None:
+        try:
+            raise KeyboardInterrupt
+        finally:
+            raise ValueError("I/O operation on closed file")
+
+    for breaks in (imports, gives_up):
+        install(monkeypatch, breaks)
+        assert app.main(["show"]) == ExitCode.INTERRUPTED
+        assert capsys.readouterr().err == "error: interrupted\n"
+
+
 @pytest.mark.parametrize("debug", ["", "0", "1"])
 def test_internal_fault_shows_its_traceback_only_when_asked(
     debug: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

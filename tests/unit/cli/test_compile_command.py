@@ -2,11 +2,14 @@
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import jsonschema
 import pytest
 
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -229,3 +232,30 @@ mission lift under shift@1 on quad {
     assert main(["compile", "lift.rts", *AT]) == ExitCode.OK
     source = str(checkout / "missions" / "short.rts")
     assert main(["compile", source, "-o", "short.bundle", *AT]) == ExitCode.OK
+
+
+@pytest.mark.parametrize("named", [".", "..", "made", "made.bundle"])
+def test_a_folder_or_a_bundle_is_no_source(
+    named: str, checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "made").mkdir()
+    assert main(["compile", str(checkout / "missions" / "short.rts"), "-o", "made.bundle", *AT]) == ExitCode.OK
+    kept = (here / "made.bundle").read_bytes()
+    capsys.readouterr()
+    for output in ([], ["-o", "other"]):
+        expected = ExitCode.USAGE if named == "made.bundle" else ExitCode.INPUT
+        assert main(["compile", named, *output, *AT]) == expected
+        what = "bundle" if named == "made.bundle" else "folder"
+        assert capsys.readouterr().err.startswith(f"error: `{named}` is a {what}, and no source\n help: ")
+    assert ((here / "made.bundle").read_bytes(), names(here)) == (kept, ["made", "made.bundle"])
+
+
+def test_a_key_that_others_may_read_says_what_to_do(
+    checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    key = here / "policy.key"
+    shutil.copy(KeyStore(data_folder()).folder / "policy.key", key)
+    key.chmod(0o644)
+    source = str(checkout / "missions" / "short.rts")
+    assert main(["compile", source, "-o", "made", "--policy-key", str(key), *AT]) == ExitCode.UNTRUSTED
+    assert "its mode is 0644\n help: `chmod 600` it; " in capsys.readouterr().err

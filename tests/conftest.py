@@ -1,5 +1,6 @@
 """What every test gets: a user's folders that are its own, a plain terminal, and repeatable property tests."""
 
+import atexit
 import gc
 import gzip
 import json
@@ -155,8 +156,8 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
         if helper is not None:
             os.waitpid(helper, 0)
         gc.enable()
-        gc.collect()
         gc.freeze()
+        atexit.register(gc.unfreeze)  # libraries look at the end whether anything of theirs is left, and print what is
         gc.set_threshold(20_000, 20, 20)
 
 
@@ -194,11 +195,6 @@ def collected(session: pytest.Session) -> Generator[None, object, object]:
     controller.pause()
     session.config.pluginmanager.register(Measured(controller.cov))
     return (yield)
-
-
-def pytest_unconfigure() -> None:
-    """Let go of what was collected: libraries look at the end whether anything of theirs is left, and print what is."""
-    gc.unfreeze()
 
 
 class Measured:

@@ -27,6 +27,8 @@ from _pytest.unraisableexception import collect_unraisable
 
 #: how long those that run tests may take to end once no more is wanted of them
 PATIENCE_S = 10.0
+#: by how much those that compute give way to those that fly, which are held up else
+NICER = 5
 #: the last word of a process that ran all it was given, and tore down what they shared
 DONE = "done"
 
@@ -118,6 +120,8 @@ class Processes:
             for worker in self._workers:
                 worker.pipe.close()
             try:
+                if computes(number):
+                    os.nice(NICER)
                 _become(session.config, number, other)
                 _run(session, other)
                 self._ended()
@@ -188,13 +192,18 @@ class Processes:
         session.config.hook.pytest_runtest_logreport(report=report)
 
 
+def computes(number: int) -> bool:
+    """Whether a process begins with the first files, as every third does, or with the last, which are flights."""
+    return number % 3 == 0
+
+
 def next_file(worker: Worker, files: list[list[int]]) -> list[int]:
     """The next file for a process, from the end that it works from until both ends meet.
 
     Flights in real time mostly wait. Were they all begun first, or last, the processors would have little to do
     meanwhile; so two of three processes fly them, while the third computes.
     """
-    return files.pop(-1 if worker.number % 3 else 0) if files else []
+    return files.pop(0 if computes(worker.number) else -1) if files else []
 
 
 def _end(workers: list[Worker]) -> None:

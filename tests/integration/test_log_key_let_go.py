@@ -1,6 +1,7 @@
 """The log key signs the first record of a flight; after that the process holds it no more."""
 
 import gc
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -10,6 +11,13 @@ from rtshcua.cli.flight import Flight
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.keys import Duty, SigningKey
+
+
+@pytest.fixture(autouse=True)
+def frozen_again() -> Iterator[None]:
+    """For the tests after these, the collector need not look at what was there before."""
+    yield
+    gc.freeze()
 
 
 def held(public: bytes) -> list[SigningKey]:

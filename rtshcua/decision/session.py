@@ -70,9 +70,9 @@ class InForce:
         self.invocations = invocations
         self.recalled = False
         self.cancelled = False
-        self._policy = policy
+        self.policy = policy
+        self.vehicle = vehicle
         self._root = root
-        self._vehicle = vehicle
         self.flight = flight
         self._approvals = Approvals(policy.policy)
         #: by step
@@ -144,7 +144,7 @@ class InForce:
     def _approval(self, document: bytes, now: Now, decided: int) -> Receipt:
         policy = self.bundle.policy
         answered = open_approval(
-            document, root=self._root, vehicle=self._vehicle, flight=self.flight, bundle=self.bundle, now=now,
+            document, root=self._root, vehicle=self.vehicle, flight=self.flight, bundle=self.bundle, now=now,
             missions=self._digests, replaced=self._replaced,
         )  # fmt: skip
         step = answered.about.step
@@ -159,7 +159,7 @@ class InForce:
         open_recall(
             document,
             root=self._root,
-            vehicle=self._vehicle,
+            vehicle=self.vehicle,
             flight=self.flight,
             missions=self._digests,
             policy=self.bundle.policy_digest,
@@ -173,7 +173,7 @@ class InForce:
         open_cancellation(
             document,
             root=self._root,
-            vehicle=self._vehicle,
+            vehicle=self.vehicle,
             flight=self.flight,
             missions=self._digests,
             bundle=self.bundle,
@@ -194,7 +194,7 @@ class InForce:
         else:
             check_root(self._root, now)
             for key in (self.bundle.policy_key, ahead.found.key):
-                check_key(key, self._vehicle, now)
+                check_key(key, self.vehicle, now)
             found = ahead.found
         after = fit_replacement(found, self.bundle, released)
         new = frozenset(each.invocation_id for each in found.mission.invocations[found.kept :])
@@ -213,11 +213,11 @@ class InForce:
 
     def _opened(self, document: bytes, now: Now) -> Replacement:
         return open_replacement(
-            document, root=self._root, vehicle=self._vehicle, flight=self.flight, bundle=self.bundle, now=now
+            document, root=self._root, vehicle=self.vehicle, flight=self.flight, bundle=self.bundle, now=now
         )
 
     def _prepared(self, mission: Mission) -> tuple[PreparedInvocation, ...]:
-        prepared = prepare_mission(mission, self._policy)
+        prepared = prepare_mission(mission, self.policy)
         if isinstance(prepared, Refusal):
             raise DocumentError("malformed", f"the mission does not make sense: {prepared.text}")
         return prepared
@@ -242,8 +242,8 @@ class Session:
     `enforced` false is mode `none`: a step that is denied flies all the same, and so becomes the current one.
     """
 
-    def __init__(self, policy: PreparedPolicy, in_force: InForce, *, enforced: bool) -> None:
-        self._policy = policy
+    def __init__(self, in_force: InForce, *, enforced: bool) -> None:
+        self._policy = in_force.policy
         self._in_force = in_force
         self._enforced = enforced
         self._consumed: set[int] = set()
@@ -291,7 +291,7 @@ class Session:
         invocation = self._in_force.invocations[step]
         decision = decide(invocation, state, self._policy, context, now)
         if decision.outcome is not _DENY or not self._enforced:
-            self._latest = max(self._latest, step)
+            self._latest = max(self._latest, step)  # `max` is slow
         if decision.outcome is _ALLOW or not self._enforced:
             self._allowed = max(self._allowed, step)
         if decision.step > _AUTHORITY and not may_ask_again(invocation.invocation, decision.outcome, decision.reason):

@@ -38,14 +38,14 @@ OTHER = bytes([7]) * 16
 def in_another_flight(of: Loaded = OF) -> Loaded:
     """The same bundle once more, on a vehicle that lost its memory of the first flight."""
     in_force = InForce(of.bundle, of.policy, of.invocations, ROOT, VEHICLE, OTHER, 0)
-    return session(in_force, of.policy, VEHICLE, of.mode, bytes(32))
+    return session(in_force, of.mode, bytes(32))
 
 
 def another_mission() -> Loaded:
     """A mission whose step has the id and the binding of the one that was approved, and whose end is another one."""
     bundle = with_fields(OF.bundle, mission_digest=bytes(32))
     in_force = InForce(bundle, OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT, 0)
-    return session(in_force, OF.policy, VEHICLE, OF.mode, bytes(32))
+    return session(in_force, OF.mode, bytes(32))
 
 
 @pytest.mark.parametrize("document", [approval, recall, replacement])

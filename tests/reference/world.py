@@ -165,7 +165,7 @@ def _loaded(policy: The, mission: The, mode: Mode) -> Loaded:
 def renewed(of: Loaded, root: TrustRoot = ROOT) -> Loaded:
     """The same bundle in a new session, without opening it again."""
     in_force = InForce(of.bundle, of.policy, of.invocations, root, VEHICLE, FLIGHT, of.in_force.received_us(0))
-    return session(in_force, of.policy, VEHICLE, of.mode, SESSION_KEY)
+    return session(in_force, of.mode, SESSION_KEY)
 
 
 class ManualClock:

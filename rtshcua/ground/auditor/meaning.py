@@ -23,7 +23,7 @@ class Meaning:
         if frames is not None:
             frames.begin(basis)
         self.derived = 0
-        session = Session(basis.policy, basis.in_force, enforced=mode != UNENFORCED)
+        session = Session(basis.in_force, enforced=mode != UNENFORCED)
         self._deriver = Deriver(basis, session)
         self._documents = Documents(session)
         self._cover = Cover()

@@ -11,7 +11,7 @@ from typing import Final
 from msgspec.structs import replace
 
 from rtshcua.decision.links import DEGRADE
-from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.session import InForce, Session
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.decision import Decision
@@ -67,14 +67,14 @@ class SoftwareBoundary:
     lost = None
 
     def __init__(
-        self, policy: PreparedPolicy, in_force: InForce, commands: Commands, vehicle: str, key: bytes,
-        chain: BoundaryChain, *, enforced: bool,
-    ) -> None:  # fmt: skip
-        self._policy = policy
+        self, in_force: InForce, commands: Commands, key: bytes, chain: BoundaryChain, *, enforced: bool
+    ) -> None:
+        policy = in_force.policy
         self._in_force = in_force
-        self._session = Session(policy, in_force, enforced=enforced)
+        self._session = Session(in_force, enforced=enforced)
         self._commands = commands
-        self._vehicle = vehicle
+        self._vehicle = in_force.vehicle
+        self._contingencies = len(policy.contingency)
         self._version = policy.policy.version  # latched: a newer policy comes with another bundle, after landing
         self._issuer = PermitIssuer(key)
         self._chain = chain
@@ -196,8 +196,8 @@ class SoftwareBoundary:
                 return b""
             not_after_us = now_us + LINK_VALID_US
         invocation = prepared.invocation
-        contingency = self._policy.policy.contingency
-        return self._issuer.step(invocation.step, not_after_us, len(invocation.contract.fallback), len(contingency))
+        fallbacks = len(invocation.contract.fallback)
+        return self._issuer.step(invocation.step, not_after_us, fallbacks, self._contingencies)
 
     def _link(self, asked: Request, ref: Ref) -> Decision:
         decision = self._session.decide_link(ref, asked.binding, asked.state, asked.now)

@@ -124,7 +124,7 @@ def load(
     if caller is None:
         issuer = PreparationIssuer(session_key, settings, owed)
         in_force = InForce(opened, policy, invocations, root, vehicle, flight, now.monotonic_us)
-        return session(in_force, policy, vehicle, mode, session_key, issuer, bundle=bundle)
+        return session(in_force, mode, session_key, issuer, bundle=bundle)
     drawn = caller.load(bundle, now)
     if isinstance(drawn, Refusal):
         return drawn
@@ -138,17 +138,17 @@ def load(
 
 
 def session(
-    in_force: InForce, policy: PreparedPolicy, vehicle: str, mode: Mode, session_key: bytes,
-    issuer: PreparationIssuer | None = None, *, bundle: bytes = b"",
-) -> Loaded:  # fmt: skip
+    in_force: InForce, mode: Mode, session_key: bytes, issuer: PreparationIssuer | None = None, *, bundle: bytes = b""
+) -> Loaded:
     """A session of a verified and prepared bundle, nothing of it decided yet. Without an `issuer` nothing is set, and
     without the octets of the bundle nothing that it signs fits a log.
     """
-    commands = Commands(policy.policy, in_force.bundle.mission)
+    commands = Commands(in_force.bundle.policy, in_force.bundle.mission)
     enforced = mode is not Mode.NONE
     chain = BoundaryChain()
-    boundary = SoftwareBoundary(policy, in_force, commands, vehicle, session_key, chain, enforced=enforced)
+    boundary = SoftwareBoundary(in_force, commands, session_key, chain, enforced=enforced)
     issuer = issuer or PreparationIssuer(session_key, {})
     attestation = Attestation(chain, in_force.flight, bundle, enforced=enforced)
     executor = Executor(session_key, commands, chain)
+    policy, vehicle = in_force.policy, in_force.vehicle
     return Loaded(boundary, executor, in_force, policy, vehicle, mode, issuer, attestation)

@@ -32,7 +32,7 @@ class Asked:
 
     def __init__(self, of: Loaded = LOADED, *, enforced: bool = True) -> None:
         self.in_force = InForce(of.bundle, of.policy, of.invocations, world.ROOT, world.VEHICLE, world.FLIGHT, 0)
-        self.session = Session(of.policy, self.in_force, enforced=enforced)
+        self.session = Session(self.in_force, enforced=enforced)
 
     def step(self, step: int, values: dict[int, int | None] | None = None, **context: Any) -> Outcome:
         assert self.session.refusal(Ref(STEP, step, -1)) is None

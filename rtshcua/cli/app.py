@@ -81,6 +81,7 @@ def _call(row: Row, words: list[str]) -> int:
         if collecting:
             gc.enable()
     _unguarded(command)
+    _reflowed(command)
     try:
         with command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context:
             return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
@@ -104,6 +105,15 @@ def _unguarded(command: object) -> None:
         _unguarded(verb)
 
 
+def _reflowed(command: object) -> None:
+    """Makes each paragraph of a command's help one line, which typer then breaks where the terminal ends."""
+    text = getattr(command, "help", None)
+    if text:
+        command.help = "\n\n".join(" ".join(each.split()) for each in text.split("\n\n"))  # type: ignore[attr-defined]
+    for verb in getattr(command, "commands", {}).values():
+        _reflowed(verb)
+
+
 def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
     """Says what is wrong with the command line as every other error is said; with `--json` as JSON, where the command
     reports findings.
@@ -112,6 +122,9 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"rtshcua {row.name}"
     words = words.replace("Value error, ", "")  # typer's words for what an enumeration does not have
+    words = words.replace(": Input should", ": it should")
+    words, _, near = words.partition(" (Possible options: ")
+    words = f"{words}; did you mean {near.rstrip(')')}?" if near else words
     words = words[:1].lower() + words[1:]
     if row.name in _REPORTING and "--json" in given:
         from rtshcua.cli.findings import Findings

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Annotated
 
 import pytest
 import typer
@@ -140,6 +141,38 @@ def test_misused_command(
     assert not error.endswith(".")
     assert usage.startswith("usage: rtshcua show [OPTIONS] ")
     assert help == " help: `rtshcua show --help` explains it"
+
+
+def test_a_typo_and_a_limit_are_told_as_every_other_error(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def takes(speed: Annotated[int, typer.Option(max=50)] = 1) -> None:
+        """Does nothing."""
+
+    install(monkeypatch, takes)
+    assert app.main(["show", "--sped", "2"]) == ExitCode.USAGE
+    assert capsys.readouterr().err.startswith("error: no such option: --sped; did you mean --speed?\n")
+    assert app.main(["show", "--speed", "60"]) == ExitCode.USAGE
+    assert "'--speed': it should be less than or equal to 50\n" in capsys.readouterr().err
+
+
+def test_paragraphs_of_help_end_where_the_terminal_does(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def told() -> None:
+        """Do a thing.
+
+        A paragraph that is broken
+        where the source ends a line.
+
+        Another one.
+        """
+
+    install(monkeypatch, told)
+    assert app.main(["show", "--help"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "A paragraph that is broken where the source ends a line." in out
+    assert "line. Another" not in out
 
 
 def test_misused_verb_names_the_verb(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -58,7 +58,7 @@ class Trial:
             was.ending or "none",
             tuple(wrong),
             tuple(f"{each.slug}: {each.cause}" for each in verdict.exceptions),
-            tuple(f"{each.at_us / 1_000_000:.2f} s {each.text}" for each in was.happened),
+            tuple(f"{each.at_us / 1_000_000:.2f} s: {each.text}" for each in was.happened),
             tuple(_reached(was)) if self.with_coverage else (),
             (perf_counter_ns() - began_ns) // 1_000,
             was.notes,

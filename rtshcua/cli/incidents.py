@@ -126,7 +126,7 @@ class Incidents:
         while self._agenda and self._agenda[0][0] <= at_us:
             _, number = heappop(self._agenda)
             incident = self.scenario.incidents[number]
-            told = f"{at_us / 1_000_000:.2f} s {incident.text}"
+            told = f"{at_us / 1_000_000:.2f} s: {incident.text}"
             try:
                 self._simulator.inject(fault_words(replace(incident.fault, at_us=0)))
             except SimulatorError as error:  # the run finds out by itself, as it would of any vehicle that is gone

@@ -143,4 +143,5 @@ class Teller:
             return call(self._policy, invocation)
         if record.link >= 0:
             return f"fallback: {invocation.contract.fallback[record.link].text}"
-        return "fallback: what the policy degrades to"
+        targets = {rule.target.text for rule in self._policy.rules if rule.target is not None}
+        return f"fallback: {targets.pop()}" if len(targets) == 1 else "fallback: what the policy degrades to"

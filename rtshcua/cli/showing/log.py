@@ -73,7 +73,9 @@ def _stated(detail: str) -> str:
     except Untrusted:
         return "no statement"
     ends = ", and it ends there" if said.final else ""
-    return f"session {said.session} has {said.count} entries and {said.frames} frames of commands{ends}"
+    entries = f"{said.count} entr{'y' if said.count == 1 else 'ies'}"
+    frames = f"{said.frames} frame{'s' * (said.frames != 1)} of commands"
+    return f"session {said.session} has {entries} and {frames}{ends}"
 
 
 def _witnessed(note: str) -> str:

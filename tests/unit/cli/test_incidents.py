@@ -111,7 +111,7 @@ def test_it_goes_wrong_when_the_scenario_says_so_and_no_sooner(source: Path) -> 
         if at_us < 101 * S:
             assert vehicle.told == []
     assert [each.split(",")[0] for each in vehicle.told] == ["link-silence", "gps-loss"]
-    assert made.happened == ["1.00 s at 1 s link_silence(for = 2 s)", "2.00 s at 2 s gps_loss(for = 1 s)"]
+    assert made.happened == ["1.00 s: at 1 s link_silence(for = 2 s)", "2.00 s: at 2 s gps_loss(for = 1 s)"]
     assert len(turns) == 4
 
 
@@ -119,7 +119,7 @@ def test_a_vehicle_that_is_gone_does_not_end_the_run(source: Path) -> None:
     made, vehicle = incidents(source, "gusts and a lost fix"), Vehicle(gone=True)
     made.begin(prepared(source), chosen(f"{source}:killed", ISSUED_US).mission, vehicle)  # type: ignore[arg-type]
     made.around(lambda *_: None, 0)(Now(1 * S, ISSUED_US, 0), [], [])
-    assert made.happened == ["1.00 s at 1 s link_silence(for = 2 s): the simulated vehicle is gone: broken pipe"]
+    assert made.happened == ["1.00 s: at 1 s link_silence(for = 2 s): the simulated vehicle is gone: broken pipe"]
 
 
 def test_another_mission_than_the_scenarios_is_refused(source: Path) -> None:

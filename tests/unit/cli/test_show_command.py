@@ -317,7 +317,7 @@ def test_text_from_elsewhere() -> None:
 
 def test_a_statement_of_the_boundary_says_how_far_it_got() -> None:
     said = [detail_of("boundary", read(line)["detail"]) for line in attested() if read(line).get("event") == "boundary"]
-    assert said[0] == "session 1 has 1 entries and 0 frames of commands"
+    assert said[0] == "session 1 has 1 entry and 0 frames of commands"
     assert said[-1].startswith("session 1 has 11 entries and ")
     assert said[-1].endswith(" frames of commands, and it ends there")
     assert detail_of("boundary", "nonsense") == "no statement"

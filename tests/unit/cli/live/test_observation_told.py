@@ -3,6 +3,7 @@
 from msgspec.structs import replace
 
 from reference.flat_case import CONTRACTS, MISSION, POLICY, TAKEOFF, WIND, M, S, apply, clause, const, signal
+from reference.forgery import edit
 from reference.world import START, FakeVehicle, Run, loaded
 from rtshcua.cli import dry_run
 from rtshcua.cli.live.lines import sentence
@@ -14,6 +15,7 @@ from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import State
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.rehearsal import rehearse
+from rtshcua.wire.request import DEGRADE, FALLBACK_LINK
 from virtual.rows import rows
 
 CALM = Monitor(MonitorKind.FOR_LAST, 3 * S, clause("wind.speed < 8 m/s", apply(Op.LT, signal(WIND), const(8 * M))))
@@ -73,3 +75,18 @@ def test_a_rehearsal_says_what_it_waits_for() -> None:
     page = str(dry_run._page(of, rehearse(of, state, START), None, None))
     assert "waits until it was observed for as long as it looks back, from the run on" in " ".join(page.split())
     assert "1 waiting for what will come, 0 would not fly" in page
+
+
+def test_what_a_policy_degrades_to_is_named_where_it_is_one_thing() -> None:
+    run = Run(loaded()).until_flies("takeoff")
+    sent = next(line for line in run.lines if b'"event":"dispatched"' in line)
+    degraded = edit(sent, kind=FALLBACK_LINK, link=DEGRADE)
+    rule = next(each for each in POLICY.rules if each.target is not None)
+    other = replace(rule, target=replace(rule.target, text="another link"))
+    for policy, subject in (
+        (POLICY, f"fallback: {rule.target.text}"),
+        (replace(POLICY, rules=(*POLICY.rules, other)), "fallback: what the policy degrades to"),
+    ):
+        told = Teller(policy, MISSION, START.monotonic_us).tell(degraded)
+        assert told is not None
+        assert told.subject == subject

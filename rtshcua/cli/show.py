@@ -43,6 +43,10 @@ def show(
     """Print what a file says, whatever kind it is, with nothing left unsaid. Showing is not verifying."""
     page = for_terminal()
     file = path / LOG if path.is_dir() else path
+    if file is not path and not file.exists():
+        return fail(
+            ExitCode.INPUT, f"there is no `{LOG}` in the folder `{path}`", "name a file, or the folder of one run"
+        )
     try:
         shown = _show(page, file)
     except Untrusted as error:

@@ -1,5 +1,6 @@
 """The folder of one run: `runs/<utc>-<bundle>/`."""
 
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -29,11 +30,18 @@ def logs_of(given: Path) -> list[Path]:
 
 
 class RunFolder:
-    """A new folder that holds the bundle, and makes room for its log, its telemetry and its summary."""
+    """A new folder that holds the bundle, and makes room for its log, its telemetry and its summary. It is gone again
+    where the bundle cannot be written.
+    """
 
     def __init__(self, runs: Path, *, name: str, bundle: bytes, utc_us: int) -> None:
         self.path = _new_folder(runs, _folder_name(name, utc_us))
-        write_new(self.path / BUNDLE, bundle)
+        try:
+            write_new(self.path / BUNDLE, bundle)
+        except OSError:
+            with suppress(OSError):
+                self.path.rmdir()
+            raise
 
     def log(self, disk: Disk = SYSTEM) -> EvidenceFile:
         """The evidence log, opened for its first line; once."""

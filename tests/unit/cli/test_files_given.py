@@ -132,3 +132,11 @@ def test_a_folder_that_cannot_be_read_is_not_passed_over(
     monkeypatch.setattr(os, "scandir", denied)
     assert app.main([*words, "runs"]) == ExitCode.INPUT
     assert capsys.readouterr().err.endswith("error: permission denied: `runs/locked`\n")
+
+
+def test_show_names_the_log_that_a_folder_lacks(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for folder, code in (("runs/one", ExitCode.OK), ("runs", ExitCode.INPUT)):
+        assert app.main(["show", folder]) == code
+    assert capsys.readouterr().err == (
+        "error: there is no `log.jsonl` in the folder `runs`\n help: name a file, or the folder of one run\n"
+    )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from reference.faulty_disk import FaultyDisk, until
-from rtshcua.adapters.files import telemetry
+from rtshcua.adapters.files import runs, telemetry
 from rtshcua.adapters.files.runs import RunFolder
 from rtshcua.mavlink import tlog
 from rtshcua.model.durability import SYNCED_FIRST
@@ -31,6 +31,18 @@ def test_folder_holds_the_bundle_and_makes_room(tmp_path: Path) -> None:
     assert sorted(file.name for file in run.path.iterdir()) == [
         "log.jsonl", "mission.bundle", "summary.json", "telemetry.tlog",
     ]  # fmt: skip
+
+
+def test_no_empty_folder_is_left_where_the_bundle_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, data: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr(runs, "write_new", full)
+    with pytest.raises(OSError, match="No space left"):
+        RunFolder(tmp_path / "runs", name="short", bundle=b"bundle", utc_us=UTC_US)
+    assert list((tmp_path / "runs").iterdir()) == []
 
 
 def test_two_runs_in_one_second_do_not_meet(tmp_path: Path) -> None:

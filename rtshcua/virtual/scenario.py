@@ -50,6 +50,8 @@ SAMPLE_US: Final = 50_000
 WAIT_US: Final = 50_000
 #: A run that could not begin after a crash is begun anew after so long.
 AGAIN_US: Final = 5 * SECOND
+#: how long a run may take, besides the time in the air and a wait for a silent vehicle
+AROUND_US: Final = 1_800 * SECOND
 #: What `rtshcua run` waits for: a heartbeat, then word of whether the vehicle is in the air.
 _HEARTBEAT_US: Final = 10 * SECOND
 _AIR_US: Final = 5 * SECOND
@@ -82,15 +84,16 @@ class Keys:
 
 def fly(
     bundle: bytes, root: bytes, keys: Keys, scenario: Scenario, flavour: str, seed: int, *, utc_us: int | None = None,
-    tick_us: int = SAMPLE_US, most_s: int = 3_600, chosen: Callable[..., SimulationConfig] = fitting,
+    tick_us: int = SAMPLE_US, chosen: Callable[..., SimulationConfig] = fitting,
 ) -> ScenarioFlown:  # fmt: skip
     """One flight of the bundle under the signed trust root, on the simulated autopilot `flavour`, with this seed.
 
-    `chosen` makes the simulated vehicle, as `fitting` does, for a policy and what is asked of it. A run that has not
-    ended after `most_s` seconds, or out of which an exception comes, is told as the `fault` of what was flown. Raises
-    ValueError for a bundle that is refused, and what `open_root` raises.
+    `chosen` makes the simulated vehicle, as `fitting` does, for a policy and what is asked of it. The `fault` of what
+    was flown tells of an exception that comes out of a run, and of a run that has not ended after `AROUND_US` and twice
+    the time that the vehicle can fly, for a silent one is waited for as long. Raises ValueError for a bundle that is
+    refused, and what `open_root` raises.
     """
-    return _Flight(bundle, root, keys, scenario, flavour, seed, utc_us, tick_us, most_s, chosen).fly()
+    return _Flight(bundle, root, keys, scenario, flavour, seed, utc_us, tick_us, chosen).fly()
 
 
 class _Killed(Exception):
@@ -183,10 +186,10 @@ class _Flight:
 
     def __init__(
         self, bundle: bytes, root: bytes, keys: Keys, scenario: Scenario, flavour: str, seed: int, utc_us: int | None,
-        tick_us: int, most_s: int, chosen: Callable[..., SimulationConfig],
+        tick_us: int, chosen: Callable[..., SimulationConfig],
     ) -> None:  # fmt: skip
         self._bundle, self._root, self._keys, self._scenario = bundle, root, keys, scenario
-        self._flavour, self._seed, self._tick_us, self._most_us = flavour, seed, tick_us, most_s * SECOND
+        self._flavour, self._seed, self._tick_us = flavour, seed, tick_us
         self._configs: list[SimulationConfig] = []
         self._stepped_us = 0  # by how much the machine's time of day was set
         self._full_until_us: int | None = 0  # None: for good
@@ -212,6 +215,7 @@ class _Flight:
             bundle, vehicle, root=root, log_key=keys.log, utc_us=utc_us, wait_us=WAIT_US, tick_us=tick_us,
             sink=lambda clock: _Sink(clock, full=False), boundary=keys.session(1, START_DIGEST), mode=self._mode,
         )  # fmt: skip
+        self._most_us = 2 * self._flight.loaded.bundle.policy.vehicle.endurance_us + AROUND_US
         self._kept = self._flight.loaded.attestation.digest  # of the boundary's own evidence, as its store has it
         self._world = self._watch(self._flight.vehicle)
         self._utc_us = self._flight.clock.now().utc_us

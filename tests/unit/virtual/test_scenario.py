@@ -392,6 +392,20 @@ def _with(found: ScenarioFlown, expected: Expected) -> tuple[ScenarioFlown, Any]
     return replace(found, scenario=scenario(expects=(expected,))), judge(found)
 
 
+@pytest.mark.soak
+def test_a_vehicle_that_flies_long_is_waited_for_as_long() -> None:
+    """A link that is lost for good is waited out for as long as the vehicle can fly: an hour, and no fault."""
+    from msgspec.structs import replace
+
+    policy = case.policy()
+    hour = replace(policy, vehicle=replace(policy.vehicle, endurance_us=3_600 * S))
+    bundle = case.seal(case.mission(case.low_steps()), hour)
+    found = flown(scenario(incident(15, faults.LinkSilence(0))), bundle=bundle)
+    assert (found.ending, found.fault) == ("link-lost", None)
+    assert found.ended_us > 3_600 * S
+    assert judge(found).failures == ()
+
+
 # ---------------------------------------------------------------- whatever happens
 
 SECOND_LONG: dict[type[Fault], Fault] = {

@@ -3,16 +3,35 @@
 Values are 64-bit integers, byte and text strings, booleans, null, arrays, and maps with text or integer keys; there are
 no floats, tags, indefinite lengths or other simple values. Map keys are in the bytewise order of their encodings (the
 canonical mode of cbor2 sorts by length first, the older rule of RFC 7049, and its encoder is slower than this one).
-The encoder is here, the decoder in `cbor_strict`.
+
+The decoder accepts only the bytes that the encoder would have made. It is written to be read, and to say where and why
+bytes are refused; a second implementation must agree with it in every refusal: reason and place.
 """
 
 from collections.abc import Mapping, Sequence
 from struct import Struct
-from typing import Final, cast
+from typing import Final, TypeAlias, cast
 
-from rtshcua.wire.cbor_strict import LIMIT, MAX_DEPTH, CborError, Value, decode
+#: what a decoded item is; arrays come back as tuples
+Value: TypeAlias = "bool | int | bytes | str | tuple[Value, ...] | dict[str | int, Value] | None"
 
-__all__ = ["LIMIT", "MAX_DEPTH", "CborError", "Value", "decode", "encode"]
+#: how deep arrays and maps may nest
+MAX_DEPTH: Final = 32
+
+#: the most bytes that `decode` takes unless told otherwise
+LIMIT: Final = 16 << 20
+
+
+class CborError(ValueError):
+    """Bytes that are not canonical, or a value that has no canonical bytes (then `offset` is None)."""
+
+    def __init__(self, reason: str, offset: int | None = None) -> None:
+        super().__init__(reason if offset is None else f"{reason} (byte {offset})")
+        self.reason = reason
+        self.offset = offset
+
+
+# ---------------------------------------------------------------- encoding
 
 _WITH_2 = Struct(">BH").pack
 _WITH_4 = Struct(">BI").pack
@@ -24,7 +43,7 @@ def encode(value: object) -> bytes:
 
     Types are taken exactly: an `IntEnum` or a `bytearray` is refused, so that equal bytes mean equal values.
     """
-    return _item(value, 0)
+    return _encoded(value, 0)
 
 
 def _head(major: int, argument: int) -> bytes:
@@ -41,10 +60,10 @@ def _head(major: int, argument: int) -> bytes:
     return _WITH_8(initial | 27, argument)
 
 
-_SMALL: Final = {n: _head(0, n) for n in range(256)} | {~n: _head(1, n) for n in range(256)}
+_SHORT: Final = {n: _head(0, n) for n in range(256)} | {~n: _head(1, n) for n in range(256)}
 
 
-def _item(value: object, depth: int) -> bytes:
+def _encoded(value: object, depth: int) -> bytes:
     match value:
         case None:
             return b"\xf6"
@@ -61,9 +80,9 @@ def _item(value: object, depth: int) -> bytes:
         text = _utf8(cast("str", value))
         return _head(3, len(text)) + text
     if kind is tuple or kind is list:
-        return _array(cast("Sequence[object]", value), depth + 1)
+        return _encoded_array(cast("Sequence[object]", value), depth + 1)
     if kind is dict:
-        return _map(cast("Mapping[object, object]", value), depth + 1)
+        return _encoded_map(cast("Mapping[object, object]", value), depth + 1)
     raise CborError(f"`{kind.__name__}` has no encoding")
 
 
@@ -73,16 +92,16 @@ def _integer(n: int) -> bytes:
     return _head(0, n) if n >= 0 else _head(1, ~n)
 
 
-def _array(items: Sequence[object], depth: int) -> bytes:
+def _encoded_array(items: Sequence[object], depth: int) -> bytes:
     _check_depth(depth)
     parts = [_head(4, len(items))]
     add = parts.append
     for item in items:
         # Lowered code is mostly integers: the common widths are written with one call at most.
         if type(item) is not int:
-            add(_item(item, depth))
+            add(_encoded(item, depth))
         elif -257 < item < 256:
-            add(_SMALL[item])
+            add(_SHORT[item])
         elif 65535 < item < 4294967296:
             add(_WITH_4(0x1A, item))
         elif 255 < item < 65536:
@@ -92,17 +111,17 @@ def _array(items: Sequence[object], depth: int) -> bytes:
     return b"".join(parts)
 
 
-def _map(pairs: Mapping[object, object], depth: int) -> bytes:
+def _encoded_map(pairs: Mapping[object, object], depth: int) -> bytes:
     _check_depth(depth)
     # No two keys encode alike, so the order never comes down to the values.
-    encoded = sorted((_key(key), _item(value, depth)) for key, value in pairs.items())
+    encoded = sorted((_key(key), _encoded(value, depth)) for key, value in pairs.items())
     return _head(5, len(encoded)) + b"".join([part for pair in encoded for part in pair])
 
 
 def _key(key: object) -> bytes:
     if type(key) is not str and type(key) is not int:
         raise CborError("map key is neither text nor an integer")
-    return _item(key, 0)
+    return _encoded(key, 0)
 
 
 def _check_depth(depth: int) -> None:
@@ -115,3 +134,124 @@ def _utf8(text: str) -> bytes:
         return text.encode()
     except UnicodeEncodeError:
         raise CborError("text is not Unicode scalar values") from None
+
+
+# ---------------------------------------------------------------- decoding
+
+#: the least argument that needs 1, 2, 4 or 8 bytes after the initial byte
+_LEAST: Final = (24, 1 << 8, 1 << 16, 1 << 32)
+_INT64_MAX: Final = (1 << 63) - 1
+#: the integers that are their own head: most of what a bundle holds
+_SMALL: Final = {bytes([n]): n for n in range(24)} | {bytes([0x20 | n]): ~n for n in range(24)}
+_SIMPLE: Final[dict[int, bool | None]] = {0xF4: False, 0xF5: True, 0xF6: None}
+
+
+def decode(data: bytes, *, limit: int = LIMIT) -> Value:
+    """The value of `data`, provided that `encode(value) == data`; else raises `CborError`. Arrays become tuples."""
+    if len(data) > limit:
+        raise CborError(f"longer than the limit of {limit} bytes", limit)
+    value, end = _item(data, 0, 0)
+    if end != len(data):
+        raise CborError("bytes left over after the item", end)
+    return value
+
+
+def head(data: bytes, at: int) -> tuple[int, int, int]:
+    """Major type, argument, and where the head at `at` ends. Raises `CborError`."""
+    if at >= len(data):
+        raise CborError("ends where an item should begin", at)
+    major, info = data[at] >> 5, data[at] & 0x1F
+    if info < 24:
+        return major, info, at + 1
+    if info == 31:
+        raise CborError("indefinite length", at)
+    if info > 27:
+        raise CborError("reserved initial byte", at)
+    end = at + 1 + (1 << (info - 24))
+    if end > len(data):
+        raise CborError("ends within the head of an item", at)
+    argument = int.from_bytes(data[at + 1 : end])
+    if argument < _LEAST[info - 24]:
+        raise CborError("not in the shortest form", at)
+    return major, argument, end
+
+
+def _item(data: bytes, at: int, depth: int) -> tuple[Value, int]:
+    if data[at : at + 1] >= b"\xe0":
+        return _simple(data, at), at + 1
+    major, argument, end = head(data, at)
+    match major:
+        case 0 | 1:
+            if argument > _INT64_MAX:
+                raise CborError("integer outside 64 bits", at)
+            return argument if major == 0 else ~argument, end
+        case 2:
+            return _string(data, at, end, argument), end + argument
+        case 3:
+            return _text(data, at, end, argument), end + argument
+        case 4:
+            return _array(data, at, end, argument, depth + 1)
+        case 5:
+            return _map(data, at, end, argument, depth + 1)
+    raise CborError(f"tag {argument} is not part of the format", at)
+
+
+def _simple(data: bytes, at: int) -> bool | None:
+    initial = data[at]
+    if initial in _SIMPLE:
+        return _SIMPLE[initial]
+    if 0xF9 <= initial <= 0xFB:
+        raise CborError("floating-point number", at)
+    raise CborError("simple value other than false, true and null", at)
+
+
+def _string(data: bytes, at: int, start: int, length: int) -> bytes:
+    if length > len(data) - start:
+        raise CborError("string longer than the bytes that follow", at)
+    return data[start : start + length]
+
+
+def _text(data: bytes, at: int, start: int, length: int) -> str:
+    try:
+        return _string(data, at, start, length).decode()
+    except UnicodeDecodeError as error:
+        raise CborError("text is not UTF-8", start + error.start) from None
+
+
+def _array(data: bytes, at: int, start: int, count: int, depth: int) -> tuple[tuple[Value, ...], int]:
+    _room(data, at, start, count, depth)
+    items: list[Value] = []
+    for _ in range(count):
+        value: Value = _SMALL.get(data[start : start + 1])
+        if value is None:
+            value, start = _item(data, start, depth)
+        else:
+            start += 1
+        items.append(value)
+    return tuple(items), start
+
+
+def _map(data: bytes, at: int, start: int, count: int, depth: int) -> tuple[dict[str | int, Value], int]:
+    _room(data, at, start, 2 * count, depth)
+    pairs: dict[str | int, Value] = {}
+    previous = b""
+    for _ in range(count):
+        key, end = _item(data, start, depth)
+        if type(key) is not str and type(key) is not int:
+            raise CborError("map key is neither text nor an integer", start)
+        encoded = data[start:end]
+        if encoded == previous:
+            raise CborError("map key repeated", start)
+        if encoded < previous:
+            raise CborError("map keys out of order", start)
+        previous = encoded
+        pairs[key], start = _item(data, end, depth)
+    return pairs, start
+
+
+def _room(data: bytes, at: int, start: int, items: int, depth: int) -> None:
+    """Refuse a container before anything is spent on it: nested too deep, or with more items than bytes."""
+    if depth > MAX_DEPTH:
+        raise CborError(f"nested deeper than {MAX_DEPTH}", at)
+    if items > len(data) - start:
+        raise CborError("more items than bytes that follow", at)

@@ -11,7 +11,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.bundle import open_envelope, parse
-from rtshcua.wire.cbor_strict import CborError, head
+from rtshcua.wire.cbor import CborError, head
 from rtshcua.wire.cose import Opened
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.names import Artefact

@@ -4,7 +4,7 @@ from random import Random
 from typing import Any
 
 from rtshcua.wire import cbor
-from rtshcua.wire.cbor_strict import head
+from rtshcua.wire.cbor import head
 
 INTEGERS = (0, 1, -1, 23, 24, 255, 256, 1 << 16, 1 << 32, (1 << 63) - 1, -(1 << 63), 1 << 53)
 

@@ -10,7 +10,6 @@ from typing import Final, NamedTuple, Protocol, dataclass_transform
 
 import msgspec
 
-from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import SigningKey
@@ -287,56 +286,6 @@ class BoundaryKey(NamedTuple):
     key: SigningKey | None
     session: int
     before: bytes
-
-
-class Boundary(Protocol):
-    """The enforcement boundary after `load`: bytes in, bytes out, the same in process, isolated, or in another
-    world.
-    """
-
-    @property
-    def lost(self) -> str | None:
-        """That it is gone for good, in words, and what that means; None while it is there."""
-        ...
-
-    def enforce(self, request: bytes) -> bytes:
-        """Decide one request; the answer is a decision with, on `allow`, permits."""
-        ...
-
-    def consider(self, document: bytes, now: Now) -> None:
-        """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick."""
-        ...
-
-    def present(self, document: bytes, now: Now, released: int) -> bytes:
-        """Take in a signed document, if it is to be trusted; the answer says what became of it.
-
-        `released` is the number of steps that were released: none of them is replaced any more.
-        """
-        ...
-
-
-class Dispatching(Protocol):
-    """What turns permits into what is sent: the boundary's executor, here or elsewhere. Times are monotonic, us."""
-
-    def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
-        """What to send for a permit, or why nothing is sent."""
-        ...
-
-    def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
-        """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
-        ...
-
-    def ended(self, token: int | None = None) -> None:
-        """The running step ended, or that command did."""
-        ...
-
-    def landed(self) -> None:
-        """The vehicle landed: standing permits lapse."""
-        ...
-
-    def release(self) -> None:
-        """Nothing more that moves the vehicle is to be sent."""
-        ...
 
 
 class Clock(Protocol):

@@ -147,7 +147,7 @@ class BothAttestations:
 
 
 class BothBoundaries:
-    """`ports.Boundary`."""
+    """`SoftwareBoundary`."""
 
     lost = None
 

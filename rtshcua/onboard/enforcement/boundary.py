@@ -58,7 +58,7 @@ class PermitIssuer:
 
 
 class SoftwareBoundary:
-    """`ports.Boundary` over a prepared bundle.
+    """The boundary over a prepared bundle.
 
     `enforced` false is mode `none`: it decides and answers as ever, and issues a step's permit whatever the decision.
     """

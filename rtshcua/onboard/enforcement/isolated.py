@@ -140,7 +140,7 @@ def _times(now: Now) -> tuple[int, int, int]:
 
 
 class IsolatedBoundary:
-    """`ports.Boundary` over calls. `in_force` and `commands` are this end's own reading of what is in force."""
+    """`SoftwareBoundary` over calls. `in_force` and `commands` are this end's own reading of what is in force."""
 
     def __init__(self, caller: Caller, in_force: InForce, commands: Commands) -> None:
         self._caller = caller

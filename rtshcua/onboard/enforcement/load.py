@@ -28,7 +28,6 @@ from rtshcua.onboard.enforcement.isolated import (
     IsolatedIssuer,
 )
 from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
-from rtshcua.onboard.ports import Boundary
 from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.bundle import Bundle, open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
@@ -52,7 +51,7 @@ class Loaded(msgspec.Struct, frozen=True):
     signs, and the verified parts.
     """
 
-    boundary: Boundary
+    boundary: SoftwareBoundary | IsolatedBoundary
     executor: Executor | IsolatedExecutor
     in_force: InForce
     policy: PreparedPolicy

@@ -6,7 +6,9 @@ from typing import Final
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Command, Dispatching, Frozen, Obeyed, Release
+from rtshcua.onboard.enforcement.executor import Executor
+from rtshcua.onboard.enforcement.isolated import IsolatedExecutor
+from rtshcua.onboard.ports import Command, Frozen, Obeyed, Release
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
@@ -59,7 +61,7 @@ class Active(Frozen):
 class Dispatcher:
     """At most one command flies; a new one replaces it."""
 
-    def __init__(self, executor: Dispatching, journal: Journal, remaining: RemainingLatency) -> None:
+    def __init__(self, executor: Executor | IsolatedExecutor, journal: Journal, remaining: RemainingLatency) -> None:
         self._executor = executor
         self._journal = journal
         self._remaining = remaining

@@ -12,6 +12,8 @@ from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard import ports
+from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
+from rtshcua.onboard.enforcement.isolated import IsolatedBoundary
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Command, Crashed, Ending, Event, Readings, Reply, TakenOver
 from rtshcua.onboard.runtime.controller import MissionController
@@ -148,7 +150,9 @@ class EventHandler:
     audit can verify it again; what it refused is recorded by its slug, and no more often than `REFUSED_EVERY_US`.
     """
 
-    def __init__(self, controller: MissionController, journal: Journal, boundary: ports.Boundary) -> None:
+    def __init__(
+        self, controller: MissionController, journal: Journal, boundary: SoftwareBoundary | IsolatedBoundary
+    ) -> None:
         self._controller = controller
         self._journal = journal
         self._boundary = boundary

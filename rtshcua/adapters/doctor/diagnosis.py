@@ -86,7 +86,8 @@ def diagnose(
         yield from found
         return
     for each in found:  # who answers nothing is not to blame for each single thing that is not known then
-        if each.verdict is STOP and each.slug not in _WITHOUT_ANSWERS:
+        wrong = each.verdict is STOP or (each.verdict is WARN and each.slug.startswith("signal/"))
+        if wrong and each.slug not in _WITHOUT_ANSWERS:
             yield VehicleFinding(each.slug, UNKNOWN, _NOT_ASKED)
         else:
             yield each

@@ -344,6 +344,8 @@ def test_one_that_answers_signed_frames_only_is_stopped_by_that_alone_where_no_k
     assert "--signing-key" in found["link/signing"].advice
     assert found["link/answers"].verdict is MissionVerdict.UNKNOWN
     assert "no key was given" in found["link/round-trip"].found
+    signals = {slug: each for slug, each in found.items() if slug.startswith("signal/")}
+    assert {each.verdict for each in signals.values()} <= {MissionVerdict.OK, MissionVerdict.UNKNOWN}, signals
 
 
 def test_what_is_not_believed_is_no_value() -> None:

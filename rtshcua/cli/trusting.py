@@ -118,9 +118,19 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
 def _given(roots: Sequence[Path], data: Path, *, needed: bool) -> list[bytes]:
     """The roots that were named, else those of the key store, if it is there or needed."""
     if roots:
-        return [read_root(path) for path in roots]
+        return [_named(path) for path in roots]
     store = KeyStore(data)
     return store.chain() if needed or store.exists() else []
+
+
+def _named(path: Path) -> bytes:
+    """The root in a file, of which only the form is looked at. Raises `Untrusted`, naming the file, and OSError."""
+    signed = read_root(path)
+    try:
+        cose.unverified(signed, limit=MAX_ROOT)
+    except Untrusted as error:
+        raise Untrusted(error.slug, f"`{path}` is no trust root: {error}") from None
+    return signed
 
 
 def _refused(error: Untrusted | OSError) -> Refused:

@@ -432,6 +432,7 @@ def test_a_vehicle_says_what_it_accepted(tmp_path: Path, capsys: pytest.CaptureF
     accept[2] = str(damaged)
     (tmp_path / "trust" / "vehicle-quad-07").rmdir()
     assert app.main(accept) == ExitCode.INPUT
+    assert capsys.readouterr().err.startswith(f"error: `{damaged}` is no trust root: ")
 
 
 def test_the_list_names_files_and_the_roots_version_and_what_is_revoked_is_not_again(

@@ -128,6 +128,7 @@ def campaign(
         order = Order(seed, flights, space)
         past = folder.past()
         progress = _Progress(flights, sum(number < flights for number in past), quiet=as_json_)
+        progress.begun(folder)
         try:
             flying.fly(order, field, workers, past, lambda result: progress.flown(result, folder))
         except KeyboardInterrupt:
@@ -286,6 +287,11 @@ class _Progress:
         self._began_s = time.monotonic()
         self._shows = not self.quiet and sys.stderr is not None
         self._changes = self._shows and sys.stderr.isatty()
+
+    def begun(self, folder: Folder) -> None:
+        """What was flown before is told."""
+        if self._shows and 0 < self.before < self.flights:
+            say(f"{self.before} of {self.flights} flights are kept in `{folder.path}`: it goes on behind them")
 
     def flown(self, result: Result, folder: Folder) -> None:
         """A flight is over; it is kept."""

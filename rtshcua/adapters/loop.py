@@ -1,38 +1,23 @@
 """The thin loop around the runtime: waits for the world, steps, carries out the actions in their order.
 
-The same loop runs on a machine's clock and in virtual time: it knows ports only. It never waits for the evidence: a
-command that must be recorded first is held until its record is kept, and the loop goes on meanwhile; a fallback is held
-for nothing.
+The same loop runs on a machine's clock and in virtual time: of either it knows ports only. It never waits for the
+evidence: a command that must be recorded first is held until its record is kept, and the loop goes on meanwhile; a
+fallback is held for nothing.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from rtshcua.model.durability import BUFFERED, SYNCED_FIRST
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard import ports
 from rtshcua.onboard.ports import Action, Command, Ending, Event
+from rtshcua.onboard.runtime.runtime import Runtime
 
 #: The longest that the loop waits for the vehicle before it steps the runtime again, in us of its clock;
 WAIT_US = 50_000
 #: while a command is held for its record, it looks this often whether that is kept.
 HELD_WAIT_US = 300
-
-
-class Stepped(Protocol):
-    """The runtime, as far as the loop knows it."""
-
-    def react(self, now: Now, events: Sequence[Event]) -> Command | None:
-        """Take in these events; a command of those that follow that may be sent before all else."""
-        ...
-
-    def actions(self, now: Now) -> Sequence[Action]:
-        """What to do at `now` after these events, in its order."""
-        ...
-
-    def prepare(self, now: Now) -> None:
-        """Nothing else is to be done: what the next step may need may be looked at ahead."""
-        ...
 
 
 Watch = Callable[[Now, Sequence[Event], Sequence[Action]], None]
@@ -52,7 +37,7 @@ class RunLoop:
     """
 
     def __init__(
-        self, runtime: Stepped, vehicle: ports.Vehicle, sink: ports.EvidenceSink, clock: ports.Clock, watch: Watch,
+        self, runtime: Runtime, vehicle: ports.Vehicle, sink: ports.EvidenceSink, clock: ports.Clock, watch: Watch,
         wait_us: int = WAIT_US, held_wait_us: int = HELD_WAIT_US, *, prepares: bool = True,
     ) -> None:  # fmt: skip
         self._runtime = runtime

@@ -7,9 +7,10 @@ freshness, approvals, the hours of zones. What is assumed of a clock that nobody
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock
+from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 
 #: the effect that says in the log where the bound came from
@@ -20,14 +21,6 @@ CLOCK: Final = "clock"
 VEHICLE_US: Final = {"px4": 6_000_000, "ardupilot": 1_000_000}
 #: SYSTEM_TIME says when it was made in whole ms
 _STAMP_US: Final = 1_000
-
-
-class TellsUtc(Protocol):
-    """What the vehicle said of the time; see `SourceTime`."""
-
-    def utc(self, now_us: int) -> tuple[int, int] | None:
-        """UTC less our monotonic time, and how far the link leaves it open, both in us; None while it is not told."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +104,7 @@ class UtcWatch:
         """Whether the vehicle's time would still be taken."""
         return self.bound.source == "unknown"
 
-    def look(self, told: TellsUtc, flavour: str, now_us: int) -> bool:
+    def look(self, told: SourceTime, flavour: str, now_us: int) -> bool:
         """Take the vehicle's own time, if it is needed and told. Whether it was taken."""
         utc = told.utc(now_us) if self.waits else None
         if utc is None:

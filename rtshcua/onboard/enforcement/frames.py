@@ -22,6 +22,7 @@ from rtshcua.mavlink.framing import SIGNATURE
 from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
 from rtshcua.mavlink.modes import KNOWN
 from rtshcua.mavlink.parameters import is_bytewise, value_of
+from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement import allow_list
 from rtshcua.onboard.enforcement.allow_list import Frame, read_frame
@@ -67,18 +68,6 @@ OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "it is to a point of the pat
 UNSIGNED: Final = Refusal("frame/unsigned", "it moves nothing, and nobody is there any more to sign it")
 TOO_MANY_AHEAD: Final = Refusal("frame/too-many-ahead", "more frames were signed ahead than any link needs")
 LATE: Final = Refusal("frame/late", "it is the command's first frame, after its permit's time")
-
-
-class Signer(Protocol):
-    """Signs outgoing frames; see `rtshcua.mavlink.signing`."""
-
-    def sign(self, frame: bytes, now_us: int) -> bytes:
-        """The signed frame for an unsigned one. `now_us` is monotonic."""
-        ...
-
-    def sign_ahead(self, frame: bytes, now_us: int) -> bytes | None:
-        """The same, for a frame that is sent only when nothing more is signed; None where there are too many."""
-        ...
 
 
 class Gate(Protocol):
@@ -130,7 +119,7 @@ class FrameSession:
     def __init__(self) -> None:
         #: where what leaves is chained
         self.chain = BoundaryChain()
-        self._signer: Signer | None = None
+        self._signer: SignedLink | None = None
         self._session: _Session | None = None
         self._here: tuple[int, int] | None = None  # 1e-7 degree
         self._started = False  # a session was opened: fences stay as they are
@@ -145,7 +134,7 @@ class FrameSession:
         self._home_amsl: int | None = None  # mm
         self._settled_amsl: int | None = None  # the same, when the takeoff was permitted
 
-    def sign_with(self, signer: Signer) -> None:
+    def sign_with(self, signer: SignedLink) -> None:
         """Sign what leaves from now on. Raises RuntimeError if it is signed already: a key is not taken away."""
         if self._signer is not None:
             raise RuntimeError("this link is signed already")

@@ -212,9 +212,10 @@ class Codec:
 
         A frame does not span datagrams, so nothing is kept from one call to the next. The time is the verifier's.
         """
-        received = _decode(datagram)  # what comes in a datagram is one frame, as a rule
+        received, only = _decode(datagram), self._only  # what comes in a datagram is one frame, as a rule
         if received is not None:
-            return [received] if self._lets_in(received, now_us) else []
+            heeded = self._verifier is None and (only is None or received[2] in only)
+            return [received] if heeded or self._lets_in(received, now_us) else []
         good: list[Received] = []
         start, octets = 0, len(datagram)
         in_garbage = False

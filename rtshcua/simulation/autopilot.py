@@ -267,7 +267,10 @@ class Autopilot:
         self._follow_plans()
         if self._boot_texts:
             self._tell_of_boot()
-        self._tell()
+        if vehicle.events or vehicle.mode is not self._told_mode:
+            self._tell()
+        if self.flavour.reminds:
+            self._remind()
 
     def _tell_of_boot(self) -> None:
         sensors = self.sensors
@@ -310,7 +313,7 @@ class Autopilot:
         self.signing.restart(time_us)
 
     def _tell(self) -> None:
-        """What happened, and what stands against arming."""
+        """What happened, and another mode."""
         vehicle, flavour = self.vehicle, self.flavour
         if vehicle.events:
             for event in vehicle.events:
@@ -321,14 +324,15 @@ class Autopilot:
             vehicle.events.clear()
         if vehicle.mode is not self._told_mode:
             self.tell_mode()
-        if not flavour.reminds:
-            return
-        if vehicle.armed:
+
+    def _remind(self) -> None:
+        """What stands against arming, once in a while."""
+        if self.vehicle.armed:
             self._remind_us = self.now_us + _REMIND_FIRST_US
         elif self.now_us >= self._remind_us:
             self._remind_us = self.now_us + _REMIND_US
             if self.sensors.consistent:
-                for reason in flavour.arming(self):
+                for reason in self.flavour.arming(self):
                     self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {reason}")
 
     def tell_mode(self) -> None:

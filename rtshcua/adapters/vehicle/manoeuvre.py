@@ -198,6 +198,8 @@ class WhoFliesQuery:
         if self._asked_us is not None and now_us - self._asked_us < every_us:
             if every_us == STREAMED_US:  # until the last heartbeat is too old for that
                 self.due_us = min(self._asked_us + every_us, (seen.heartbeat_us or 0) + half_us)
+            elif flies:
+                self.due_us = self._asked_us + every_us
             return []
         self._asked_us, self.due_us = now_us, now_us + min(half_us, AGAIN_US)
         names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if self._target else ("HEARTBEAT",)

@@ -1,5 +1,6 @@
 """The MAVLink messages that adapters send, made in one place with the fields that nobody uses filled in."""
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -92,8 +93,9 @@ def message_interval(system: int, message: str, interval_us: int) -> Message:
     return command(system, SET_INTERVAL, number_of(message) or 0, interval_us)
 
 
+@lru_cache(maxsize=16)
 def request(system: int, message: str) -> Message:
-    """REQUEST_MESSAGE: once, by the name of a message that the dialect has."""
+    """REQUEST_MESSAGE: once, by the name of a message that the dialect has. The same one each time: to be sent only."""
     return command(system, enums.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
 
 

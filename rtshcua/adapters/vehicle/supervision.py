@@ -51,8 +51,11 @@ class StageProgress:
         return seen.up_us - self._since_us > self._expected.within_us
 
     def _has_come_further(self, best: tuple[int, ...], left: tuple[int, ...]) -> bool:
-        changes = [before - now for before, now in zip(best, left, strict=True)]
-        return max(map(abs, changes) if self._expected.either_way else changes) >= LEAST
+        either_way = self._expected.either_way
+        for before, now in zip(best, left, strict=True):
+            if before - now >= LEAST or (either_way and now - before >= LEAST):
+                return True
+        return False
 
 
 # ---------------------------------------------------------------- stopping

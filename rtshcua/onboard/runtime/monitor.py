@@ -76,7 +76,11 @@ class StateMonitor:
     def hides(self, readings: Readings) -> bool:
         """Whether these readings replace a value that nobody has looked at: frames came faster than steps were made."""
         unseen = self._unseen
-        return bool(unseen) and any(slot in unseen for slot, _ in readings.values)
+        if unseen:
+            for slot, _ in readings.values:
+                if slot in unseen:
+                    return True
+        return False
 
     def seen(self) -> None:
         """All values that are held were looked at."""

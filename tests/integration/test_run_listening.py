@@ -4,6 +4,7 @@ import json
 import os
 import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +160,16 @@ def test_a_boundary_that_is_killed_in_flight(ground: Any, made: Listening, port:
     assert (code, said["shortfall"]["slug"]) == (10, "boundary/lost")
 
 
+@contextmanager
+def away(folder: Path) -> Iterator[None]:
+    """Without a folder, which is back at the end."""
+    elsewhere = folder.rename(folder.with_name("elsewhere"))
+    try:
+        yield
+    finally:
+        elsewhere.rename(folder)
+
+
 def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
     """As the unit has it, with no key store at all: what is handed in flies; one that is killed is begun again, and
     brings the vehicle down.
@@ -166,20 +177,19 @@ def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
     aboard = Aboard(ground, made, port, signed=True)
     store = ground.store.folder
     assert ground.start("keys", "accept", str(store / "root.trust"), "--vehicle", "quad-07").process.wait() == 0
-    store.rename(store.with_name("elsewhere"))
     place = made.socket.with_name("agent")
     words = ("--wait", "--agent-socket", str(place))
-    first = aboard.run(0, *words)
-    first.until("waiting")
-    (waiting,) = made.boundaries()
-    assert hand_in(place, (ground.folder / aboard.bundles[1]).read_bytes()).slug == "accepted"
-    first.until("dispatched", step=1)
-    assert made.boundaries() == [waiting], "one boundary over the waiting and the flight"
-    first.signal(signal.SIGKILL)
-    assert first.process.wait() == -signal.SIGKILL
-    second = aboard.run(0, *words).end()
-    assert second.code == 6, second.stderr
-    store.with_name("elsewhere").rename(store)
+    with away(store):
+        first = aboard.run(0, *words)
+        first.until("waiting")
+        (waiting,) = made.boundaries()
+        assert hand_in(place, (ground.folder / aboard.bundles[1]).read_bytes()).slug == "accepted"
+        first.until("dispatched", step=1)
+        assert made.boundaries() == [waiting], "one boundary over the waiting and the flight"
+        first.signal(signal.SIGKILL)
+        assert first.process.wait() == -signal.SIGKILL
+        second = aboard.run(0, *words).end()
+        assert second.code == 6, second.stderr
     (other,) = [run for run in aboard.runs() if "resumed" in (run / "log.jsonl").read_text()]
     assert json.loads((other / "log.jsonl").read_bytes().splitlines()[0])["mode"] == "process"
     assert aboard.verified(other)[0] == 0

@@ -80,8 +80,9 @@ class Processes:
         ):
             return None
         files = [[at for at, _ in group] for _, group in groupby(enumerate(session.items), lambda each: each[1].path)]
-        # flights in real time come last: two of three processes begin at that end, see `next_file`
-        files.sort(key=lambda each: "integration" in session.items[each[0]].path.parts)
+        # flights in real time come last: two of three processes begin at that end, see `next_file`; before them come
+        # the many small files, so that all processes are done at about the same time where both ends meet
+        files.sort(key=lambda each: [name in session.items[each[0]].path.parts for name in ("integration", "unit")])
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  one folder for all processes
         try:
             for _ in range(min(self._number, len(files))):

@@ -13,7 +13,7 @@ typedef struct {
     const uint8_t *end;
 } rt_cursor;
 
-/* Whether the bytes are one item, in the one encoding that it has (`cbor_strict.decode`). */
+/* Whether the bytes are one item, in the one encoding that it has (`cbor.decode`). */
 bool rt_cbor_valid(rt_bytes data);
 
 /* Take the next item off, if it is of that kind; else nothing is said of where the cursor stands then. */

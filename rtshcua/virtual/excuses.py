@@ -187,28 +187,32 @@ class Excuses:
         off, since_us = 0.0, failure.at_us
         for fault in self._before(failure.at_us, faults.ReceiverFault):
             ended_us = fault.at_us + (getattr(fault, "for_us", None) or _FOREVER)
-            if isinstance(fault, faults.GpsLoss) and self._lands_blind(ended_us + _AFTER_GLITCH_US, failure.at_us):
+            passes = isinstance(fault, faults.GpsLoss | faults.GpsGlitch)
+            blind = passes and self._lands_blind(ended_us + _AFTER_GLITCH_US, failure.at_us)
+            if blind:
                 ended_us = failure.at_us
             lasted_s = (min(ended_us, failure.at_us) - fault.at_us) / 1e6
+            carried = (self._air_mm_s(failure.at_us) + 1_000) * lasted_s
             match fault:
                 case faults.GpsJump(_, north_mm, east_mm):
                     off += hypot(north_mm, east_mm)
                 case faults.GpsDrift(_, north_mm_s, east_mm_s):
                     off += hypot(north_mm_s, east_mm_s) * lasted_s
                 case faults.GpsGlitch(_, north_mm, east_mm) if failure.at_us <= ended_us + _AFTER_GLITCH_US:
-                    off += hypot(north_mm, east_mm)
+                    off += hypot(north_mm, east_mm) + (carried if blind else 0)
                 case faults.GpsLoss() if failure.at_us <= ended_us + _AFTER_GLITCH_US:
-                    off += (self._air_mm_s(failure.at_us) + 1_000) * lasted_s
+                    off += carried
                 case _:
                     continue
             since_us = min(since_us, fault.at_us)
         return "position" if off and failure.amount <= off + self._stop_mm(since_us, failure.at_us) else None
 
     def _lands_blind(self, back_us: int, at_us: int) -> bool:
-        """Whether it lands since before its position was back: ArduCopter asks for one as a landing begins, and not
+        """Whether it lands, and did before its position was back: ArduCopter asks for one as a landing begins, and not
         again (`ModeLand::init`).
         """
-        lands = [sample.mode is Mode.LAND for sample in self._flown.samples if back_us <= sample.at_us < at_us]
+        from_us = min(back_us, at_us)
+        lands = [sample.mode is Mode.LAND for sample in self._flown.samples if from_us <= sample.at_us <= at_us]
         return self._flown.flavour == "ardupilot" and all(lands)
 
     def _misled(self, failure: Failure) -> str | None:

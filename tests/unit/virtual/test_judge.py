@@ -198,6 +198,32 @@ def test_what_excuses_being_outside(good: ScenarioFlown, fault: Fault, cause: st
     assert causes(found) == ([("outside-fence", cause)] if cause else [])
 
 
+@rows(
+    ("fault", "flavour", "from_s", "cause"),
+    [
+        (faults.GpsGlitch(5 * S, 0, 10 * M, 10 * S), "ardupilot", 20, "position"),
+        (faults.GpsGlitch(5 * S, 0, 10 * M, 10 * S), "ardupilot", 27, None),
+        (faults.GpsGlitch(5 * S, 0, 10 * M, 10 * S), "px4", 20, None),
+        (faults.GpsLoss(5 * S, 10 * S), "ardupilot", 20, "position"),
+        (faults.GpsLoss(5 * S, 10 * S), "ardupilot", 27, None),
+        (faults.GpsGlitch(5 * S, 0, M, 23 * S), "ardupilot", 27, "position"),
+        (faults.GpsGlitch(5 * S, 0, M, 23 * S), "ardupilot", 30, None),
+    ],
+)
+def test_a_landing_of_arducopter_that_began_without_a_position_stays_without(
+    good: ScenarioFlown, fault: Fault, flavour: str, from_s: int, cause: str | None
+) -> None:
+    """It is carried off by the wind long after the receiver is right again (`ModeLand::init`)."""
+    modes = [(at_s, Mode.LAND if at_s >= from_s else Mode.BRAKE) for at_s in range(18, 29)]
+    samples = [
+        *(sample(at_s, mode=mode) for at_s, mode in modes),
+        sample(29, 508, mode=Mode.LAND if from_s < 30 else Mode.BRAKE),
+        sample(30, 480),
+    ]
+    found = judged(good, samples, fault, flavour=flavour)
+    assert (slugs(found), causes(found)) == (([], [("outside-fence", cause)]) if cause else (["outside-fence"], []))
+
+
 def test_who_took_over_flies_where_he_wants(good: ScenarioFlown) -> None:
     taken: dict[str, Any] = {"taken_over_us": 10 * S, "taken_over_by": "pilot"}
     samples = [sample(9), sample(12, 508, **taken), sample(13, 480, **taken)]

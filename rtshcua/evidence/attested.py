@@ -42,7 +42,7 @@ _DOCUMENTS: Final = {
 }  # fmt: skip
 _UNDECIDED: Final = re.compile(r"([a-z_]+) ([0-9a-f]{64})")
 _BINDING: Final = re.compile(rf"[0-9a-f]{{{2 * DIGEST_BYTES}}}")
-_WRITES: Final = re.compile(r"(set|restore) ([^,]++(?:, [^,]++)*+)")
+_WRITES: Final = re.compile(r"(set|restore) ([^,]++(?:, [^,]++){0,99})")
 _WRITE: Final = re.compile(r"([A-Z0-9_]{1,16}) from (\S+) to (\S+)", re.ASCII)
 _NONE: Final = Claim(
     "boundary", "what the boundary itself saw: no key of duty `boundary` in the trust root speaks for this vehicle"

@@ -29,7 +29,7 @@ _RANGES: Final = {
     "RTL_ALT": (30, 300_000), "RTL_ALT_M": (1, 3_000), "RTL_RETURN_ALT": (1, 3_000), "GF_MAX_HOR_DIST": (0, 10_000),
     "GF_MAX_VER_DIST": (0, 10_000),
 }  # fmt: skip
-_LISTED: Final = re.compile(r"(?P<what>set|restore) (?P<writes>[^,]++(?:, [^,]++)*+)")
+_LISTED: Final = re.compile(r"(?P<what>set|restore) (?P<writes>[^,]++(?:, [^,]++){0,99})")
 _WRITE: Final = re.compile(r"(?P<name>[A-Z0-9_]{1,16}) from (?P<before>\S+) to (?P<value>\S+)", re.ASCII)
 
 

@@ -173,8 +173,7 @@ class _Cutting(Builder):
 
 def _behind(text: str, end: int) -> int:
     """Where the next word begins."""
-    blank = table().skip.match(text, end)
-    return blank.end() if blank else end
+    return table().skipped(text, end)
 
 
 def _is_firm(text: str, start: int, before: int) -> bool:

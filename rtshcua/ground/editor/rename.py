@@ -23,7 +23,6 @@ from rtshcua.model.ir.signals import SignalDecl
 Steps = Callable[[Sequence[View]], Iterable[View]]
 RENAMED = (Sort.DECLARED, Sort.PARAMETER, Sort.MEMBER, Sort.CHOICE)
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
-_DOTTED = re.compile(r"[A-Za-z_][A-Za-z0-9_]*+(?:\.[A-Za-z_][A-Za-z0-9_]*+)*+", re.ASCII)
 _TAKEN = ("phase", "local")
 """Names that would be read as words where values stand."""
 _READ = dict.fromkeys(WELL_KNOWN, "every decision needs it") | dict.fromkeys(
@@ -173,7 +172,7 @@ def _sentinels(view: View, target: Target) -> set[str]:
 def _unfit(view: View, target: Target, name: str) -> str | None:
     declared = view.symbols.declared.get(target.name) if target.sort is Sort.DECLARED else None
     dotted = isinstance(declared, SignalDecl)
-    if not (_DOTTED if dotted else _PLAIN).fullmatch(name):
+    if not all(map(_PLAIN.fullmatch, name.split(".") if dotted else [name])):
         return f"`{name}` is no name: names are of letters, digits and `_`" + (", those of signals with dots" * dotted)
     if dotted and name in _READ:
         return f"a signal `{name}` is read by this very name: {_READ[name]}"

@@ -89,13 +89,14 @@ def read(text: str) -> Read | None:
     while True:
         match, kinds = lexers[states[-1]]
         token = match(text, end)
+        if token is None and (begin := known.skipped(text, end)) < len(text):
+            token = match(text, begin)
+            if token is None:
+                return None
         if token:
             group = token.lastindex or 0
             word, kind = token[group], kinds[group]
         else:
-            blank = known.skip.match(text, end)
-            if blank is not None and blank.end() < len(text):
-                return None
             word = kind = END
         while True:
             row = rows[states[-1]]

@@ -48,18 +48,19 @@ class Automaton:
         """Parses from `offset` on; None when the text was read to its end."""
         rows, lexers, last = self.table.rows, self.table.lexers, self.table.end
         rules, states, values, starts = self.rules, self.states, self.values, self.starts
-        text, skip = self.source.text, self.table.skip
+        text, skipped = self.source.text, self.table.skipped
         end = offset  # of the last token that was shifted
         while True:
             match, kinds = lexers[states[-1]]
             token = match(text, end)
+            if token is None and (start := skipped(text, end)) < len(text):
+                token = match(text, start)
             if token:
                 group = token.lastindex or 0
                 word, kind = token[group], kinds[group]
                 start, after = token.span(group)
             else:
-                blank = skip.match(text, end)
-                start = after = blank.end() if blank else end
+                after = start
                 word = kind = END
                 if start < len(text):
                     self.end = end

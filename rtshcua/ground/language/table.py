@@ -13,6 +13,7 @@ PATH = Path(__file__).with_name("table.json")
 END = "<END>"
 NAME = "<NAME>"
 WORD = "[A-Za-z_][A-Za-z0-9_]*"
+MAX_SKIPPED = 1000  # comments and runs of blanks that one match takes
 
 Row = dict[str, int]
 
@@ -91,6 +92,12 @@ class Table:
     words: dict[str, bool]
     skip: re.Pattern[str]
 
+    def skipped(self, text: str, offset: int) -> int:
+        """Where the comments and blanks end that begin at a place; a lexer skips at most `MAX_SKIPPED` of them."""
+        while (found := self.skip.match(text, offset)) and found.end() > offset:
+            offset = found.end()
+        return offset
+
 
 @cache
 def table() -> Table:
@@ -107,7 +114,8 @@ def table() -> Table:
 
 
 def _ignored(raw: dict[str, Any]) -> str:
-    return f"(?:{'|'.join(raw['ignored'])})*+"  # possessive: no input makes it backtrack
+    """Bounded, for each repetition of a group costs memory: `Automaton.run` goes on behind what one match skipped."""
+    return f"(?>(?:{'|'.join(raw['ignored'])}){{0,{MAX_SKIPPED}}})"
 
 
 def _lexer(raw: dict[str, Any], accepted: tuple[str, ...]) -> Lexer:

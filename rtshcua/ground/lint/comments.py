@@ -16,7 +16,8 @@ LINE, FILE = "ignore", "ignore-file"
 ASKING = "rtshcua:"
 
 _TOKEN = re.compile(
-    r'(?P<text>"(?:[^"\\\n]++|\\[^\n])*+"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)', re.DOTALL
+    r'(?P<text>"[^"\\\n]*+(?:\\[^\n][^"\\\n]*+){0,65535}"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)',
+    re.DOTALL,
 )
 _ASKED = re.compile(r"\s*rtshcua:\s*(?P<word>[^\s,]*)(?P<rest>.*)", re.DOTALL)
 

@@ -14,7 +14,7 @@ from rtshcua.ground.lint.subject import Subject
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.program import Unit
 
-_PART = re.compile(r"[a-z][a-z0-9]*+(?:_[a-z0-9]++)*+")
+_PART = re.compile(r"(?!.*__)[a-z][a-z0-9_]*+(?<!_)")
 _HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 

@@ -19,7 +19,9 @@ from rtshcua.model.ir.policies import PolicyDecl
 #: of how many differences a finding tells
 MAX_TOLD = 3
 
-_VERSION = re.compile(r"(?:\s++|//[^\n]*+|/\*.*?\*/)*+version(?:\s++|//[^\n]*+|/\*.*?\*/)*+(\d+)", re.DOTALL)
+_VERSION = re.compile(
+    r"(?>(?:\s++|//[^\n]*+|/\*.*?\*/){0,999})version(?>(?:\s++|//[^\n]*+|/\*.*?\*/){0,999})(\d+)", re.DOTALL
+)
 
 
 class Compared(NamedTuple):

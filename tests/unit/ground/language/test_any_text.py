@@ -10,11 +10,12 @@ from lark import UnexpectedInput
 
 from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.format.read import read
 from rtshcua.ground.language import generate
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.parse import parse
-from rtshcua.ground.language.table import table
+from rtshcua.ground.language.table import MAX_SKIPPED, table
 from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
@@ -159,3 +160,21 @@ def test_a_long_run_of_one_thing_ends_with_findings(before: str, part: str) -> N
 @pytest.mark.parametrize("before", BEGINNINGS)
 def test_long_runs_in_every_place_end_with_findings(before: str, part: str) -> None:
     long_run(before, part)
+
+
+@rows("between", ["/**/", "/**/ ", "// a\n", "// a\n\n", '/* \\" */\t//\n'])
+def test_any_number_of_comments_may_stand_between_two_words(between: str) -> None:
+    comments = between * (3 * MAX_SKIPPED)
+    one, other = f"skill{comments} a() {{{comments} deadline 1 s{comments}}}{comments}", "skill b() { deadline 1 s }"
+    source = f"{comments}{one}{other}{comments}"
+    found = parse(Source("x", source))
+    assert [skill.name.text for skill in found.unit.skills] == ["a", "b"]
+    assert found.diagnostics == ()
+    assert read(source) is not None
+    assert read(source + "}") is None
+
+
+def test_a_text_of_escapes_is_read() -> None:
+    text = '\\"' * 60_000
+    (mission,) = parse(Source("x", f'mission m under p@1 on v {{ intent "{text}" phase a {{ b() }} }}')).unit.missions
+    assert mission.intent == '"' * 60_000

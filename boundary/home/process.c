@@ -280,14 +280,13 @@ static int64_t own_time_us(clockid_t clock) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-/* The link's timestamps, so many ahead of what was used. */
+/* The link's timestamps: our own so many ahead of what was used, each peer's as it was last heard (signing.py says why). */
 static void gather(rt_kept *kept, int64_t ahead) {
     rt_signed_link *link = &boundary.executor.gate.signer;
     if (!boundary.executor.gate.signs) return; /* what was kept of the link stays, for a start that has its key */
     kept->link_timestamp = rt_signed_up_to(link) + ahead;
     kept->stream_count = link->stream_count;
     memcpy(kept->streams, link->streams, sizeof kept->streams);
-    for (uint64_t each = 0; each < kept->stream_count; each++) kept->streams[each].last += ahead;
     link->news = false;
 }
 

@@ -12,6 +12,11 @@ from rtshcua.onboard.enforcement.isolated import IsolatedGate
 from rtshcua.onboard.rehearsal import unheard
 
 _RADIO = "the policy reads RADIO_STATUS, which radios do not sign: it is not known without `--unsigned-radio`"
+_OUTDATED = (
+    "Either they are repeated, or the vehicle's signing clock is behind; our heartbeat goes out and sets it. If the "
+    "vehicle does not hear us here, connect over a cable for a moment: "
+    "`rtshcua doctor --connect serial:DEVICE:BAUD --signing-key FILE`"
+)
 #: messages that nobody signs
 _UNSIGNED = frozenset({"RADIO_STATUS"})
 
@@ -85,6 +90,8 @@ class Signing:
             (counts.strayed + counts.crowded, "of another link"),
         )
         told = ", ".join(f"{count} {what}" for count, what in why if count)
+        if counts.stale:
+            told += f". {_OUTDATED}"
         return f"frames come, and none is believed: {told}" if told else None
 
     def close(self) -> None:

@@ -7,7 +7,7 @@ can make the link look worse, never better. It is let in only where the operator
 from typing import Any, Final
 
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
-from rtshcua.mavlink.signing import Verifier
+from rtshcua.mavlink.signing import Counts, Verifier
 
 RADIO_STATUS: Final = 109
 #: who a SiK radio says that it is: `RADIO_SOURCE_SYSTEM` '3' and `RADIO_SOURCE_COMPONENT` 'D' of ArduPilot/SiK,
@@ -29,6 +29,10 @@ class UnsignedRadio:
         self._now: dict[str, int] = {}  # the worst since `_since_us`,
         self._before: dict[str, int] = {}  # and in the span before it
         self._since_us: int | None = None
+
+    @property
+    def counts(self) -> Counts:
+        return self._link.counts
 
     def accept(self, frame: bytes, now_us: int) -> bool:
         """Whether a frame may come in."""

@@ -31,7 +31,7 @@ MOST_AHEAD: Final = _SECOND
 #: as many as the C library keeps (MAVLINK_MAX_SIGNING_STREAMS)
 MOST_STREAMS: Final = 16
 #: Timestamps have 48 bits, until 2104; what claims the last year is believed no more, so that ours never run out.
-_LAST: Final = (1 << 48) - 366 * 24 * 60 * MINUTE
+LAST: Final = (1 << 48) - 366 * 24 * 60 * MINUTE
 
 _TAG: Final = 6
 _STAMP: Final = 6
@@ -66,7 +66,12 @@ class Counts:
 
 
 class Verifier(Protocol):
-    """Says whether a frame proves where it comes from."""
+    """Says whether a frame proves where it comes from. `counts`: what became of those that came."""
+
+    @property
+    def counts(self) -> Counts:
+        """How many were accepted, and why others were not."""
+        ...
 
     def accept(self, frame: bytes, now_us: int) -> bool:
         """Whether a frame with a right checksum may be taken in at a monotonic time."""
@@ -100,9 +105,15 @@ class SignedLink:
         self._own: Stream | None = None
         recent = [stream for stream, last in stored.streams.items() if last >= self._ahead - MINUTE]
         self._heard_by = {stream[:2]: stream[2] for stream in sorted(recent, key=stored.streams.__getitem__)}
-        self.counts = Counts()
+        self._counts = Counts()
         #: called when there is more to keep than time going by: a stream that is new, or a leap of the local time
         self.on_news: Callable[[], object] = lambda: None
+        #: called with the stream and the timestamp of each frame that is accepted
+        self.on_heard: Callable[[Stream, int], object] = lambda stream, timestamp: None
+
+    @property
+    def counts(self) -> Counts:
+        return self._counts
 
     @property
     def state(self) -> State:
@@ -139,18 +150,18 @@ class SignedLink:
         """Whether a whole frame with a right checksum may come in at a monotonic time; only then is it remembered."""
         # 1. it is signed
         if not frame[FLAGS] & FLAG_SIGNED:
-            self.counts.unsigned += 1
+            self._counts.unsigned += 1
             return False
         # 2. "Computed 48 bit signature does not match": before anything that it says is believed
         if not hmac.compare_digest(self._tag(frame[:-_TAG]), frame[-_TAG:]):
-            self.counts.forged += 1
+            self._counts.forged += 1
             return False
         # 3. it is not one of ours, sent back to us, nor one that its sender sent on another link: it signs there too,
         #    and what was overheard there would be news here for a minute
         stream = stream_of(frame)
         astray = not self._as_library and self._heard_by.get(stream[:2], stream[2]) != stream[2]
         if stream == self._own or astray:
-            self.counts.strayed += 1
+            self._counts.strayed += 1
             return False
         # 4. "Timestamp is older than the previous packet from the same logical stream", or the same: a replay;
         #    "more than 1 minute (6,000,000) behind the local system's timestamp"
@@ -158,18 +169,19 @@ class SignedLink:
         local = max(self._ahead, self._clock(now_us))
         last = self._streams.get(stream, -1)
         least = local - MINUTE if last < 0 or not self._as_library else 0
-        if timestamp <= last or timestamp < least or timestamp > _LAST:
-            self.counts.stale += 1
+        if timestamp <= last or timestamp < least or timestamp > LAST:
+            self._counts.stale += 1
             return False
         if not self._has_room(stream, local):
-            self.counts.crowded += 1
+            self._counts.crowded += 1
             return False
         # 5. "the timestamp should be replaced by the timestamp of the incoming message if that is greater"
         is_news = stream not in self._streams or timestamp > local + _SECOND
         self._streams[stream] = timestamp
         self._heard_by[stream[:2]] = stream[2]
         self._ahead = max(self._ahead, timestamp)
-        self.counts.accepted += 1
+        self._counts.accepted += 1
+        self.on_heard(stream, timestamp)
         if is_news:
             self.on_news()
         return True

@@ -2,14 +2,21 @@
 
 import os
 import signal
+import time
 from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from boundary import kept as keeping
 from boundary.together import PIN, SIGNED_ROOT
-from reference.world import START, VEHICLE, sealed
+from reference.world import MISSION, POLICY, START, VEHICLE, sealed
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
+from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.onboard.enforcement.isolated import Caller
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State, timestamp_in, timestamp_of
+from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.onboard.enforcement.isolated import Caller, IsolatedGate
 
 
 def link_after(state: Path, key: Path | None) -> keeping.LinkState:
@@ -40,3 +47,33 @@ def test_a_mission_that_another_bundle_gave_back_stays_given_back_when_it_is_kil
     os.kill(process.pid, signal.SIGKILL)
     process.close()
     assert not keeping.read(kept_file(tmp_path, VEHICLE)).opened
+
+
+@pytest.mark.parametrize("heard", [1, 40])
+def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_believed(
+    tmp_path: Path, heard: int
+) -> None:
+    """ArduPilot's timestamp rises by one a frame: what is kept of it must not be ahead of what was heard."""
+    key = tmp_path / "link.key"
+    key.write_bytes(bytes(range(32)))
+    key.chmod(0o600)
+    vehicle = SignedLink(key.read_bytes(), State(timestamp_of(time.time_ns() // 1_000), {}), EPOCH_US, 0)
+    beat = Codec(1, 1).pack(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3))
+
+    def begin() -> tuple[BoundaryProcess, IsolatedGate]:
+        process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, tmp_path, link_key=key, paced=True)
+        return process, IsolatedGate(Caller(process.call, signs=True), Commands(POLICY, MISSION))
+
+    process, gate = begin()
+    frames = [vehicle.sign(beat, 0) for _ in range(heard)]
+    now_us = time.monotonic_ns() // 1_000
+    assert all(gate.accept(frame, now_us) for frame in frames)
+    while keeping.read(kept_file(tmp_path, VEHICLE)).link.streams.get((1, 1, 0), 0) < timestamp_in(frames[0]):
+        gate.accept(frames[0], time.monotonic_ns() // 1_000)  # a replay; each call lets it keep what is due
+    os.kill(process.pid, signal.SIGKILL)
+    process.close()
+    process, gate = begin()
+    now_us = time.monotonic_ns() // 1_000
+    assert not gate.accept(frames[0], now_us)
+    assert gate.accept(vehicle.sign(beat, 0), now_us)
+    process.close()

@@ -18,7 +18,7 @@ UTC_US = 1_767_225_600_000_000
 AUTOPILOT = {"px4": 12, "ardupilot": 3}
 NEW = State(0, {})
 PLAIN = (int, float, str, bytes, type(None))
-COUNTED = ("counts", "damaged", "refused", "unknown", "foreign", "_policy")
+COUNTED = ("counts", "_counts", "damaged", "refused", "unknown", "foreign", "_policy")
 #: that another vehicle is heard, before a flight, is for people to know, and believed of nobody: `VehicleLink.crowd`
 TOLD = ("crowd",)
 

@@ -2,25 +2,32 @@
 
     FILE                                                       the key: 32 octets, or 64 hexadecimal digits; mode 0600
     <state folder>/link/vehicle-<identity>/<fingerprint>       JSON: the local timestamp, and each stream's last one
+    memory (`adapters.store.memory`)                           each stream's last one, after each frame
 
-"The current timestamp should be stored regularly in persistent storage" (guide, "Timestamp Handling"). What is stored
-lies `RESERVE_S` ahead of what was used, and is stored again every `EVERY_S`, and when a peer's frame makes our time
-leap, by a thread of its own: nothing that flies may wait for a disk. So after a crash the first timestamp is above all
-that were sent, and what was heard before is not heard again. An orderly end stores the exact figures.
+"The current timestamp should be stored regularly in persistent storage" (guide, "Timestamp Handling"). Our own is
+stored `RESERVE_S` ahead of what was used, again every `EVERY_S`, and when a peer's frame makes our time leap, by a
+thread of its own: nothing that flies may wait for a disk. So after a crash our first timestamp is above all that we
+sent. A peer's last timestamp is kept as it was, never ahead: ArduPilot counts one a frame, so a reserve of 3 s would
+refuse it for an hour. After a crash of the process at most one frame can be heard again, after one of the machine those
+of the last `EVERY_S`. An orderly end stores the exact figures.
 """
 
 import hashlib
 import json
+import mmap
 import os
+import struct
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 from urllib.parse import quote
 
+from rtshcua.adapters.store.memory import memory_file, open_memory
 from rtshcua.adapters.store.reading import exposed, open_regular, read_if_there
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, lock, make_folder, replace, write_new
-from rtshcua.mavlink.signing import KEY_OCTETS, UNIT_US, SignedLink, State
+from rtshcua.mavlink.signing import KEY_OCTETS, LAST, MOST_STREAMS, UNIT_US, SignedLink, State, Stream
 
 EVERY_S: Final = 1.0
 RESERVE_S: Final = 3.0
@@ -80,6 +87,60 @@ def fingerprint(key: bytes) -> str:
     return hashlib.sha256(b"rtshcua/link-key\0" + key).hexdigest()[:16]
 
 
+class HeardStamps:
+    """The last timestamp of each stream, in memory that outlives this process; nothing where there is none."""
+
+    _SLOT: Final = struct.Struct("<BBB5xQ")  # system, component, link; the timestamp, 0 in a slot that is free
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._memory: mmap.mmap | None = None
+        self._slots: dict[Stream, int] = {}
+
+    def load(self) -> dict[Stream, int]:
+        """What an earlier process left there."""
+        if self._memory is None and memory_file(self._name).exists():
+            self._memory = self._open()
+        if self._memory is None:
+            return {}
+        return {(a, b, c): last for a, b, c, last in self._SLOT.iter_unpack(self._memory[:]) if 0 < last <= LAST}
+
+    def start(self, streams: dict[Stream, int]) -> None:
+        """Remember these, and nothing else."""
+        self._memory = self._memory or self._open()
+        if self._memory is None:
+            return
+        newest = sorted(streams, key=streams.__getitem__, reverse=True)[:MOST_STREAMS]
+        self._slots = {stream: slot for slot, stream in enumerate(newest)}
+        for slot in range(MOST_STREAMS):
+            stream = newest[slot] if slot < len(newest) else (0, 0, 0)
+            self._SLOT.pack_into(self._memory, slot * self._SLOT.size, *stream, streams.get(stream, 0))
+
+    def remember(self, stream: Stream, timestamp: int) -> None:
+        """A frame of this stream was believed. Another stream than those known takes the place of the oldest."""
+        memory, size = self._memory, self._SLOT.size
+        if memory is None:
+            return
+        slot = self._slots.get(stream)
+        if slot is None:
+            lasts = [last for *_, last in self._SLOT.iter_unpack(memory[:])]
+            slot = lasts.index(min(lasts))
+            self._slots = {each: place for each, place in self._slots.items() if place != slot} | {stream: slot}
+        self._SLOT.pack_into(memory, slot * size, *stream, timestamp)
+
+    def _open(self) -> mmap.mmap | None:
+        return open_memory(self._name, MOST_STREAMS * self._SLOT.size)
+
+    def close(self, *, forget: bool) -> None:
+        """Give the memory back; `forget` it where all of it is on the disk."""
+        if self._memory is not None:
+            self._memory.close()
+            self._memory = None
+            if forget:
+                with suppress(OSError):
+                    memory_file(self._name).unlink()
+
+
 class LinkStore:
     """The state of one key on one vehicle. Held by one process at a time, until it is closed or dies."""
 
@@ -92,6 +153,8 @@ class LinkStore:
             self._lock = lock(self.path.with_suffix(".lock"))
         except BlockingIOError:
             raise LinkKeyError(IN_USE, f"another run signs for `{vehicle}` with this key") from None
+        self.heard = HeardStamps(hashlib.sha256(os.fsencode(self.path.absolute())).hexdigest()[:16])
+        self._exact = False  # the file has all that `heard` has
 
     def load(self) -> State:
         """What was kept; nothing for a new key. Raises LinkKeyError (`damaged`), and OSError."""
@@ -101,19 +164,24 @@ class LinkStore:
         try:
             kept = json.loads(data)
             streams = {(int(a), int(b), int(c)): int(last) for a, b, c, last in kept["streams"]}
+            heard = self.heard.load()
+            streams |= {each: max(last, streams.get(each, 0)) for each, last in heard.items()}
             return State(int(kept["timestamp"]), streams)
         except (ValueError, TypeError, KeyError):
             text = f"`{self.path}` is damaged: which timestamps the link used is not known"
             raise LinkKeyError("damaged", text, "a new key on both ends; `rtshcua keys link` makes one") from None
 
     def save(self, state: State, ahead: int = 0) -> None:
-        """Keep a state, all of it so many timestamps ahead. Raises OSError."""
-        streams = [[*stream, last + ahead] for stream, last in sorted(state.streams.items())]
+        """Keep a state, our own timestamp so many ahead. Raises OSError."""
+        self._exact = False
+        streams = [[*stream, last] for stream, last in sorted(state.streams.items())]
         kept = json.dumps({"timestamp": state.timestamp + ahead, "streams": streams})
         replace(self.path, kept.encode() + b"\n", mode=PRIVATE_FILE)
+        self._exact = not ahead
 
     def close(self) -> None:
         """Let another run have it."""
+        self.heard.close(forget=self._exact)
         os.close(self._lock)
 
 
@@ -131,8 +199,11 @@ class LinkKeeper:
         self._ahead = us_in(RESERVE_S) // UNIT_US
         self._due = threading.Event()
         self._over = False
-        self._store.save(link.state, self._ahead)
+        state = link.state
+        self._store.save(state, self._ahead)
+        store.heard.start(dict(state.streams))
         link.on_news = self._due.set
+        link.on_heard = store.heard.remember
         self._thread = threading.Thread(target=self._keep, name="link keeper", daemon=True)
         self._thread.start()
 

@@ -76,7 +76,7 @@ class ConnectedVehicle:
         if self._peer is not None and not transport.is_open(self._peer):
             self._peer = None
         if transport.begins and self._peer is None:
-            self._greet(now_us)
+            self._greet(now_us, None)
         links = transport.readable()
         came = bool(select.select(links, [], [], 0)[0])
         if came:  # before the driver is told the time: it must not take for silence that nobody looked
@@ -134,8 +134,11 @@ class ConnectedVehicle:
         if self._peer is not None and sender != self._peer:
             self.driver.overhear(datagram, now_us)
             return now_us
+        outdated = self.driver.link.outdated
         heard = self.driver.receive(datagram, now_us)
         if self._peer is None:
+            if self.driver.link.outdated > outdated:
+                self._greet(now_us, sender)  # the time stamp of our heartbeat sets its clock; a replay gains nothing
             if self.driver.flavour is None:
                 self._look(datagram)
                 return now_us
@@ -160,13 +163,13 @@ class ConnectedVehicle:
         utc_us = self._clock.now().utc_us
         self._unkept += [(utc_us, frame) for frame in frames]
 
-    def _greet(self, now_us: int) -> None:
-        """Speak first: over this transport a vehicle may wait for it. Not kept: it is to nobody yet."""
+    def _greet(self, now_us: int, to: Hashable | None) -> None:
+        """Speak before anybody is believed, at most once a heartbeat. Not kept: it is to nobody yet."""
         if self._greeted_us is not None and now_us - self._greeted_us < HEARTBEAT_US:
             return
         self._greeted_us = now_us
         for frame in self.driver.link.greet(now_us):
-            self._transport.send(frame, None)
+            self._transport.send(frame, to)
 
     def _look(self, datagram: bytes) -> None:
         """What there is in a datagram that tells of no vehicle."""

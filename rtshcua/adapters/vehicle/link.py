@@ -72,6 +72,13 @@ class VehicleLink:
         # with a key, a second sender of the vehicle's own frames is nobody: at most it repeats them
         self._others = others, Codec(0, 0) if self._verifier is None else others
 
+    @property
+    def outdated(self) -> int:
+        """How many frames were signed with the link's key, and are too old to be believed. An autopilot whose signing
+        clock is behind sends such until it hears a later timestamp: ArduPilot's counts frames while it hears nobody.
+        """
+        return 0 if self._verifier is None else self._verifier.counts.stale
+
     def greet(self, now_us: int) -> list[bytes]:
         """Our heartbeat to a vehicle that waits to be spoken to, before it is known which one it is. It is of the
         system that was named, or of the one that autopilots are delivered as.

@@ -200,9 +200,13 @@ class IsolatedGate:
         self._caller = caller
         #: what leaves when it is lost
         self.ahead = FramesAhead(commands, caller.ahead)
-        #: what came, by what the boundary made of it
-        self.counts = Counts()
+        self._counts = Counts()
         self._heard: dict[Stream, tuple[int, int]] = {}  # the last timestamp of what was verified, and when it came
+
+    @property
+    def counts(self) -> Counts:
+        """What came, by what the boundary made of it."""
+        return self._counts
 
     def stands(self, now_us: int) -> bool:
         """Whether the vehicle is known to be on the ground, disarmed, and nothing permitted is under way."""
@@ -216,7 +220,7 @@ class IsolatedGate:
     def accept(self, frame: bytes, now_us: int) -> bool:
         """Whether a frame proves where it comes from; one that does is observed at once."""
         if not frame[FLAGS] & FLAG_SIGNED:
-            self.counts.unsigned += 1
+            self._counts.unsigned += 1
             return False
         answer = self._caller(OBSERVE, _TIME.pack(now_us), frame)
         if self._caller.lost:
@@ -224,7 +228,7 @@ class IsolatedGate:
         names = ("accepted", "unsigned", "forged", "strayed", "stale", "crowded")
         if isinstance(answer, Refusal) or len(answer) != 1 or answer[0] >= len(names):
             return False
-        setattr(self.counts, names[answer[0]], getattr(self.counts, names[answer[0]]) + 1)
+        setattr(self._counts, names[answer[0]], getattr(self._counts, names[answer[0]]) + 1)
         if answer[0] == 0:
             self._heard[stream_of(frame)] = timestamp_in(frame), now_us
         return answer[0] == 0
@@ -236,10 +240,10 @@ class IsolatedGate:
         stream, timestamp = stream_of(frame), timestamp_in(frame)
         last, heard_us = self._heard.get(stream, (None, 0))
         if last is None or not last < timestamp <= last + MINUTE + (now_us - heard_us) // UNIT_US:
-            self.counts.stale += 1
+            self._counts.stale += 1
             return False
         self._heard[stream] = timestamp, now_us
-        self.counts.unverified += 1
+        self._counts.unverified += 1
         return True
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:

@@ -213,7 +213,7 @@ def test_a_later_frame_takes_the_local_time_with_it_and_a_refused_one_does_not()
 def test_timestamps_never_run_out() -> None:
     ours = link()
     assert not ours.accept(at((1 << 48) - 2), 0)
-    assert ours.accept(at(signing._LAST), 0)
+    assert ours.accept(at(signing.LAST), 0)
     ours.sign(frame(), 0)
 
 

@@ -16,6 +16,7 @@ from rtshcua.adapters.files.signing import (
     read_link_key,
     write_link_key,
 )
+from rtshcua.adapters.store import memory
 from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State, timestamp_of
 
 KEY = bytes(range(32))
@@ -35,6 +36,10 @@ def us_in(seconds: float) -> int:
 
 def a_frame() -> bytes:
     return bytes([0xFD, 1, 0, 0, 0, 1, 191, 0, 0, 0, 7, 0, 0])
+
+
+def a_vehicles_frame() -> bytes:
+    return bytes([0xFD, 1, 0, 0, 0, 1, 1, 0, 0, 0, 7, 0, 0])
 
 
 def slug(act: Callable[[], object]) -> str:
@@ -92,7 +97,7 @@ def test_what_was_saved_is_loaded_by_vehicle_and_key(tmp_path: Path) -> None:
     store.save(STATE)
     assert store.load() == STATE
     store.save(STATE, ahead=5)
-    assert store.load() == State(82, {(1, 1, 0): 75, (1, 68, 2): 65})
+    assert store.load() == State(82, STATE.streams), "the reserve is for our own timestamp"
     for other in (LinkStore(tmp_path, "quad-08", KEY), LinkStore(tmp_path, "quad/07", bytes(32))):
         assert other.load() == State(0, {})
         other.close()
@@ -136,6 +141,74 @@ def test_after_a_crash_no_timestamp_comes_again_and_nothing_old_is_heard(tmp_pat
     keeper.close()
 
 
+@pytest.mark.parametrize("moment", range(0, 150, 3))
+def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_believed(
+    tmp_path: Path, moment: int
+) -> None:
+    """ArduPilot's timestamp rises by one a frame (recorded), so one second of frames is a millisecond of timestamps."""
+    store = LinkStore(tmp_path, "quad-07", KEY)
+    link = SignedLink(KEY, store.load(), UTC, 0)
+    vehicle = SignedLink(KEY, State(timestamp_of(UTC) + 6_000_000, {}), EPOCH_US, 0, as_library=True)
+    keeper = LinkKeeper(store, link, us_in)
+    heard = [vehicle.sign(a_vehicles_frame(), 0) for _ in range(moment)]
+    assert all(link.accept(frame, 10_000 * at) for at, frame in enumerate(heard))
+    left = store.load()  # here it is killed: what lies in memory and on the disk is all that is left
+    after = SignedLink(KEY, left, UTC + 10_000 * moment, 0)
+    assert not any(after.accept(frame, 0) for frame in heard)
+    assert after.accept(vehicle.sign(a_vehicles_frame(), 0), 0)
+    keeper.close()
+
+
+def test_without_memory_that_outlives_the_process_the_disk_is_at_most_a_second_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "_FOLDER", tmp_path / "none")
+    store = LinkStore(tmp_path, "quad-07", KEY)
+    link = SignedLink(KEY, store.load(), UTC, 0)
+    vehicle = SignedLink(KEY, State(timestamp_of(UTC), {}), EPOCH_US, 0, as_library=True)
+    first, *others = (vehicle.sign(a_vehicles_frame(), 0) for _ in range(5))
+    assert link.accept(first, 0)
+    keeper = LinkKeeper(store, link, us_in)
+    assert all(link.accept(frame, 0) for frame in others)
+    after = SignedLink(KEY, store.load(), UTC, 0)
+    assert not after.accept(first, 0)
+    assert after.accept(others[-1], 0)
+    keeper.close()
+
+
+@pytest.mark.parametrize("there", ["a link", "a folder", "two names"])
+def test_memory_of_somebody_else_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: str) -> None:
+    monkeypatch.setattr(memory, "_FOLDER", tmp_path)
+    target, path = tmp_path / "target", memory.memory_file("name")
+    target.write_bytes(b"as it was")
+    match there:
+        case "a link":
+            path.symlink_to(target)
+        case "a folder":
+            path.mkdir()
+        case "two names":
+            path.hardlink_to(target)
+    assert memory.open_memory("name", 256) is None
+    assert target.read_bytes() == b"as it was"
+
+
+def test_memory_keeps_the_newest_streams_and_is_given_back_at_an_orderly_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "_FOLDER", tmp_path)
+    many = {(1, component, 0): 100 + component for component in range(20)}
+    heard = signing.HeardStamps("name")
+    heard.start(many)
+    heard.remember((1, 200, 0), 500)
+    heard.remember((1, 19, 0), 501)
+    heard.close(forget=False)
+    again = signing.HeardStamps("name")
+    assert again.load() == {(1, each, 0): 100 + each for each in range(5, 19)} | {(1, 200, 0): 500, (1, 19, 0): 501}
+    again.close(forget=True)
+    again.remember((1, 1, 1), 7)  # too late: nothing happens
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_orderly_end_keeps_the_exact_state(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, State(5, {}), 0, 0)
@@ -167,7 +240,7 @@ def test_a_leap_of_time_is_kept_at_once(tmp_path: Path) -> None:
     assert link.accept(later.sign(a_frame(), 0), 0)
     while store.load().timestamp != 10_000_001 + 300_000:
         keeper._thread.join(0.001)
-    assert store.load().streams == {(1, 191, 0): 10_000_001 + 300_000}
+    assert store.load().streams == {(1, 191, 0): 10_000_001}
     keeper.close()
 
 

@@ -13,6 +13,7 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.codec.frames import Codec
+from rtshcua.mavlink.signing import EPOCH_US, MINUTE, SignedLink, State, timestamp_of
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -115,6 +116,37 @@ def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
     vehicle.send(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, 57))
     (readings,) = [event for event in poll(link) if isinstance(event, Readings)]
     assert readings.values == ((BATTERY, 5_700),)
+
+
+@pytest.mark.parametrize("key", ["the link's", "another"])
+def test_a_vehicle_whose_signing_clock_is_behind_is_greeted_and_then_believed(key: str) -> None:
+    """ArduPilot that heard nobody for over a minute: it counts frames, and takes a later timestamp."""
+    now, frames = SystemClock().now(), FrameSession()
+    ours = SignedLink(bytes(range(32)), State(0, {}), now.utc_us, now.monotonic_us)
+    theirs = SignedLink(
+        bytes(range(32)) if key == "the link's" else bytes(32), State(timestamp_of(now.utc_us) - 2 * MINUTE, {}),
+        EPOCH_US, 0, as_library=True,
+    )  # fmt: skip
+    frames.sign_with(ours)
+    transport = UdpTransport(HERE, 0, begins=False)
+    link = ConnectedVehicle(transport, Driver(POLICY, frames, verifier=ours), SystemClock(), lambda utc_us, frame: None)
+    vehicle = Peer(transport.port)
+    beat = vehicle.codec.pack(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3))
+    for _ in range(3):
+        vehicle.socket.send(theirs.sign(beat, 0))
+        poll(link)
+    assert link.driver.flavour is None
+    if key == "another":
+        vehicle.socket.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            vehicle.socket.recv(65_535)
+    else:
+        assert theirs.accept(vehicle.socket.recv(65_535), 0), "one heartbeat a second is enough"
+        vehicle.socket.send(theirs.sign(beat, 0))
+        poll(link)
+        assert link.driver.flavour is not None
+    link.close()
+    vehicle.socket.close()
 
 
 def test_what_is_sent_is_kept_and_told(link: ConnectedVehicle, vehicle: Peer) -> None:

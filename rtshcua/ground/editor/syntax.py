@@ -11,7 +11,7 @@ from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.program import Unit
 
 _TOKEN = re.compile(
-    r"""(?P<comment>//[^\n]*+|/\*(?s:.)*?(?:\*/|\Z)) | (?P<string>"[^"\\\n]*+(?:\\.[^"\\\n]*+){0,65535}"?)
+    r"""(?P<comment>//[^\n]*+|/\*(?s:.)*?(?:\*/|\Z)) | (?P<string>"[^"\\\n]*+(?:\\.[^"\\\n]*+){0,999}"?)
       | (?P<time>[0-9]{1,2}:[0-9]{2}(?![0-9])) | (?P<number>[0-9][0-9_]*+(?:\.[0-9][0-9_]*+){0,63})
       | (?P<word>[A-Za-z_][A-Za-z0-9_]*+(?:\.[A-Za-z_][A-Za-z0-9_]*+){0,63})
       | (?P<mark>[<>=!]=|\.\.|[^\sA-Za-z0-9_])""",

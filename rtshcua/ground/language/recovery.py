@@ -14,7 +14,7 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.tests import Quoted
 
 _SCAN = re.compile(
-    r"""(?P<line>\n[ \t\r\f]*+) | //[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | "[^"\\\n]*+(?:\\.[^"\\\n]*+){0,65535}"?
+    r"""(?P<line>\n[ \t\r\f]*+) | //[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | "[^"\\\n]*+(?:\\.[^"\\\n]*+){0,999}"?
       | (?P<word>[A-Za-z_][A-Za-z0-9_.]*+) | (?P<open>\{) | (?P<close>\})
       | [^\n/"A-Za-z_{}]++ | (?s:.)""",
     re.VERBOSE,

@@ -16,7 +16,7 @@ LINE, FILE = "ignore", "ignore-file"
 ASKING = "rtshcua:"
 
 _TOKEN = re.compile(
-    r'(?P<text>"[^"\\\n]*+(?:\\[^\n][^"\\\n]*+){0,65535}"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)',
+    r'(?P<text>"[^"\\\n]*+(?:\\[^\n][^"\\\n]*+){0,999}"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)',
     re.DOTALL,
 )
 _ASKED = re.compile(r"\s*rtshcua:\s*(?P<word>[^\s,]*)(?P<rest>.*)", re.DOTALL)

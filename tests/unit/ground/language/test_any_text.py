@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lark import UnexpectedInput
 
-from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE
+from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE, UNCLOSED
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.read import read
 from rtshcua.ground.language import generate
@@ -175,6 +175,11 @@ def test_any_number_of_comments_may_stand_between_two_words(between: str) -> Non
 
 
 def test_a_text_of_escapes_is_read() -> None:
-    text = '\\"' * 60_000
+    text = '\\"' * 900
     (mission,) = parse(Source("x", f'mission m under p@1 on v {{ intent "{text}" phase a {{ b() }} }}')).unit.missions
-    assert mission.intent == '"' * 60_000
+    assert mission.intent == '"' * 900
+
+
+def test_a_text_of_more_escapes_than_are_read_is_refused() -> None:
+    (found,) = parse(Source("x", 'import "' + '\\"' * 1_000 + '"')).diagnostics
+    assert found.code is UNCLOSED

@@ -19,8 +19,8 @@ from rtshcua.diagnostics.codes import IMPORT_PATH, TOO_LARGE, UNKNOWN_IGNORE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import MOST_TEXT, render_one
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.checker.features import Refused
 from rtshcua.ground.checker.geojson import read_area
+from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.elaborate import elaborate
 from rtshcua.ground.format import attempt as attempting

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from rtshcua.ground.checker.features import Refused
 from rtshcua.ground.checker.geojson import GeoPolygon, read_area
+from rtshcua.ground.checker.refused import Refused
 from rtshcua.model.ir.places import GeoJson
 
 

@@ -1,26 +1,25 @@
 """Which geometry of a GeoJSON text is meant: RFC 7946, sections 2, 3.2 and 3.3."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from rtshcua.diagnostics import codes
-from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.suggest import nearest
+from rtshcua.ground.checker.refused import Refused
+from rtshcua.ground.checker.unread import refuse_unread
 
 AREAS = ("Polygon", "MultiPolygon")
 #: RFC 7946, 1.4
 GEOMETRIES = ("Point", "MultiPoint", "LineString", "MultiLineString", *AREAS, "GeometryCollection")
-#: the one reference system of RFC 7946, 4, as files name it that were written before it
-_CRS84 = ("urn:ogc:def:crs:OGC:1.3:CRS84", "urn:ogc:def:crs:OGC::CRS84")
+#: the one reference system of RFC 7946, 4, as files name it that were written before it. The register of EPSG has the
+#: latitude of 4326 first; GeoJSON has the longitude first, whatever a `crs` says (GeoJSON 2008, 2.1.1)
+_WGS84 = re.compile(
+    r"urn:ogc:def:crs:OGC:[0-9.]*:CRS84|OGC:CRS84|(?:urn:ogc:def:crs:)?EPSG:(?:[0-9.]*:)?4326"
+    r"|https?://www\.opengis\.net/(?:def/crs/OGC/1\.3/CRS84|def/crs/EPSG/0/4326|gml/srs/epsg\.xml#4326)|WGS ?84",
+    re.IGNORECASE,
+)
 MOST_NAMED = 5
-
-
-class Refused(Exception):
-    """The text has no such area: what is wrong, and what would help."""
-
-    def __init__(self, code: Code, message: str, help: str | None = None) -> None:
-        super().__init__(message)
-        self.code, self.message, self.help = code, message, help
 
 
 def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
@@ -41,6 +40,7 @@ def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
         return _geometry(tree, "")
     if feature is not None:
         raise Refused(codes.GEOJSON_SHAPE, f"it is a {kind}, and has no features", "leave out `feature`")
+    refuse_unread(tree)
     return _area(tree, "")
 
 
@@ -59,6 +59,7 @@ def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], s
         found = [number for number, each in enumerate(features) if feature in _names(each)]
         what = f"are called `{feature}`"
     if len(found) == 1:
+        refuse_unread(tree)
         return _geometry(features[found[0]], f"/features/{found[0]}")
     if feature is not None and not found:
         raise Refused(codes.GEOJSON_SHAPE, f"none of its features is called `{feature}`", _known(features, feature))
@@ -72,6 +73,7 @@ def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], s
 def _geometry(feature: dict[str, Any], pointer: str) -> tuple[dict[str, Any], str]:
     """RFC 7946, 3.2: a Feature's geometry is a geometry object, or null where it has no place."""
     _reference_system(feature)
+    refuse_unread(feature, pointer)
     geometry = feature.get("geometry")
     if geometry is None:
         raise Refused(codes.GEOJSON_SHAPE, f"the feature at `{pointer or '/'}` has no geometry")
@@ -94,7 +96,15 @@ def _area(geometry: Any, pointer: str) -> tuple[dict[str, Any], str]:
 
 
 def _is_area(geometry: Any) -> bool:
-    return isinstance(geometry, dict) and geometry.get("type") in AREAS
+    """Whether a zone might be meant by it: also what is refused then, such as the circles of ED-318."""
+    if not isinstance(geometry, dict):
+        return False
+    inner = geometry.get("geometries")
+    return (
+        geometry.get("type") in AREAS
+        or (geometry.get("type") == "Point" and bool(geometry.get("extent")))
+        or (geometry.get("type") == "GeometryCollection" and isinstance(inner, list) and any(map(_is_area, inner)))
+    )
 
 
 def _names(feature: dict[str, Any]) -> Iterator[str]:
@@ -124,9 +134,10 @@ def _reference_system(tree: dict[str, Any]) -> None:
     crs = tree.get("crs")
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
-    if crs is not None and name not in _CRS84:
+    if crs is not None and not (isinstance(name, str) and _WGS84.fullmatch(name)):
+        told = f", `{name}`," if isinstance(name, str) and name.isprintable() and len(name) < 80 else ""
         raise Refused(
             codes.GEOJSON_SHAPE,
-            "its coordinates are in another reference system than WGS 84",
+            f"its `crs`{told} does not name WGS 84, the one reference system of GeoJSON",
             "convert it to longitudes and latitudes in WGS 84 (RFC 7946, 4)",
         )

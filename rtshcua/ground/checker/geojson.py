@@ -14,8 +14,10 @@ from itertools import pairwise
 from typing import Any
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.features import Refused, chosen
-from rtshcua.ground.checker.polygons import Corner, crossing
+from rtshcua.ground.checker.features import chosen
+from rtshcua.ground.checker.polygons import Corner, contains, crossing, tangled
+from rtshcua.ground.checker.refused import Refused
+from rtshcua.ground.checker.unread import refuse_height
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
 #: a FeatureCollection's MultiPolygon takes nine, foreign members (RFC 7946, 6.1) may take some more
@@ -147,7 +149,32 @@ def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:
     made = [_ring(_array(ring, f"{pointer}/{i}"), f"{pointer}/{i}") for i, ring in enumerate(rings)]
     if not made:
         raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` has no ring")
+    _holes(made, pointer)
     return GeoPolygon(made[0], tuple(made[1:]))
+
+
+def _holes(rings: Sequence[GeoRing], pointer: str) -> None:
+    """RFC 7946, 3.1.6, as for a polygon in a source: all holes lie within the exterior ring, apart from each other."""
+    met = tangled(rings)
+    if met is not None:
+        (one, i), (other, j) = met
+        raise Refused(
+            codes.GEOJSON_SHAPE,
+            f"the hole at `{pointer}/{max(one, other)}` crosses or touches the ring at `{pointer}/{min(one, other)}`: "
+            f"the edge from {_written(rings[one][i])} meets the one from {_written(rings[other][j])}",
+            "a hole lies within the polygon, apart from all others",
+        )
+    for number, hole in enumerate(rings[1:], 1):
+        around = next((i for i, each in enumerate(rings[1:], 1) if i != number and contains(each, hole[0])), None)
+        if around is not None or not contains(rings[0], hole[0]):
+            where = (
+                f"outside of its polygon, `{pointer}/0`" if around is None else f"in the hole at `{pointer}/{around}`"
+            )
+            raise Refused(
+                codes.GEOJSON_SHAPE,
+                f"the hole at `{pointer}/{number}` lies {where}",
+                "a hole lies within the polygon, apart from all others",
+            )
 
 
 def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
@@ -188,7 +215,7 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
 
 
 def _position(numbers: Sequence[Any], pointer: str) -> Corner:
-    """RFC 7946, 3.1.1: longitude, latitude, and perhaps an altitude, which is not read: a zone has its floor and its
+    """RFC 7946, 3.1.1: longitude, latitude, and perhaps an altitude, which must be zero: a zone has its floor and its
     ceiling in the source. WGS 84 by section 4.
     """
     if len(numbers) < 2 or not all(isinstance(each, Number) for each in numbers):
@@ -197,6 +224,7 @@ def _position(numbers: Sequence[Any], pointer: str) -> Corner:
             f"`{pointer}` is not a position",
             "a position is a longitude and a latitude, as in `[8.5456, 47.3977]` (RFC 7946, 3.1.1)",
         )
+    refuse_height([each.text for each in numbers], pointer)
     longitude, latitude = (Decimal(each.text) for each in numbers[:2])
     north, east = latitude.copy_abs(), longitude.copy_abs()  # exact; `abs` rounds
     if north > MAX_LATITUDE or east > MAX_LONGITUDE:

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
-from rtshcua.ground.checker.features import Refused
 from rtshcua.ground.checker.geojson import GeoPolygon, read_area
+from rtshcua.ground.checker.refused import Refused
 from virtual.rows import rows
 
 SQUARE = [[8.54, 47.39], [8.55, 47.39], [8.55, 47.40], [8.54, 47.40], [8.54, 47.39]]
+INNER = [[8.5425, 47.3925], [8.5425, 47.3935], [8.5435, 47.3935], [8.5435, 47.3925], [8.5425, 47.3925]]
 HOLE = [[8.542, 47.392], [8.542, 47.394], [8.544, 47.394], [8.544, 47.392], [8.542, 47.392]]
 CORNERS = ((85400000, 473900000), (85500000, 473900000), (85500000, 474000000), (85400000, 474000000))
 HOLE_CORNERS = ((85420000, 473920000), (85420000, 473940000), (85440000, 473940000), (85440000, 473920000))
@@ -58,7 +59,7 @@ POINT = {"type": "Point", "coordinates": [8.5, 47.3]}
         (collection(feature(POINT), feature(polygon(SQUARE, HOLE)), feature(None)), None),
         (collection(feature(polygon(HOLE), id="b"), feature(polygon(SQUARE, HOLE), id="a")), "a"),
         (polygon(SQUARE[::-1], HOLE[::-1]) | {"bbox": [8, 47, 9, 48], "note": {"foreign": [True, None]}}, None),
-        (polygon([[*each, 400.5] for each in SQUARE], HOLE), None),
+        (polygon([[*each, 0.0] for each in SQUARE], HOLE), None),
         (
             collection(
                 feature(polygon(SQUARE, HOLE)),
@@ -171,15 +172,23 @@ BOW = [[8.0, 47.0], [8.1, 47.1], [8.1, 47.0], [8.0, 47.1], [8.0, 47.0]]
         (collection(feature(polygon(SQUARE), id="site")), "sit", "none of its features is called `sit`"),
         (collection(feature(polygon(SQUARE), id="a"), feature(POINT, id="a")), "a", "2 of its 2 features are called"),
         (collection(feature(POINT, id="a")), "a", "`/features/0/geometry` is a Point"),
-        (polygon(SQUARE) | {"crs": {"properties": {"name": "EPSG:2056"}}}, None, "another reference system"),
+        (polygon(SQUARE) | {"crs": {"properties": {"name": "EPSG:2056"}}}, None, "`crs`, `EPSG:2056`, does not"),
         (
-            {
-                "type": "Feature",
-                "properties": None,
-                "geometry": polygon(SQUARE) | {"crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}},
-            },
+            feature(polygon(SQUARE) | {"crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::2056"}}}),
             None,
-            "another reference system",
+            "does not name WGS 84",
+        ),
+        (polygon(SQUARE) | {"crs": {"type": "link", "properties": {"href": "x"}}}, None, "`crs` does not name WGS 84"),
+        (polygon(SQUARE, [[x + 1, y] for x, y in HOLE]), None, "`/coordinates/1` lies outside of its polygon"),
+        (polygon(SQUARE, HOLE, INNER), None, "the hole at `/coordinates/2` lies in the hole at `/coordinates/1`"),
+        (polygon(SQUARE, INNER, HOLE), None, "the hole at `/coordinates/1` lies in the hole at `/coordinates/2`"),
+        (polygon(SQUARE, [[x + 0.007, y] for x, y in HOLE]), None, "the hole at `/coordinates/1` crosses or touches"),
+        (polygon(HOLE, SQUARE), None, "the hole at `/coordinates/1` lies outside of its polygon"),
+        (polygon(SQUARE, SQUARE), None, "the hole at `/coordinates/1` crosses or touches the ring at `/coordinates/0`"),
+        (
+            {"type": "MultiPolygon", "coordinates": [[HOLE], [SQUARE, [[x + 1, y] for x, y in HOLE]]]},
+            None,
+            "the hole at `/coordinates/1/1` lies outside",
         ),
         (polygon(), None, "`/coordinates` has no ring"),
         ({"type": "Polygon"}, None, "`/coordinates` is not an array"),

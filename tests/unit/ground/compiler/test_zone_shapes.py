@@ -232,7 +232,7 @@ def test_what_a_policys_zone_is_made_of_is_imported_by_the_policy() -> None:
 
 SITE = b"""{"type": "FeatureCollection", "features": [
  {"type": "Feature", "id": "yard", "properties": {}, "geometry": {"type": "MultiPolygon", "coordinates": [
-  [[[8.544, 47.397, 408.2], [8.549, 47.397, 408.2], [8.549, 47.399, 409], [8.544, 47.399, 409], [8.544, 47.397, 408.2]],
+  [[[8.544, 47.397, 0], [8.549, 47.397, 0.0], [8.549, 47.399, -0], [8.544, 47.399, 0], [8.544, 47.397, 0]],
    [[8.545, 47.398], [8.546, 47.398], [8.546, 47.3975], [8.545, 47.3975], [8.545, 47.398]]],
   [[[8.549, 47.399], [8.550000000000123, 47.399], [8.55, 47.4], [8.549, 47.399]]]]}},
  {"type": "Feature", "properties": {"name": "mast"}, "geometry": {"type": "Point", "coordinates": [8.5455, 47.3978]}}

@@ -120,6 +120,8 @@ ARDUPILOT = AutopilotFlavour(
         (ReturnLimit("RTL_CONE_SLOPE", 1_000, returns.slope, may_be_off=True),),
         (ReturnLimit("RTL_CLIMB_MIN", 10, returns.climb), ReturnLimit("RTL_CLIMB_MIN_M", 1_000, returns.climb)),
         (ReturnLimit("WPNAV_RADIUS", 10, returns.corner), ReturnLimit("WP_RADIUS_M", 1_000, returns.corner)),
+        (returns.RTL_ALT_TYPE,),
+        (returns.RALLY_TOTAL,),
     ),
     critical_acts=False,  # a failsafe that acts changes the mode
     bytewise=False,

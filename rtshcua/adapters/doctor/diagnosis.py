@@ -13,7 +13,7 @@ from rtshcua.adapters.qualification.identity import firmware_of, those_that_matt
 from rtshcua.adapters.qualification.standing import Standing
 from rtshcua.adapters.vehicle.bounds import Reach, reach_of
 from rtshcua.adapters.vehicle.preflight import SAME_MM
-from rtshcua.adapters.vehicle.returns import Need
+from rtshcua.adapters.vehicle.returns import ONLY_ZERO, Need
 from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
 from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
@@ -443,6 +443,9 @@ def _settings(
         here = project(policy.projection, seen.latitude, seen.longitude)
         reach = reach_of(flown.invocations, policy, here)
     yield from settings_told(flavour, vehicle.parameters.values, policy, reach, vehicle.meant)
+    for names in vehicle.preflight.silent if vehicle.parameters.values else ():
+        found = f"{names} was not answered: if it has it, its way home may not be the one that is proved"
+        yield VehicleFinding("settings/unanswered", UNKNOWN, found, "an answer", "ask again, or look in its parameters")
 
 
 def settings_told(
@@ -483,6 +486,10 @@ def _setting(
         found += f"; for a flight `--set` makes it {_words(setting, meant)} ({meant:g})"
         found += ", which it is" if meant == value else f", and {value:g} again after it"
         value = meant
+    wrong = None if setting.limit is None else setting.limit.misfit(value, ONLY_ZERO)
+    if wrong is not None:
+        proved = f"what is proved of the way home is not proved of it; set `{name}` to {wrong.accepted}"
+        return _graded(slug, found, wrong.accepted, proved, warns=True)
     why = setting.warns.get(value, "")
     if why:
         better = setting.better

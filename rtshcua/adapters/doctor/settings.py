@@ -20,7 +20,7 @@ class Setting(NamedTuple):
 
     `better` is a value to set in place of those. For a number, `mm` is how many mm, or mm/s, one of it is, and `needs`
     what a policy and the reach of a mission need of it; None where nothing does. Where it is 0, `otherwise` names the
-    parameter that counts in its place.
+    parameter that counts in its place. `limit` is the rule of a choice that a run refuses where it is not 0.
     """
 
     parameter: str
@@ -31,6 +31,7 @@ class Setting(NamedTuple):
     mm: int = 0
     needs: Callable[[Policy, Reach], Need | None] = lambda _policy, _reach: None
     otherwise: str = ""
+    limit: returns.ReturnLimit | None = None
 
     @property
     def unit(self) -> str:
@@ -148,10 +149,7 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting("RTL_CONE_ANG", "degrees, half the angle of the cone in which a return is low (0: none)"),
         Setting("RTL_MIN_DIST", "how far from home a return may be low", mm=1_000, needs=_of(returns.near)),
         Setting("NAV_MC_ALT_RAD", "how near to a height it counts as there", mm=1_000, needs=_of(returns.corner)),
-        Setting(
-            "RTL_TYPE", "where a return goes", {0: "home, or a rally point that is nearer"},
-            {float(kind): "what is proved of the way home is proved of home alone" for kind in range(1, 6)}, 0,
-        ),
+        Setting("RTL_TYPE", "where a return goes", returns.RETURNS_TO, limit=returns.RTL_TYPE),
         Setting("MPC_XY_CRUISE", "speed across where a step says none", mm=1_000, needs=_speed_and_return),
         Setting("MPC_XY_VEL_MAX", "greatest speed across", mm=1_000),
         Setting("MPC_Z_VEL_MAX_UP", "greatest speed up", mm=1_000, needs=_climb),
@@ -230,10 +228,8 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         ),
         Setting("RTL_CLIMB_MIN", "climb of a return above its height", mm=10, needs=_of(returns.climb)),
         Setting("RTL_CLIMB_MIN_M", "climb of a return above its height", mm=1_000, needs=_of(returns.climb)),
-        Setting(
-            "RTL_ALT_TYPE", "height of a return counts from", {0: "home", 1: "the terrain"},
-            {1: "what is proved of the way home is proved of heights above home"}, 0,
-        ),
+        Setting("RTL_ALT_TYPE", "height of a return counts from", returns.HEIGHTS_FROM, limit=returns.RTL_ALT_TYPE),
+        Setting("RALLY_TOTAL", "rally points, to which a return may go", limit=returns.RALLY_TOTAL),
         Setting("WPNAV_RADIUS", "how near to a place it turns", mm=10, needs=_of(returns.corner)),
         Setting("WP_RADIUS_M", "how near to a place it turns", mm=1_000, needs=_of(returns.corner)),
         Setting(

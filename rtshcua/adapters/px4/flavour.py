@@ -91,6 +91,7 @@ PX4 = AutopilotFlavour(
     limits=(
         (ReturnLimit("RTL_MIN_DIST", 1_000, returns.near),),
         (ReturnLimit("NAV_MC_ALT_RAD", 1_000, returns.corner),),
+        (returns.RTL_TYPE,),
     ),
     critical_acts=True,  # since 1.15 a warning alone does not count (PX4-Autopilot pull request 22879)
     bytewise=True,

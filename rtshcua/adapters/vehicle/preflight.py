@@ -14,7 +14,7 @@ from rtshcua.adapters.vehicle.fence import Fencing, fence_of
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ReturnAltitude
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
-from rtshcua.adapters.vehicle.parameters import VehicleParameters
+from rtshcua.adapters.vehicle.parameters import RETRIES, RETRY_US, VehicleParameters
 from rtshcua.adapters.vehicle.returns import ReturnLimits
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.mission import Invocation
@@ -55,6 +55,7 @@ class Preflight:
         self._arms = (fence or judges) and bool(flavour.fence.switches and fence_of(policy, flavour.fence).items)
         self._meant = meant
         self._told = False
+        self._missed: set[str] = set()  # what limits its way home and was not answered, as far as that was told
         self._advised = 0  # what its circle was said to be set to
         self._reached: tuple[tuple[int, int], bounds.Reach] | None = None  # where it stood, and what was made of it
         self._checked_us: int | None = None
@@ -75,6 +76,13 @@ class Preflight:
             out.append(messages.command(system, messages.RUN_PREARM_CHECKS))
         if not (self.unplaced or self.astray or self.unread):  # a fence is of one place only
             out += self._fencing.due(system, now_us)
+        for names in self.silent:
+            if names not in self._missed:
+                self._missed.add(names)
+                self.notes.append(
+                    f"{names} was not answered within {RETRIES * RETRY_US // 1_000_000} s, so it counts as one that it "
+                    "does not have; if it has it, its way home may not be the one that is proved"
+                )
         if not self._told and self._fencing.unready is None:
             self._told = True
             self.notes.append(self._fencing.note)
@@ -105,6 +113,11 @@ class Preflight:
     def fencing(self) -> Fencing:
         """What becomes of its fence."""
         return self._fencing
+
+    @property
+    def silent(self) -> list[str]:
+        """Names of parameters that limit its way home, if it has them, and that were not answered."""
+        return self._limits.silent(self._parameters)
 
     @property
     def unready(self) -> str | None:

@@ -3,6 +3,7 @@ proved (`decision.volume`): docs/flying/returns.md has the sources.
 """
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
@@ -40,27 +41,75 @@ def corner(vehicle: Vehicle) -> Need | None:
     return Need(most=SHORT) if vehicle.return_altitude else None
 
 
+def plain(vehicle: Vehicle) -> Need | None:
+    """A choice of which only 0 is proved: heights above home, a way to home, no rally points."""
+    return ONLY_ZERO if vehicle.return_altitude else None
+
+
+ONLY_ZERO: Final = Need(0, 0)
+
+
+class Wrong(NamedTuple):
+    """A value that does not fit: the parameter, what it is, and what is accepted, in words and as a value to set."""
+
+    parameter: str
+    is_now: str
+    accepted: str
+    proved: str  # what of the way home would be otherwise
+
+    @property
+    def text(self) -> str:
+        """What is wrong, and what to do."""
+        name = self.parameter
+        return f"its way home would not be {self.proved} (`{name}` is {self.is_now}): set `{name}` to {self.accepted}"
+
+
 class ReturnLimit(NamedTuple):
-    """A parameter, the mm in one of its units, what is needed of it, and whether 0 is none and always good."""
+    """A parameter, the mm in one of its units (a choice or a count: 1), what is needed of it, and whether 0 is none and
+    always good. A choice has `words` for its values. `proved` is what it would make otherwise than is proved.
+    """
 
     parameter: str
     mm: int
     need: Callable[[Vehicle], Need | None]
     may_be_off: bool = False
+    words: Mapping[float, str] = MappingProxyType({})
+    proved: str = "at the height that is proved"
 
-    def wrong(self, value: float, vehicle: Vehicle) -> str | None:
-        """What is wrong with its value, and what to set it to, in words."""
-        need, has = self.need(vehicle), quantise(value, self.mm, 1)
-        if need is None or (self.may_be_off and value == 0):
-            return None
+    def wrong(self, value: float, vehicle: Vehicle) -> Wrong | None:
+        """What is wrong with its value for the vehicle of a policy."""
+        need = self.need(vehicle)
+        return None if need is None or (self.may_be_off and value == 0) else self.misfit(value, need)
+
+    def misfit(self, value: float, need: Need) -> Wrong | None:
+        """What is wrong with its value where this is needed."""
+        has = quantise(value, self.mm, 1)
         least, most = need
         if has is not None and (least is None or has >= least) and (most is None or has <= most):
             return None
-        wanted = f"at most {(most or 0) // self.mm}" if least is None else f"at least {-(-least // self.mm)}"
-        return (
-            f"its way home would not be at the height that is proved (`{self.parameter}` is {value:g}): set "
-            f"`{self.parameter}` to {wanted}"
-        )
+        if least == most:
+            accepted = self._told((least or 0) / self.mm)
+        else:
+            accepted = f"at most {(most or 0) // self.mm}" if least is None else f"at least {-(-least // self.mm)}"
+        return Wrong(self.parameter, self._told(value), accepted, self.proved)
+
+    def _told(self, value: float) -> str:
+        return f"{value:g}, {self.words[value]}" if value in self.words else f"{value:g}"
+
+
+#: PX4 and ArduCopter: to a rally point instead of home, along a mission, above the terrain
+ELSEWHERE: Final = "to the place that is proved"
+ABOVE_HOME: Final = "at heights above home, as is proved"
+RETURNS_TO: Final[Mapping[float, str]] = MappingProxyType({
+    0: "home, or a rally point that is nearer", 1: "a rally point or a mission's landing", 2: "along the mission",
+    3: "the shortest of rally point, mission and home", 4: "as is shorter, home or along the mission",
+    5: "a rally point or a landing that is safe",
+})  # fmt: skip
+HEIGHTS_FROM: Final[Mapping[float, str]] = MappingProxyType({0: "home", 1: "the terrain"})
+
+RTL_TYPE: Final = ReturnLimit("RTL_TYPE", 1, plain, words=RETURNS_TO, proved=ELSEWHERE)
+RTL_ALT_TYPE: Final = ReturnLimit("RTL_ALT_TYPE", 1, plain, words=HEIGHTS_FROM, proved=ABOVE_HOME)
+RALLY_TOTAL: Final = ReturnLimit("RALLY_TOTAL", 1, plain, words=MappingProxyType({0: "none"}), proved=ELSEWHERE)
 
 
 class ReturnLimits:
@@ -88,4 +137,12 @@ class ReturnLimits:
     def wrong(self, values: Mapping[str, float]) -> str | None:
         """The first that leads its way home elsewhere than was proved, in words."""
         every = (each for group in self._limits for each in group if each.parameter in values)
-        return next((words for each in every if (words := each.wrong(values[each.parameter], self._vehicle))), None)
+        found = (each.wrong(values[each.parameter], self._vehicle) for each in every)
+        return next((wrong.text for wrong in found if wrong is not None), None)
+
+    def silent(self, parameters: VehicleParameters) -> list[str]:
+        """Those that did not answer, by the names that they may have: one that is not there limits nothing, but one
+        that is there and stayed silent would.
+        """
+        groups = [[each.parameter for each in group] for group in self._limits]
+        return [" or ".join(f"`{name}`" for name in group) for group in groups if all(map(parameters.is_absent, group))]

@@ -90,8 +90,8 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
         ("ardupilot", {"FENCE_RADIUS": 5.0}, "settings/fence_radius", "at least ", "set `FENCE_RADIUS` to "),
         ("ardupilot", {"FENCE_ALT_MAX": 5.0}, "settings/fence_alt_max", "at least ", "set `FENCE_ALT_MAX` to "),
         ("px4", {"GF_MAX_HOR_DIST": 5.0}, "settings/gf_max_hor_dist", "at least ", "set `GF_MAX_HOR_DIST` to "),
-        ("px4", {"RTL_TYPE": 1.0}, "settings/rtl_type", "home", "home alone; set `RTL_TYPE` to 0"),
-        ("ardupilot", {"RTL_ALT_TYPE": 1.0}, "settings/rtl_alt_type", "home", "set `RTL_ALT_TYPE` to 0"),
+        ("px4", {"RTL_TYPE": 1.0}, "settings/rtl_type", "0, home", "set `RTL_TYPE` to 0"),
+        ("ardupilot", {"RTL_ALT_TYPE": 1.0}, "settings/rtl_alt_type", "0, home", "set `RTL_ALT_TYPE` to 0"),
         ("ardupilot", {"WPNAV_SPEED": 5_000.0}, "settings/wpnav_speed", "at most 12 m/s", "to 1200"),
         ("px4", {"MPC_Z_VEL_MAX_UP": 8.0}, "settings/mpc_z_vel_max_up", "at most ", "set `MPC_Z_VEL_MAX_UP` to "),
         ("px4", {"GF_ACTION": 0.0}, "settings/gf_action", "hold", "second line of defence; set `GF_ACTION` to 2"),
@@ -232,6 +232,9 @@ def test_another_return_altitude_than_the_policy_says() -> None:
         ("ardupilot", ("RTL_CONE_SLOPE", 1.0), "at least 3"),
         ("ardupilot", ("RTL_CLIMB_MIN", 500.0), "at most 0 m"),
         ("ardupilot", ("WPNAV_RADIUS", 300.0), "at most 2 m"),
+        ("px4", ("RTL_TYPE", 1.0), "0, home, or a rally point that is nearer"),
+        ("ardupilot", ("RTL_ALT_TYPE", 1.0), "0, home"),
+        ("ardupilot", ("RALLY_TOTAL", 2.0), "0, none"),
     ],
 )
 def test_what_lowers_or_lifts_the_way_home_stops_a_mission(
@@ -241,11 +244,22 @@ def test_what_lowers_or_lifts_the_way_home_stops_a_mission(
     policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=16_000))
     found = examine(case.simulated(flavour, parameters=(parameter,)), policy)
     assert stops(found) == {"mission/unready"}
-    assert f"(`{parameter[0]}` is {parameter[1]:g})" in found["mission/unready"].found
+    assert f"(`{parameter[0]}` is {parameter[1]:g}" in found["mission/unready"].found
     finding = found[f"settings/{parameter[0].lower()}"]
     assert (finding.verdict, finding.needed) == (MissionVerdict.WARN, needed)
     well = examine(case.simulated(flavour), policy)
     assert (stops(well), well[f"settings/{parameter[0].lower()}"].verdict) == (set(), MissionVerdict.OK)
+
+
+def test_a_limit_of_the_way_home_that_is_not_answered_is_unknown() -> None:
+    def silent(vehicle: VirtualVehicle) -> None:
+        vehicle.lose = lambda frame: b"RTL_TYPE" in frame
+
+    policy = case.policy()
+    policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=30_000))
+    found = examine(case.simulated("px4"), policy, prepare=silent)
+    finding = found["settings/unanswered"]
+    assert (finding.verdict, finding.found.split(":")[0]) == (MissionVerdict.UNKNOWN, "`RTL_TYPE` was not answered")
 
 
 def test_a_vehicle_that_answers_nothing() -> None:

@@ -34,6 +34,7 @@ FLAVOURS = pytest.mark.parametrize("flavour", [PX4, ARDUPILOT], ids=lambda flavo
 #: what limits the way home, of both flavours
 AS_IT_COMES = {
     "RTL_MIN_DIST": 10.0, "NAV_MC_ALT_RAD": 0.8, "RTL_CONE_SLOPE": 3.0, "RTL_CLIMB_MIN": 0.0, "WPNAV_RADIUS": 200.0,
+    "RTL_TYPE": 0.0, "RTL_ALT_TYPE": 0.0, "RALLY_TOTAL": 0.0,
 }  # fmt: skip
 
 
@@ -180,6 +181,12 @@ def test_the_same_return_altitude_is_ready(flavour: Flavour, parameters: Any) ->
     (ARDUPILOT, {"RTL_CONE_SLOPE": 1.0}, "(`RTL_CONE_SLOPE` is 1): set `RTL_CONE_SLOPE` to at least 3"),
     (ARDUPILOT, {"RTL_CLIMB_MIN": 100.0}, "set `RTL_CLIMB_MIN` to at most 0"),
     (ARDUPILOT, {"WPNAV_RADIUS": 500.0}, "set `WPNAV_RADIUS` to at most 200"),
+    (PX4, {"RTL_TYPE": 1.0}, "its way home would not be to the place that is proved (`RTL_TYPE` is 1, a rally point or "
+                             "a mission's landing): set `RTL_TYPE` to 0, home, or a rally point that is nearer"),
+    (PX4, {"RTL_TYPE": 9.0}, "(`RTL_TYPE` is 9): set `RTL_TYPE` to 0"),
+    (ARDUPILOT, {"RTL_ALT_TYPE": 1.0}, "its way home would not be at heights above home, as is proved (`RTL_ALT_TYPE` "
+                                       "is 1, the terrain): set `RTL_ALT_TYPE` to 0, home"),
+    (ARDUPILOT, {"RALLY_TOTAL": 2.0}, "(`RALLY_TOTAL` is 2): set `RALLY_TOTAL` to 0, none"),
 ])  # fmt: skip
 def test_what_lowers_or_lifts_the_way_home_keeps_it_from_being_ready(
     flavour: Flavour, parameters: dict[str, float], says: str | None
@@ -191,7 +198,7 @@ def test_what_lowers_or_lifts_the_way_home_keeps_it_from_being_ready(
 
 def test_the_limits_of_the_way_home_by_their_new_names_and_for_another_height() -> None:
     high = replace(CITY, vehicle=replace(CITY.vehicle, return_altitude=60_000))
-    new = {"RTL_ALT_M": 60.0, "RTL_CONE_SLOPE": 0.0, "RTL_CLIMB_MIN_M": 0.0, "WP_RADIUS_M": 2.0}
+    new = {"RTL_ALT_M": 60.0, "RTL_CONE_SLOPE": 0.0, "RTL_CLIMB_MIN_M": 0.0, "WP_RADIUS_M": 2.0, "RTL_ALT_TYPE": 0.0}
     for flavour, parameters, ready in (
         (ARDUPILOT, new, True),
         (ARDUPILOT, new | {"WP_RADIUS_M": 2.5}, False),
@@ -209,6 +216,19 @@ def test_what_limits_the_way_home_is_waited_for() -> None:
     port.lose = lambda name: name == "PARAM_VALUE" and len(port.heard) > 1
     port.settle(one, 3)
     assert one.unready == "what limits its way home (`RTL_MIN_DIST`) was not read yet"
+
+
+@FLAVOURS
+def test_a_limit_of_the_way_home_that_stays_silent_is_told_once(flavour: Flavour) -> None:
+    one, name = preflight(flavour, fence=False), "RTL_TYPE" if flavour is PX4 else "RTL_ALT_TYPE"
+    port = Port(flavour)
+    del port.parameters[name]
+    port.settle(one)
+    assert one.unready is None
+    assert [note for note in one.notes if name in note] == [
+        f"`{name}` was not answered within 5 s, so it counts as one that it does not have; if it has it, its way home "
+        "may not be the one that is proved"
+    ]
 
 
 @FLAVOURS

@@ -14,6 +14,7 @@ import msgspec
 from rtshcua.adapters.agent_socket import AgentSocket
 from rtshcua.cli.showing import words
 from rtshcua.model.flat.situation import Now
+from rtshcua.model.step_number import number_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Append, Event, Presented, Reply
 
@@ -190,6 +191,7 @@ class Agents:
         steps = [
             {
                 "step": each.step,
+                "step_number": number_of(each.step),
                 "phase": mission.phases[each.phase],
                 "skill": each.contract.name,
                 "text": words.call(bundle.policy, each),

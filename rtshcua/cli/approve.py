@@ -34,6 +34,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.compiler.surveyed import Planned, planned_otherwise
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.step_number import index_of, number_of
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
 from rtshcua.wire.untrusted import Untrusted
 
@@ -49,7 +50,7 @@ AGREE: Final = "`--refuse` says no; `--other-path` agrees to it; ask who signed 
 @app.command()
 def approve(
     bundle: FlyingBundle,
-    step: Annotated[int, typer.Option(help="the number of the step, from 0")],
+    step: Annotated[int, typer.Option(min=1, help="the number of the step, from 1")],
     role: Annotated[str | None, typer.Option(help="who you are, where several are asked")] = None,
     refused: Annotated[bool, typer.Option("--refuse", help="say no: the step is denied, whoever else agrees")] = False,
     seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="how many seconds the answer is good")]
@@ -87,31 +88,32 @@ def approve(
         if refused:  # a yes is held to it already; a no is told in our words too, which nonsense has not
             expect_sense(flying.policy, [flying.mission])
         steps = flying.mission.invocations
-        if not 0 <= step < len(steps):
-            return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 0 to {len(steps) - 1}")
-        asked = _roles(flying.policy, steps[step])
+        if step > len(steps):
+            return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 1 to {len(steps)}")
+        about = steps[index_of(step)]
+        asked = _roles(flying.policy, about)
         if role is None and len(asked) == 1:
             role = asked[0]
         if role is None or role not in asked:
-            return _not_asked(steps[step], role, asked)
+            return _not_asked(about, role, asked)
         name = flight_id(flight, to)
         if name is None:
             return fail(ExitCode.USAGE, "the answer is for one flight", WHOSE)
         said = ApprovalDocument(
             flight=name,
             mission=flying.mission_digest,
-            invocation_id=steps[step].invocation_id,
-            binding=steps[step].binding,
+            invocation_id=about.invocation_id,
+            binding=about.binding,
             vehicle=flying.policy.vehicle.identity,
             role=role,
             granted=int(not refused),
             issued_at_us=now_us,
             expires_at_us=now_us + seconds * 1_000_000,
         )
-        told = words.step(flying.policy, steps[step])
+        told = words.step(flying.policy, about)
         mission = shorten(flying.mission.name, NAME_SHOWN)  # the proposer's word: it pushes nothing out of sight
         say(f"step {step} of `{mission}` on `{said.vehicle}`: `{told}`")
-        planned = planned_otherwise(flying.policy, steps[step])
+        planned = planned_otherwise(flying.policy, about)
         if planned is not None:
             told += ", a path that is not the planner's"
             say(f"who signed the mission chose another path than the planner does: {_other(planned)}")
@@ -145,7 +147,7 @@ def _roles(policy: Policy, invocation: Invocation) -> list[str]:
 
 
 def _not_asked(invocation: Invocation, role: str | None, asked: list[str]) -> ExitCode:
-    step = invocation.step
+    step = number_of(invocation.step)
     if not asked:
         return fail(ExitCode.USAGE, f"no `confirm` of the policy asks anybody about step {step}")
     names = ", ".join(f"`{name}`" for name in asked)

@@ -13,7 +13,9 @@ def steps_told(bounds: Bounds) -> list[str]:
 
 def bounds_dict(bounds: Bounds) -> dict[str, object]:
     """The same for a program."""
-    return bounds._asdict() | {"steps": [each._asdict() for each in bounds.steps]}
+    return bounds._asdict() | {
+        "steps": [{"step_number": number} | each._asdict() for number, each in enumerate(bounds.steps, 1)]
+    }
 
 
 def bounds_told(bounds: Bounds) -> str:

@@ -21,6 +21,7 @@ from rtshcua.ground.compiler.pins import Pins
 from rtshcua.ground.compiler.sign import sign
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.step_number import index_of
 from rtshcua.wire.bundle import policy_digest, policy_payload
 from rtshcua.wire.digest import BUNDLE, digest
 from rtshcua.wire.keys import Duty, SigningKey
@@ -58,7 +59,8 @@ def compile(
         typer.Option(help="the bundle that flies, then what replaced it since: make a replacement (repeatable)"),
     ] = None,
     first: Annotated[
-        int | None, typer.Option("--from", min=0, help="with --replaces: the first step that is another one")
+        int | None,
+        typer.Option("--from", min=1, help="with --replaces: the number of the first step that is another one"),
     ] = None,
     flight: Annotated[
         str | None, typer.Option(metavar="ID", help="with --replaces: the flight, by its id or a socket of it")
@@ -104,7 +106,7 @@ def compile(
         return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())
     if replaces and first is not None and flight is not None:
-        order = Replacing(replaces, first, flight, root, mission_key, passphrase_file, issued_at, target)
+        order = Replacing(replaces, index_of(first), flight, root, mission_key, passphrase_file, issued_at, target)
         return replace_with(compiled.policy, compiled.mission, order, store, findings, quiet=as_json)
     try:
         signers = (

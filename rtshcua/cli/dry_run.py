@@ -17,6 +17,7 @@ from rtshcua.cli.showing.why import would_pass
 from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.outcome import Outcome
+from rtshcua.model.step_number import number_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event, Readings, Ready
 from rtshcua.onboard.rehearsal import Rehearsed, rehearse
@@ -103,7 +104,7 @@ def _page(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, refus
         invocation, decision = mission.invocations[each.step], each.decision
         outcome = decision.outcome.name.lower()
         called = words.call(loaded.bundle.policy, invocation)
-        page.text(f"{each.step:>3}  {outcome:<8}  {mission.phases[invocation.phase]:<12}  {called}")
+        page.text(f"{number_of(each.step):>3}  {outcome:<8}  {mission.phases[invocation.phase]:<12}  {called}")
         if decision.outcome is not Outcome.ALLOW:
             quoted = words.quoted(loaded.bundle.policy, invocation, decision.clause)
             clause = f": {quoted}" if quoted else ""
@@ -130,6 +131,7 @@ def _object(loaded: Loaded, found: Sequence[Rehearsed], unready: str | None, cod
         steps.append(
             {
                 "step": each.step,
+                "step_number": number_of(each.step),
                 "phase": mission.phases[invocation.phase],
                 "text": words.call(loaded.bundle.policy, invocation),
                 "outcome": decision.outcome.name.lower(),

@@ -13,6 +13,7 @@ from rtshcua.cli.unlock import check_trusted, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.step_number import number_of, step_words
 from rtshcua.wire.bundle import policy_digest, policy_payload
 from rtshcua.wire.document import MAX_DOCUMENT, DocumentError
 from rtshcua.wire.replacement import sign_replacement
@@ -22,8 +23,8 @@ _SAME_POLICY = "a replacement flies under the policy in force: compile it with t
 
 
 class Replacing(NamedTuple):
-    """What was asked for: the bundle and its replacements so far, the first step that changes, the flight, and where it
-    goes.
+    """What was asked for: the bundle and its replacements so far, the index of the first step that changes, the flight,
+    and where it goes.
     """
 
     replaces: list[Path]
@@ -44,8 +45,8 @@ def replace_with(
         over = subject(order.replaces[0], order.replaces[1:], order.root, order.issued_at_us)
         flown = len(over.mission.invocations)
         if order.first > flown:
-            text = f"`--from {order.first}`: the mission that flies has {flown} steps"
-            return findings.refuse(ExitCode.USAGE, "usage", text, f"accepted: 0 to {flown}")
+            text = f"`--from {number_of(order.first)}`: the mission that flies has {flown} steps"
+            return findings.refuse(ExitCode.USAGE, "usage", text, f"accepted: 1 to {number_of(flown)}")
         if policy_digest(policy_payload(policy)) != over.policy_digest:
             text = f"the sources make another policy than the `{over.policy.name}@{over.policy.version}` that is flown"
             return findings.refuse(ExitCode.REFUSED, "wrong-policy", text, _SAME_POLICY)
@@ -65,7 +66,7 @@ def replace_with(
     replace(order.target, document)
     steps = len(mission.invocations)
     if not quiet:
-        out(f"{mission.name}: {steps} steps, new from {order.first}, signed into {order.target}")
+        out(f"{mission.name}: {steps} steps, new from {step_words(order.first)}, signed into {order.target}")
     return findings.finish(
         ExitCode.OK,
         replacement={
@@ -73,7 +74,7 @@ def replace_with(
             "bytes": len(document),
             "mission": mission.name,
             "supersedes": over.mission_digest.hex(),
-            "from": order.first,
+            "from_step_number": number_of(order.first),
             "steps": steps,
             "mission_key": key.kid.hex(),
         },

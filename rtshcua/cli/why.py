@@ -29,6 +29,7 @@ from rtshcua.ground.why.nominal import nominal
 from rtshcua.ground.why.trace import trace
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.situation import Approval, Context, Now
+from rtshcua.model.step_number import index_of, number_of
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import MAX_BUNDLE, policy_digest, policy_payload
@@ -41,7 +42,7 @@ _SOURCES = (".rts", ".json")
 @app.command()
 def why(
     path: Annotated[Path, typer.Argument(help="a source with a mission, a bundle, a log, or a run's folder")],
-    step: Annotated[int | None, typer.Option(help="the number of the mission's step, from 0")] = None,
+    step: Annotated[int | None, typer.Option(help="the number of the mission's step, from 1")] = None,
     state: Annotated[
         list[str] | None, typer.Option("--state", help="a signal's value: `battery=20 %`, `gps.fix=unknown`")
     ] = None,
@@ -114,18 +115,21 @@ def _by_hand(
     approved: bool,
 ) -> dict[str, object] | ExitCode:
     policy, count = subject.policy, len(subject.invocations)
-    if step is None or not 0 <= step < count:
+    if step is None or not 1 <= step <= count:
         what = "say which step" if step is None else f"there is no step {step}"
-        steps = "; ".join(f"{each.invocation.step} {each.invocation.contract.name}" for each in subject.invocations)
+        steps = "; ".join(
+            f"{number_of(each.invocation.step)} {each.invocation.contract.name}" for each in subject.invocations
+        )
         return fail(ExitCode.USAGE, what, f"--step takes one of: {steps}")
-    invocation = subject.invocations[step]
+    index = index_of(step)
+    invocation = subject.invocations[index]
     flat = invocation.invocation
     utc_us = flat.issued_at_us if at_us is None else at_us
     now = Now(waited_ms * 1_000, utc_us, 0)
     said, spoken = settings(texts), dialect.load()
     if isinstance(said, Refusal):
         return refuse(said)
-    situation = nominal(subject.invocations, step, policy, now)
+    situation = nominal(subject.invocations, index, policy, now)
     for last in (False, True):  # what is set over time outweighs what follows from what is set of signals
         for setting in said:
             changed = given(situation, setting, policy.policy, spoken)

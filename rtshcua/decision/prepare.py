@@ -30,6 +30,7 @@ from rtshcua.model.flat.policy import Airspace, Monitor, Policy, Rule, RuleKind
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.flat.zone import MAX_COORDINATE
+from rtshcua.model.step_number import step_words
 
 #: a clause, and the function that evaluates it
 Guards = tuple[tuple[Clause, Condition], ...]
@@ -338,7 +339,7 @@ def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedI
     for step, invocation in enumerate(mission.invocations):
         found = prepare_invocation(invocation, policy, mission.phases)
         if isinstance(found, Refusal):
-            return Refusal("malformed", f"step {step}: {found.text}")
+            return Refusal("malformed", f"{step_words(step)}: {found.text}")
         prepared.append(at_slowest(found, slowest))
         slowest = slower(slowest, invocation.plan.speed)
     return tuple(prepared)
@@ -353,7 +354,9 @@ def paths_fit(mission: Mission, policy: PreparedPolicy) -> Refusal | None:
             compared += sum(1 + zone.shape.compared(y0, y1, box) for zone in policy.tables.zones)
             if compared > MAX_COMPARED:
                 text = f"the legs of its paths would be compared with more than {MAX_COMPARED:,} edges of zones"
-                return Refusal("malformed", f"step {step}: {text}", "fewer points of its paths, or of the zones there")
+                return Refusal(
+                    "malformed", f"{step_words(step)}: {text}", "fewer points of its paths, or of the zones there"
+                )
     return None
 
 

@@ -19,6 +19,7 @@ from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.model.step_number import step_words
 from rtshcua.wire import names
 from rtshcua.wire.approval import Approvals, open_approval
 from rtshcua.wire.bundle import Bundle
@@ -149,10 +150,10 @@ class InForce:
         )  # fmt: skip
         step = answered.about.step
         if step < decided:
-            raise DocumentError("already-decided", f"step {step} was decided before")
+            raise DocumentError("already-decided", f"{step_words(step)} was decided before")
         self._approvals.add(answered, now)
         what = "granted" if answered.granted else "refused"
-        text = f"step {step} is {what} by `{policy.roles[answered.role]}`"
+        text = f"{step_words(step)} is {what} by `{policy.roles[answered.role]}`"
         return Receipt(APPROVAL, ACCEPTED, text, step, answered.role, answered.granted, answered.expires_us)
 
     def _recall(self, document: bytes, now: Now) -> Receipt:
@@ -209,7 +210,9 @@ class InForce:
         self._digests = (*self._digests, found.digest)
         self._approvals.keep(after.mission.invocations)
         steps = len(prepared)
-        return Receipt(REPLACEMENT, ACCEPTED, f"the mission has {steps} steps now, new from {found.kept}", found.kept)
+        return Receipt(
+            REPLACEMENT, ACCEPTED, f"the mission has {steps} steps now, new from {step_words(found.kept)}", found.kept
+        )
 
     def _opened(self, document: bytes, now: Now) -> Replacement:
         return open_replacement(

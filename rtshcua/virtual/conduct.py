@@ -31,6 +31,7 @@ from rtshcua.model.faults import Fault
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.step_number import step_words
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.journal import Detail, said
 from rtshcua.onboard.runtime.limits import Limits
@@ -335,10 +336,14 @@ class Conduct:
                 if ended_us is not None or life.ended_us > at_us + bound_us:
                     end = "it went on" if ended_us is None else f"it ended {(ended_us - at_us) / 1e6:.2f} s later"
                     if not self._excused(at_us, silences, bound_us):
-                        yield Failure("not-watched", at_us, f"step {step.step} rests on `{said(found)}`, and {end}")
+                        yield Failure(
+                            "not-watched", at_us, f"{step_words(step.step)} rests on `{said(found)}`, and {end}"
+                        )
                 step, supervisor = next(queue, None), None
             elif ended_us == at_us and step.how == "violated" and found is None:
-                yield Failure("needless", at_us, f"step {step.step} was broken off, and as heard holds: {step.detail}")
+                yield Failure(
+                    "needless", at_us, f"{step_words(step.step)} was broken off, and as heard holds: {step.detail}"
+                )
 
     def _excused(self, at_us: int, silences: Sequence[tuple[int, int]], bound_us: int) -> bool:
         return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in silences)
@@ -371,7 +376,7 @@ class Conduct:
                 if record["kind"] == STEP and record["outcome"] == "deny":
                     asked = next((each for each in airborne[number + 1 :] if each["type"] == "decision"), None)
                     if asked is not None and asked["kind"] == FALLBACK_LINK:
-                        text = f"step {record['step']} was denied, and its own fallback was asked for"
+                        text = f"{step_words(record['step'])} was denied, and its own fallback was asked for"
                         yield Failure("chain", self._at(record), text)
                 continue
             match record.get("event"):
@@ -402,7 +407,8 @@ class Conduct:
         choice = choose_fallback(self._invocations[asked["step"]], state, self._policy, now)
         if choice is None or choice.index == asked["link"]:
             return
-        text = f"the fallback of step {asked['step']} begins with link {asked['link']}, and {choice.index} could fly"
+        of = step_words(asked["step"])
+        text = f"the fallback of {of} begins with link {asked['link']}, and {choice.index} could fly"
         yield Failure("chain", self._at(asked), text)
 
     def _recalled(self, at_us: int, flights: Sequence[Flight], records: Sequence[Record]) -> Iterator[Failure]:
@@ -415,7 +421,8 @@ class Conduct:
             if flight.kind != STEP or flight.motion in _HOMEWARD or silent:
                 continue
             if flight.since_us <= at_us and flight.until_us is not None and flight.until_us > at_us + bound_us:
-                text = f"step {flight.step} went on for {(flight.until_us - at_us) / 1e6:.1f} s after it was called off"
+                lasted_s = (flight.until_us - at_us) / 1e6
+                text = f"{step_words(flight.step)} went on for {lasted_s:.1f} s after it was called off"
                 yield Failure("chain", at_us, text)
 
     def _stranded(self, record: Record, flights: Sequence[Flight]) -> Iterator[Failure]:
@@ -447,9 +454,8 @@ class Conduct:
             elif record["type"] == "decision" and record["kind"] == STEP and released is not None:
                 given = record["context"]["released_us"]
                 if given != released:
-                    text = (
-                        f"step {record['step']} counts as released {(given - released) / 1e6:.1f} s later than it was"
-                    )
+                    late_s = (given - released) / 1e6
+                    text = f"{step_words(record['step'])} counts as released {late_s:.1f} s later than it was"
                     yield Failure("release", self._at(record), text, abs(given - released))
 
     def _recorded(self, life: Life, records: Sequence[Record]) -> Iterator[Failure]:

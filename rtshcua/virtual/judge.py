@@ -37,6 +37,7 @@ from rtshcua.model.faults import Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
+from rtshcua.model.step_number import step_words
 from rtshcua.virtual.conduct import Conduct
 from rtshcua.virtual.excuses import Excuses, Failure
 from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
@@ -582,7 +583,7 @@ def _in_time(flown: ScenarioFlown, first: Frame, decision: dict[str, Any]) -> It
         released_us = max([decision["context"]["released_us"], *(each[3] for each in decision["context"]["approvals"])])
         after_us = first.sent_us + flown.start_us - released_us - contract.deadline_us
         if after_us > 0:
-            text = f"step {decision['step']} began {after_us / 1e6:.3f} s after its deadline"
+            text = f"{step_words(decision['step'])} began {after_us / 1e6:.3f} s after its deadline"
             yield Failure("late", first.sent_us, text, after_us)
 
 

@@ -13,6 +13,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import Approval, Now
 from rtshcua.model.flat.struct import Flat
+from rtshcua.model.step_number import step_words
 from rtshcua.wire import names
 from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.document import (
@@ -96,10 +97,12 @@ def open_approval(
     if named is None or invocation is None:
         raise DocumentError("unknown-invocation", "it is about no step of the mission in force")
     if named.binding != said.binding:
-        raise DocumentError("binding-mismatch", f"it was made for another step {named.step} than the one in force")
+        raise DocumentError(
+            "binding-mismatch", f"it was made for another {step_words(named.step)} than the one in force"
+        )
     role = policy.roles.index(said.role) if said.role in policy.roles else -1
     if role < 0 or not confirms(policy, invocation, role):
-        text = f"no `confirm` of the policy asks role `{said.role[:80]}` about step {invocation.step}"
+        text = f"no `confirm` of the policy asks role `{said.role[:80]}` about {step_words(invocation.step)}"
         raise DocumentError("not-asked", text)
     return Answered(invocation, role, root.person(opened.key), said.granted, now.monotonic_us, said.expires_at_us)
 
@@ -146,7 +149,7 @@ class Approvals:
         key = _subject(answered.about, answered)
         held = self._answers.get(key)
         if held is not None and _counts(held, now):
-            raise DocumentError("already-answered", f"step {answered.about.step} has this answer already")
+            raise DocumentError("already-answered", f"{step_words(answered.about.step)} has this answer already")
         if held is None and len(self._answers) == MAX_ANSWERS:
             raise DocumentError("too-many", f"one flight takes at most {MAX_ANSWERS} answers")
         self._answers[key] = answered

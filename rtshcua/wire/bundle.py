@@ -12,6 +12,7 @@ from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.struct import Flat
+from rtshcua.model.step_number import step_words
 from rtshcua.wire import artefact, binding, cose, digest, names
 from rtshcua.wire.cose import EnvelopeError, Opened
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
@@ -165,10 +166,12 @@ def _check_belonging(bundle: Bundle, after: bytes) -> None:
         )
     unbound = binding.first_unbound(mission)
     if unbound is not None:
-        raise BundleError("binding-mismatch", f"the binding of step {unbound} is not the one over its fields")
+        raise BundleError("binding-mismatch", f"the binding of {step_words(unbound)} is not the one over its fields")
     misnamed = binding.first_misnamed(mission, after=after)
     if misnamed is not None:
-        raise BundleError("id-mismatch", f"the id of step {misnamed} is not the one that follows from the mission")
+        raise BundleError(
+            "id-mismatch", f"the id of {step_words(misnamed)} is not the one that follows from the mission"
+        )
 
 
 def _check_entitled(bundle: Bundle, vehicle: str, now_us: int) -> None:
@@ -198,5 +201,5 @@ def check_proposer(key: VerificationKey, policy: Policy, invocations: Iterable[I
 def _speaker(policy: Policy, invocation: Invocation) -> tuple[str, str]:
     """The names of an invocation's role and source."""
     if not 0 <= invocation.role < len(policy.roles) or invocation.source not in SourceKind._value2member_map_:
-        raise BundleError("malformed", f"step {invocation.step} has no role or source that the policy knows")
+        raise BundleError("malformed", f"{step_words(invocation.step)} has no role or source that the policy knows")
     return policy.roles[invocation.role], SourceKind(invocation.source).name.lower()

@@ -15,6 +15,7 @@ from rtshcua.model.flat.contract import Contract, SourceKind
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.struct import Flat
+from rtshcua.model.step_number import step_words
 from rtshcua.wire import cbor, names
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import Bundle, check_bundle, check_proposer
@@ -100,7 +101,7 @@ def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle
     if found.supersedes != bundle.mission_digest:
         raise DocumentError("superseded", "it replaces another mission than the one in force")
     if found.kept < released:
-        text = f"it changes step {found.kept}, and {released} steps were released already"
+        text = f"it changes {step_words(found.kept)}, and {released} steps were released already"
         raise DocumentError("already-released", text)
     _check_kept(bundle.mission, found.mission, found.kept)
     check_set_aside(found.key, bundle, found.kept)
@@ -136,7 +137,7 @@ def _check_kept(old: Mission, new: Mission, kept: int) -> None:
         raise DocumentError("other-steps", "the phases of the steps that stay have other names or another order")
     for number in range(kept):
         if _essence(old.invocations[number], phases) != _essence(new.invocations[number], phases):
-            raise DocumentError("other-steps", f"step {number} is to stay, and is not the same step")
+            raise DocumentError("other-steps", f"{step_words(number)} is to stay, and is not the same step")
 
 
 def _essence(invocation: Invocation, phases: int) -> Invocation:

@@ -105,7 +105,7 @@ def test_a_laxer_policy_of_the_library_takes_no_place_of_the_one_handed_in(compi
 
 
 def test_a_replacement_claims_no_more_than_a_mission(compiles: Compile) -> None:
-    found = compiles(by("operator"), *UNDER, "--replaces", "flown.bundle", "--from", "0", "--flight", "0" * 32)
+    found = compiles(by("operator"), *UNDER, "--replaces", "flown.bundle", "--from", "1", "--flight", "0" * 32)
     assert found[:2] == (ExitCode.DIAGNOSTICS, ["E0905"])
 
 

@@ -72,7 +72,7 @@ mission m under bridge_inspection@7 on quad {
 def test_why_tells_whose_words_they_are_and_what_they_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "m.rts"
     source.write_text(HELD)
-    command = ["why", str(source), "--step", "0", "--at", "2026-05-01T10:00:00Z", "--state", "battery=50 %"]
+    command = ["why", str(source), "--step", "1", "--at", "2026-05-01T10:00:00Z", "--state", "battery=50 %"]
     assert main(command) == ExitCode.OK
     out = " ".join(capsys.readouterr().out.split())
     assert "because `battery > 60 %`, in the mission's own words" in out

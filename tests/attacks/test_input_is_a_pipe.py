@@ -32,7 +32,7 @@ PATIENCE_S = 60
         ["compile", "imports.rts", "--with", "pipe.rts", "-o", "x.bundle"],
         ["show", "pipe"],
         ["verify-log", "pipe", "--root", "0" * 64],
-        ["approve", "pipe", "--step", "1", "-o", "answer"],
+        ["approve", "pipe", "--step", "2", "-o", "answer"],
         ["check", "/dev/zero"],
         ["check", "/dev/tty"],
         ["run", "/dev/zero"],

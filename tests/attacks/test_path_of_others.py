@@ -30,7 +30,7 @@ mission low under bridge_inspection@7 on quad {
   phase recovery { return_home() }
 }
 """
-APPROVE = ("approve", "low.bundle", "--step", "2", "-o", "yes", "--flight", bytes(16).hex())
+APPROVE = ("approve", "low.bundle", "--step", "3", "-o", "yes", "--flight", bytes(16).hex())
 
 Sign = Callable[[Callable[[Invocation, Policy], Invocation]], None]
 

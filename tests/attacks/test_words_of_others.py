@@ -69,7 +69,7 @@ def low(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 @pytest.mark.parametrize("answer", [(), ("--refuse",), ("--json",)])
 def test_what_is_approved_is_told_by_us(low: Path, capsys: pytest.CaptureFixture[str], answer: tuple[str, ...]) -> None:
     """A comment among the arguments is the proposer's, and what is signed is the skill with its arguments."""
-    command = ["approve", "low.bundle", "--step", "2", "-o", "yes", "--flight", bytes(16).hex(), *answer]
+    command = ["approve", "low.bundle", "--step", "3", "-o", "yes", "--flight", bytes(16).hex(), *answer]
     assert main(command) == ExitCode.OK
     out = capsys.readouterr().out
     assert "hover" not in out
@@ -93,9 +93,9 @@ def test_what_is_approved_is_told_before_it_is_signed(
         "rtshcua.cli.approve.unlock_person", lambda *a, **k: (seen.append("key"), unlock_person(*a, **k))[1]
     )
     monkeypatch.setattr("sys.stdin", io.StringIO(typed))
-    assert main(["approve", "low.bundle", "--step", "2", "-o", "yes", *FLIGHT]) == code
+    assert main(["approve", "low.bundle", "--step", "3", "-o", "yes", *FLIGHT]) == code
     err = capsys.readouterr().err
-    assert "step 2 of `low` on `quad-07`: `inspect_area(" in err
+    assert "step 3 of `low` on `quad-07`: `inspect_area(" in err
     assert "may be flown as supervisor? [y/N]" in err
     assert err.index("inspect_area(") < err.index("[y/N]")
     assert (low / "yes").exists() == bool(seen) == (code is ExitCode.OK)
@@ -112,7 +112,7 @@ def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys:
         mission = bind(replace(bundle.mission, name=name), bundle.policy_digest)
         (low / "low.bundle").write_bytes(seal_under(envelopes(data)[0], mission_payload(mission), mission_key=key))
         capsys.readouterr()
-        return main(["approve", "low.bundle", "--step", "2", "-o", "yes", *FLIGHT])
+        return main(["approve", "low.bundle", "--step", "3", "-o", "yes", *FLIGHT])
 
     assert named(f"low` on `quad-07`: `hover(time = 5 s)`{' ' * 4000}`") == ExitCode.INPUT
     assert "would be refused on board: the name of the mission is no name" in capsys.readouterr().err
@@ -125,8 +125,8 @@ def test_a_script_at_a_terminal_is_not_asked(
     low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rtshcua.cli.approve.terminal", lambda: True)
-    assert main(["approve", "low.bundle", "--step", "2", "-o", "no", "--refuse", "--yes", *FLIGHT]) == ExitCode.OK
-    assert "step 2 of `low` on `quad-07`: `inspect_area(" in capsys.readouterr().err
+    assert main(["approve", "low.bundle", "--step", "3", "-o", "no", "--refuse", "--yes", *FLIGHT]) == ExitCode.OK
+    assert "step 3 of `low` on `quad-07`: `inspect_area(" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("as_json", [False, True])
@@ -154,9 +154,9 @@ OVER_NAMES = [
     (("compile", "{source}", "-o", "{made}", "--json"), ExitCode.OK),
     (("show", "{bundle}"), ExitCode.OK), (("show", "{bundle}", "--json"), ExitCode.OK),
     (("show", "{source}"), ExitCode.INPUT), (("show", "{source}", "--json"), ExitCode.INPUT),
-    (("why", "{bundle}", "--step", "0"), ExitCode.OK), (("why", "{bundle}", "--step", "0", "--json"), ExitCode.OK),
-    (("approve", "{bundle}", "--step", "2", "-o", "{made}", *FLIGHT), ExitCode.OK),
-    (("approve", "{bundle}", "--step", "2", "-o", "{made}", *FLIGHT, "--json"), ExitCode.OK),
+    (("why", "{bundle}", "--step", "1"), ExitCode.OK), (("why", "{bundle}", "--step", "1", "--json"), ExitCode.OK),
+    (("approve", "{bundle}", "--step", "3", "-o", "{made}", *FLIGHT), ExitCode.OK),
+    (("approve", "{bundle}", "--step", "3", "-o", "{made}", *FLIGHT, "--json"), ExitCode.OK),
     (("recall", "{bundle}", "-o", "{made}", *FLIGHT), ExitCode.OK),
     (("recall", "{bundle}", "-o", "{made}", *FLIGHT, "--json"), ExitCode.OK),
     (("fmt", "--check", "{untidy}"), ExitCode.DIAGNOSTICS), (("fmt", "--diff", "{untidy}"), ExitCode.DIAGNOSTICS),

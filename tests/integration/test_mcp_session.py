@@ -146,8 +146,8 @@ HOSTILE: tuple[tuple[str, dict[str, Any]], ...] = (
     ("explain_decision", {}),
     ("explain_decision", {"record": -1}),
     ("explain_decision", {"record": 1 << 80}),
-    ("replan", {"mission": PROPOSAL, "from_step": 0, "idempotency_key": "r"}),
-    ("replan", {"mission": PROPOSAL, "from_step": -1, "idempotency_key": "r"}),
+    ("replan", {"mission": PROPOSAL, "from_step_number": 1, "idempotency_key": "r"}),
+    ("replan", {"mission": PROPOSAL, "from_step_number": 0, "idempotency_key": "r"}),
     ("replan", {"mission": PROPOSAL, "idempotency_key": "r"}),
     ("propose_mission", {"mission": PROPOSAL, "idempotency_key": ""}),
     ("propose_mission", {"mission": PROPOSAL, "idempotency_key": "k" * 201}),
@@ -348,9 +348,9 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
         admitted = await call(session, "mission_status", ticket=ticket["ticket"], wait_s=10)
         assert admitted["state"] == "admitted", admitted
         newer = changed("phases.1.steps", PROPOSAL["phases"][1]["steps"][:1])
-        early = await call(session, "replan", mission=newer, from_step=9, idempotency_key="far")
+        early = await call(session, "replan", mission=newer, from_step_number=10, idempotency_key="far")
         assert (early["wrong"], early["code"]) == (True, "other-steps"), early
-        replaced = await call(session, "replan", mission=newer, from_step=2, idempotency_key="two")
+        replaced = await call(session, "replan", mission=newer, from_step_number=3, idempotency_key="two")
         assert replaced["accepted"], replaced
         status: dict[str, Any] = {"over": False}
         while not status["over"]:
@@ -402,7 +402,7 @@ def test_an_agent_cancels_its_flight_and_the_contingency_brings_it_home(ground: 
         assert (cancelled["accepted"], cancelled["flies"][-1]) == (True, "emergency_land"), cancelled
         again = await call(session, "cancel")
         assert again["accepted"] is False
-        late = await call(session, "replan", mission=PROPOSAL, from_step=3, idempotency_key="back")
+        late = await call(session, "replan", mission=PROPOSAL, from_step_number=4, idempotency_key="back")
         while not (status := await call(session, "mission_status", ticket=ticket, wait_s=10))["over"]:
             pass
         assert status["ending"] == "cancelled", status

@@ -97,6 +97,11 @@ def matching(**values: object) -> str:
     return " AND ".join(terms) or "TRUE"
 
 
+#: records hold the index of a step, from 0; people number steps from 1
+_NUMBER: Final = ", CASE WHEN step >= 0 THEN step + 1 END AS step_number"
+_ABOUT_STEPS: Final = frozenset({"decisions", "effects"})
+
+
 class Asker:
     """A connection to an archive that can only read it."""
 
@@ -120,7 +125,8 @@ class Asker:
             files = ", ".join(
                 quoted(folder.table(table) / f"{part}.parquet") for part in (NOTHING, *(p for (p,) in parts))
             )
-            engine.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet([{files}])")
+            number = _NUMBER if table in _ABOUT_STEPS else ""
+            engine.execute(f"CREATE VIEW {table} AS SELECT *{number} FROM read_parquet([{files}])")
         for name in VIEWS:
             where = conditions.sql() if name == "decided" else "TRUE"
             engine.execute(f"CREATE VIEW {name} AS SELECT * FROM ({view(name)}) v WHERE {where}")

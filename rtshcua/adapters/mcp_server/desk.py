@@ -28,6 +28,7 @@ from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.step_number import index_of, number_of
 from rtshcua.onboard.runtime.seen import value_in_words
 from rtshcua.wire.binding import bind, binding_of
 from rtshcua.wire.bundle import Bundle, mission_payload, policy_digest, policy_payload, seal_under
@@ -55,7 +56,7 @@ _AWAITED: Final = "approval/awaited"
 #: the effects of which the last says whether another step is waited for
 _AFTER_REPLAN: Final = frozenset({"replan", "replacement", "dispatched", "cancellation", "recall"})
 _REPLANS: Final = (
-    "`replan` with this `from_step`; the vehicle holds meanwhile, and falls back when nothing comes in time"
+    "`replan` with this `from_step_number`; the vehicle holds meanwhile, and falls back when nothing comes in time"
 )
 
 
@@ -153,10 +154,10 @@ class Desk:
         with self._proposing:
             return self._submit(mission, idempotency_key, None)
 
-    def replan(self, mission: Any, from_step: int, idempotency_key: str) -> dict[str, Any]:
+    def replan(self, mission: Any, from_step_number: int, idempotency_key: str) -> dict[str, Any]:
         """Another mission for what was not released yet: signed as its replacement, and handed in."""
         with self._proposing:
-            return self._submit(mission, idempotency_key, from_step)
+            return self._submit(mission, idempotency_key, index_of(from_step_number))
 
     def cancel(self) -> dict[str, Any]:
         """End the mission that flies: no step of it begins any more, and the policy's contingency flies.
@@ -223,7 +224,7 @@ class Desk:
                 flight = bytes.fromhex(str(self.following.hello.get("flight", "")))
                 document = sign_replacement(mission, over=over, flight=flight, kept=first, key=signer.key)
         except DocumentError as error:
-            raise Misused(error.slug, str(error), "leave the steps before `from_step` as they fly") from None
+            raise Misused(error.slug, str(error), "leave the steps before `from_step_number` as they fly") from None
         except Untrusted as error:
             raise Misused(error.slug, str(error), "propose for a role that the key may speak for") from None
         if len(document) > MAX_DOCUMENT:
@@ -275,7 +276,7 @@ class Desk:
         decided = next((each for each in reversed(records) if each.get("type") == "decision"), None)
         awaited = decided is not None and decided.get("reason") == _AWAITED
         events = [
-            {"step": each.get("step"), "event": each.get("event"), "record": each.get("seq")}
+            {"step_number": _number(each), "event": each.get("event"), "record": each.get("seq")}
             for each in records
             if each.get("event") in _TELLING
         ]
@@ -283,12 +284,12 @@ class Desk:
         return {
             "stage": seen.stage,
             "over": seen.stage in ("ended", "unreachable"),
-            "replan": {"from_step": asked.get("step"), "within": asked.get("detail"), "how": _REPLANS}
+            "replan": {"from_step_number": _number(asked), "within": asked.get("detail"), "how": _REPLANS}
             if asked.get("event") == "replan" and seen.stage == "flying"
             else None,
             "ending": seen.close.get("ending"),
-            "decision": None if decided is None else {key: decided.get(key) for key in _DECIDED},
-            "approval": {"rule": decided.get("clause"), "step": decided.get("step"), "how": _HOW}
+            "decision": None if decided is None else _decided(decided),
+            "approval": {"rule": decided.get("clause"), "step_number": _number(decided), "how": _HOW}
             if awaited and decided is not None
             else None,
             "untrusted": {"note": UNTRUSTED, "events": events[-MOST_RECORDS:]},
@@ -306,7 +307,7 @@ class Desk:
             chosen = next((each for each in decisions if each.get("seq") == record), None)
         if chosen is None:
             raise Misused("no-decision", "there is no such decision", "`read_evidence` lists the records")
-        told = {key: chosen.get(key) for key in _DECIDED}
+        told = _decided(chosen)
         if chosen.get("kind") != STEP:
             return told
         with self._lock:
@@ -332,11 +333,23 @@ class Desk:
         count = min(max(count, 1), MOST_RECORDS)
         found = [each for each in self.following.records if each.get("seq", -1) >= first]
         more = found[count]["seq"] if len(found) > count else None
-        return {"verified": False, "next": more, "untrusted": {"note": UNTRUSTED, "records": found[:count]}}
+        told = [each | {"step_number": _number(each)} for each in found[:count]]
+        return {"verified": False, "next": more, "untrusted": {"note": UNTRUSTED, "records": told}}
 
 
-_DECIDED: Final = ("seq", "step", "outcome", "reason", "clause", "target")
+_DECIDED: Final = ("seq", "outcome", "reason", "clause", "target")
 _HOW: Final = "a person of the rule's role signs: `rtshcua approve BUNDLE --step N --to SOCKET`; no agent can"
+
+
+def _number(record: Mapping[str, Any]) -> int | None:
+    """The number of the step that a record is about, from 1; a record holds its index, from 0."""
+    step = record.get("step")
+    return number_of(step) if isinstance(step, int) and step >= 0 else None
+
+
+def _decided(record: Mapping[str, Any]) -> dict[str, Any]:
+    """What a decision says, in brief."""
+    return {key: record.get(key) for key in _DECIDED} | {"step_number": _number(record)}
 
 
 def _explained(chosen: Mapping[str, Any], policy: Policy, mission: Mission) -> dict[str, Any]:

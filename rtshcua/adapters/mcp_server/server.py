@@ -85,12 +85,16 @@ TOOLS: Final = (
     ),
     _tool(
         "replan", "Put other steps in the place of those that were not released: the whole mission anew.",
-        _ACTS, ("mission", "from_step", "idempotency_key"), mission=_MISSION,
-        from_step={"type": "integer", "minimum": 0}, idempotency_key=_KEY,
+        _ACTS, ("mission", "from_step_number", "idempotency_key"), mission=_MISSION,
+        from_step_number={
+            "type": "integer", "minimum": 1,
+            "description": "The first step that is another one. Steps are numbered from 1.",
+        },
+        idempotency_key=_KEY,
     ),
     _tool("cancel", "End the mission that flies: no step begins any more; the policy's contingency flies.", _ENDS),
     _tool(
-        "read_evidence", "Records of the flight's log, as they were told.",
+        "read_evidence", "Records of the flight's log, as they were told; `step_number`, from 1, is added to each.",
         first={"type": "integer", "minimum": 0}, count={"type": "integer", "minimum": 1, "maximum": 100},
     ),
 )  # fmt: skip

@@ -7,6 +7,7 @@ import msgspec
 from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.cli.shown import many
 from rtshcua.diagnostics.excerpt import escaped, visible
+from rtshcua.model.step_number import number_of
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 
 
@@ -67,6 +68,9 @@ def as_json(message: Message) -> Iterable[str]:
         case Snapshot():
             return
         case Happened(what):
-            yield escaped(msgspec.json.encode(what).decode())
+            told = msgspec.to_builtins(what)
+            if what.step >= 0:
+                told["step_number"] = number_of(what.step)
+            yield escaped(msgspec.json.encode(told).decode())
         case _:
             yield escaped(msgspec.json.encode(message).decode())

@@ -15,6 +15,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import POSITION
+from rtshcua.model.step_number import step_words
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 
 #: the effect that puts another mission into force
@@ -107,7 +108,7 @@ class Teller:
         if is_unconfirmed(record.kind, record.detail):
             self.unconfirmed.append(subject)
         if record.event == REPLACED:
-            return Happening(record.event, t_us, record.step, detail=f"from step {record.step} on")
+            return Happening(record.event, t_us, record.step, detail=f"from {step_words(record.step)} on")
         detail = detail_of(record.event, record.detail)
         return Happening(record.event, t_us, record.step, subject, detail=detail)
 

@@ -9,6 +9,7 @@ from rtshcua.cli.shown import utc
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.struct import Flat
+from rtshcua.model.step_number import step_words
 from rtshcua.onboard.calls import quantity
 from rtshcua.wire import cose, names
 from rtshcua.wire.approval import ApprovalDocument
@@ -97,7 +98,7 @@ def show_document(page: Page, data: bytes) -> dict[str, object]:
             page.row("flight", newer.flight.hex())
             page.row("supersedes", newer.supersedes.hex())
             for step in newer.mission.invocations:
-                page.row("stays" if step.step < newer.kept else "new", f"step {step.step} {_called(step)}")
+                page.row("stays" if step.step < newer.kept else "new", f"{step_words(step.step)} {_called(step)}")
         case CancellationDocument() as cancelled:
             page.row("flight", cancelled.flight.hex())
             page.row("issued", utc(cancelled.issued_at_us))
@@ -130,7 +131,7 @@ def _body(body: Flat) -> str:
             whom = f"the mission {mission.hex()}" if mission else f"all under the policy {policy.hex()}"
             return f"calls home {whom}, good until {utc(until)}"
         case ReplacementDocument(mission=mission, kept=kept):
-            return f"`{mission.name}`, {len(mission.invocations)} steps, new from step {kept}"
+            return f"`{mission.name}`, {len(mission.invocations)} steps, new from {step_words(kept)}"
         case CancellationDocument(mission=mission, expires_at_us=until):
             return f"cancels the mission {mission.hex()}, good until {utc(until)}"
         case _:

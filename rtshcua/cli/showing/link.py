@@ -10,13 +10,16 @@ from rtshcua.ground.why.recorded import state_of
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
 from rtshcua.model.flat.situation import State
+from rtshcua.model.step_number import number_of, step_words
 
 
 def show_link(
     page: Page, record: Decision, found: LinkTrace, of: PreparedInvocation | None, policy: Policy
 ) -> dict[str, object]:
     """Adds a decision on a link to the page, and gives it for a program."""
-    whose = "the contingency" if of is None else f"the fallback of step {record.step}, {of.invocation.contract.name}"
+    whose = (
+        "the contingency" if of is None else f"the fallback of {step_words(record.step)}, {of.invocation.contract.name}"
+    )
     if found.rule is not None:
         whose = f"the degrade rule `{' '.join(found.rule.text.split())}`"
     page.head(f"{found.link.link.text}, of {whose}: {record.outcome}, {record.reason}")
@@ -38,6 +41,7 @@ def show_link(
     return {
         "kind": "why",
         "step": record.step,
+        "step_number": None if of is None else number_of(record.step),
         "link": record.link,
         "of": whose,
         "text": found.link.link.text,

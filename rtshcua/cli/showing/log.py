@@ -18,6 +18,7 @@ from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.anchors import ANCHORED
+from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.dispatcher import OBEYED
 from rtshcua.wire import statement
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
@@ -114,7 +115,10 @@ def _received(genesis: Genesis, issued_at_us: int) -> str:
 def _entry(record: AnyRecord, what: str) -> dict[str, object]:
     """A record for a program, without the genesis' bulk."""
     fields: dict[str, object] = msgspec.to_builtins(record)
-    return {"what": what, **{name: value for name, value in fields.items() if name not in ("bundle", "root")}}
+    about = (
+        {"step_number": number_of(record.step)} if isinstance(record, Decision | Effect) and record.step >= 0 else {}
+    )
+    return {"what": what, **{name: value for name, value in fields.items() if name not in ("bundle", "root")}, **about}
 
 
 def _bundle(genesis: Genesis) -> Claimed | None:
@@ -174,9 +178,9 @@ class Names:
         if kind not in _KINDS:
             return ""
         if kind == FALLBACK_LINK and link == DEGRADE:
-            return f"target of the degrade rule, at step {step}"
+            return f"target of the degrade rule, at {step_words(step)}"
         text = self._text(kind, step, link)
-        number = link if kind == CONTINGENCY_LINK else step
+        number = number_of(link if kind == CONTINGENCY_LINK else step)  # a link by its place in the chain, from 1
         return f"{_KINDS[kind]} {number}{f' `{text}`' if text else ''}"
 
     def _text(self, kind: int, step: int, link: int) -> str:

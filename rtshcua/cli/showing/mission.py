@@ -6,6 +6,7 @@ from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.step_number import number_of
 
 
 def show_mission(page: Page, mission: Mission, policy: Policy) -> None:
@@ -27,7 +28,9 @@ def show_mission(page: Page, mission: Mission, policy: Policy) -> None:
 
 def _show_step(page: Page, step: Invocation, mission: Mission, policy: Policy) -> None:
     contract = step.contract
-    page.text(f"{step.step:>2} {contract.name}({words.arguments(policy, contract.parameters, step.arguments)})")
+    page.text(
+        f"{number_of(step.step):>2} {contract.name}({words.arguments(policy, contract.parameters, step.arguments)})"
+    )
     phases = [name for number, name in enumerate(mission.phases) if step.phases >> number & 1]
     rows = [
         ("asked by", f"role {policy.roles[step.role]} through {words.source(step.source)}"),

@@ -17,6 +17,7 @@ from rtshcua.model.durability import SYNCED
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
+from rtshcua.model.step_number import number_of
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.untrusted import Untrusted
 
@@ -102,6 +103,7 @@ def show_record(page: Page, told: Told, report: Report) -> dict[str, object]:
     return {
         "record": {name: value for name, value in fields.items() if name not in ("bundle", "root")},
         "what": told.what.strip(" ·"),
+        "step_number": number_of(record.step) if isinstance(record, Decision | Effect) and record.step >= 0 else None,
         "permitted_by": None if told.permit is None else told.permit.seq,
         "sent_by": None if told.sent is None else told.sent.seq,
         "sealed_by": None if told.sealed_by is None else told.sealed_by.seq,

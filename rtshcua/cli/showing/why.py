@@ -17,6 +17,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.outcome import Outcome
+from rtshcua.model.step_number import number_of
 from rtshcua.onboard.calls import is_own
 
 _TRUTHS: Mapping[int, str] = {TRUE: "true", FALSE: "false", UNKNOWN: "unknown"}
@@ -58,6 +59,7 @@ def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
     return {
         "kind": "why",
         "step": flat.step,
+        "step_number": number_of(flat.step),
         "skill": flat.contract.name,
         "outcome": decision.outcome.name.lower(),
         "reason": decision.reason.value,
@@ -85,9 +87,8 @@ def _flies(target: Link | None, aloft: bool | None) -> str:
 
 def _subject(policy: Policy, invocation: PreparedInvocation) -> str:
     flat = invocation.invocation
-    return (
-        f"Step {flat.step}, {flat.contract.name}({words.arguments(policy, flat.contract.parameters, flat.arguments)})"
-    )
+    arguments = words.arguments(policy, flat.contract.parameters, flat.arguments)
+    return f"Step {number_of(flat.step)}, {flat.contract.name}({arguments})"
 
 
 def _step(page: Page, step: Traced, case: Case, decisive: Decisive) -> dict[str, object]:

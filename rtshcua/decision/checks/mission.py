@@ -15,6 +15,7 @@ from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_PATH, MAX_PHASES, MAX
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE
+from rtshcua.model.step_number import step_words
 
 
 def mission(mission: Mission, policy: Policy) -> Iterator[str]:
@@ -35,10 +36,10 @@ def mission(mission: Mission, policy: Policy) -> Iterator[str]:
         yield "two phases have the same name"
     for step, one in enumerate(mission.invocations):
         if one.step != step:
-            yield f"step {step} says it is step {one.step}"
-        yield from at(f"step {step}", index("phase", one.phase, len(mission.phases)))
+            yield f"{step_words(step)} says it is {step_words(one.step)}"
+        yield from at(step_words(step), index("phase", one.phase, len(mission.phases)))
         if one.phases & ~_phases(one.contract, mission):
-            yield f"step {step}: it is valid in a phase that its contract does not name"
+            yield f"{step_words(step)}: it is valid in a phase that its contract does not name"
     yield from _rules_words(mission, policy)
     if len({one.invocation_id for one in mission.invocations}) != len(mission.invocations):
         yield "two steps have the same id"

@@ -2,6 +2,8 @@
 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Decision, Effect
+from rtshcua.ground.auditor.named import ref_words
+from rtshcua.model.step_number import step_words
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
 
 DISPATCHED = "dispatched"
@@ -37,9 +39,11 @@ class Cover:
             return None
         self.dispatches += 1
         if self.recalled and record.kind == STEP:
-            return Flaw("dispatch/recalled", "a step was sent after the mission was recalled", f"step {record.step}")
+            return Flaw("dispatch/recalled", "a step was sent after the mission was recalled", step_words(record.step))
         if self.cancelled and record.kind == STEP:
-            return Flaw("dispatch/cancelled", "a step was sent after the mission was cancelled", f"step {record.step}")
+            return Flaw(
+                "dispatch/cancelled", "a step was sent after the mission was cancelled", step_words(record.step)
+            )
         until_us = self._until_us.pop(record.ref, None)
         if until_us is not None:
             if record.at_us <= until_us or self._stands(record):
@@ -49,7 +53,7 @@ class Cover:
         if self._stands(record):
             return None
         text = "it was sent without an earlier record that permits it"
-        return Flaw("dispatch/not-permitted", text, f"kind {record.kind}, step {record.step}, link {record.link}")
+        return Flaw("dispatch/not-permitted", text, ref_words(record.ref))
 
     def _stands(self, record: Effect) -> bool:
         if record.kind == FALLBACK_LINK:

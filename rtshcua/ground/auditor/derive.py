@@ -7,12 +7,14 @@ from rtshcua.decision.session import Session
 from rtshcua.decision.situation import SINGLE
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import DECIDED, Decision, in_words
+from rtshcua.ground.auditor.named import ref_words
 from rtshcua.ground.auditor.observed import Observed
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.decision import Decision as Decided
 from rtshcua.model.durability import WORDS, WRITTEN
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
+from rtshcua.model.step_number import step_words
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP, Ref
 from rtshcua.wire.response import Status
 
@@ -98,7 +100,7 @@ class Deriver:
         refused = self._session.refusal(ref)
         if refused is Status.UNKNOWN_STEP:
             text = "the bundle has no such step or link"
-            return Flaw("decision/unknown-step", text, f"kind {ref.kind}, step {ref.step}, link {ref.link}")
+            return Flaw("decision/unknown-step", text, ref_words(ref))
         if ref.kind == CONTINGENCY_LINK:
             if not record.invocation:
                 return None
@@ -118,8 +120,8 @@ class Deriver:
         if refused is None:
             return None
         text = "a step is decided whose turn had not come, or was over: the boundary decides no such step"
-        current = f"step {self._session.current} or the next"
-        return Flaw("decision/not-current", text, f"step {ref.step}", current)
+        current = f"{step_words(self._session.current)} or the next"
+        return Flaw("decision/not-current", text, step_words(ref.step), current)
 
     def _step(self, record: Decision, state: State, now: Now) -> Decided | Flaw:
         given = record.context

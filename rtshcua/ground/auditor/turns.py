@@ -7,6 +7,7 @@ forward only, and a chain lapses when another step was sent. A dispatch names a 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.auditor.cover import DISPATCHED
+from rtshcua.ground.auditor.named import ref_words
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
@@ -96,4 +97,4 @@ def _nth(chain: tuple[Link, ...], number: int) -> tuple[Link, ...]:
 
 
 def _name(record: Effect) -> str:
-    return f"kind {record.kind}, step {record.step}, link {record.link}"
+    return ref_words(record.ref)

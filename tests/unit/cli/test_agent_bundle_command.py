@@ -132,7 +132,7 @@ def test_the_skill_is_one_by_the_specification_of_skills(base: Path, tmp_path: P
     assert 0 < len(fields["description"]) <= 1024
     tools = set(re.findall(r"`([a-z]+_[a-z]+|cancel|replan)`", body))
     server = (CHECKOUT / "rtshcua/adapters/mcp_server/server.py").read_text("utf-8")
-    for tool in tools - {"idempotency_key", "wait_s", "from_step"}:
+    for tool in tools - {"idempotency_key", "wait_s", "from_step_number"}:
         assert f'"{tool}"' in server, "the skill speaks of tools that there are"
     assert {"describe_vehicle", "propose_mission", "mission_status", "cancel", "replan"} <= tools
 

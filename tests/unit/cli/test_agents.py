@@ -136,7 +136,7 @@ def test_the_view_follows_a_replacement_and_shows_no_signature(run: Followed) ->
     run.hand(replacement(run.loaded))
     (what,) = [teller.tell(line) for line in run.lines[before:]]
     assert what is not None
-    assert (what.event, what.detail) == ("replacement", "from step 2 on")
+    assert (what.event, what.detail) == ("replacement", "from step 3 on")
     teller.replace(run.loaded.bundle.mission)
     longest = b'{"type":"effect","at_us":1,"kind":0,"step":9,"event":"x"}\n'
     far = teller.tell(longest)

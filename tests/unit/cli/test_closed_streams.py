@@ -18,7 +18,7 @@ def shell(line: str, folder: Path) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.mark.parametrize(
-    "words", ["--version", "--help", "show a.bundle", "explain E1001", "why a.bundle --step 0", "show -h"]
+    "words", ["--version", "--help", "show a.bundle", "explain E1001", "why a.bundle --step 1", "show -h"]
 )
 def test_closed_output_is_quiet_and_not_a_success(words: str, tmp_path: Path) -> None:
     (tmp_path / "a.bundle").write_bytes(case.seal(case.mission()))

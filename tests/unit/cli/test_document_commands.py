@@ -82,24 +82,24 @@ def presented(of: Loaded, document: Path) -> Receipt:
 
 def test_from_the_command_line_to_the_boundary(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     of = in_force(here / "low.bundle")
-    assert main(["approve", "low.bundle", "--step", "2", "-o", "yes", *FLIGHT]) == ExitCode.OK
+    assert main(["approve", "low.bundle", "--step", "3", "-o", "yes", *FLIGHT]) == ExitCode.OK
     said = capsys.readouterr()
     assert "approved as supervisor" in said.out
     assert re.search(r" along \d+ points, \d+\.\d m in all", said.out + said.err), "who signed chose it"
     assert (here / "yes").stat().st_mode & 0o777 == 0o600
     assert presented(of, here / "yes").granted == 1
-    assert main(["compile", "shorter.rts", "--replaces", "low.bundle", "--from", "2", *FLIGHT]) == ExitCode.OK
-    assert "4 steps, new from 2" in capsys.readouterr().out
+    assert main(["compile", "shorter.rts", "--replaces", "low.bundle", "--from", "3", *FLIGHT]) == ExitCode.OK
+    assert "4 steps, new from step 3" in capsys.readouterr().out
     assert presented(of, here / "shorter.replacement").slug == "accepted"
     assert [each.contract.name for each in of.bundle.mission.invocations] == ["takeoff", "goto", "hover", "return_home"]
     again = [*FLIGHT, "--replaces", "low.bundle", "--replaces", "shorter.replacement"]
-    assert main(["compile", "low.rts", *again, "--from", "2", "-o", "back", "--json"]) == ExitCode.OK
-    assert json.loads(capsys.readouterr().out)["replacement"]["from"] == 2
+    assert main(["compile", "low.rts", *again, "--from", "3", "-o", "back", "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["replacement"]["from_step_number"] == 3
     assert presented(of, here / "back").slug == "accepted"
     assert presented(of, here / "yes").slug == "other-mission", "what was approved stood there before"
     put = ["--replacement", "shorter.replacement", "--replacement", "back"]
     assert (
-        main(["approve", "low.bundle", *put, "--step", "2", "--refuse", "--role", "supervisor", "-o", "no", *FLIGHT])
+        main(["approve", "low.bundle", *put, "--step", "3", "--refuse", "--role", "supervisor", "-o", "no", *FLIGHT])
         == 0
     )
     assert presented(of, here / "no").granted == 0
@@ -114,7 +114,7 @@ def test_a_replacement_that_drops_a_phase_is_followed_in_a_log(here: Path, capsy
         "inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)", ""
     )
     (here / "two.rts").write_text(two)
-    assert main(["compile", "two.rts", "--replaces", "low.bundle", "--from", "2", *FLIGHT]) == ExitCode.OK
+    assert main(["compile", "two.rts", "--replaces", "low.bundle", "--from", "3", *FLIGHT]) == ExitCode.OK
     of, replacement = in_force(here / "low.bundle"), here / "two.replacement"
     assert presented(of, replacement).slug == "accepted"
     before = unpacked((here / "low.bundle").read_bytes(), "low.bundle")
@@ -133,26 +133,26 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
         assert main(list(command)) == code
         assert words in capsys.readouterr().err
 
-    says(ExitCode.USAGE, "has to go somewhere", "approve", "low.bundle", "--step", "2")
+    says(ExitCode.USAGE, "has to go somewhere", "approve", "low.bundle", "--step", "3")
     says(ExitCode.USAGE, "has to go somewhere", "recall", "low.bundle")
-    says(ExitCode.USAGE, "for one flight", "approve", "low.bundle", "--step", "2", "-o", "x")
+    says(ExitCode.USAGE, "for one flight", "approve", "low.bundle", "--step", "3", "-o", "x")
     says(ExitCode.USAGE, "for one flight", "recall", "low.bundle", "-o", "x")
-    says(ExitCode.USAGE, "there is no step 4", "approve", "low.bundle", "--step", "4", "-o", "x")
-    says(ExitCode.USAGE, "no `confirm` of the policy", "approve", "low.bundle", "--step", "1", "-o", "x")
-    says(ExitCode.USAGE, "is not asked", "approve", "low.bundle", "--step", "2", "--role", "operator", "-o", "x")
-    says(ExitCode.USAGE, "for", "approve", "low.bundle", "--step", "2", "--for", "100000", "-o", "x")
-    says(ExitCode.INPUT, "no such file", "approve", "nothing.bundle", "--step", "2", "-o", "x")
+    says(ExitCode.USAGE, "there is no step 5", "approve", "low.bundle", "--step", "5", "-o", "x")
+    says(ExitCode.USAGE, "no `confirm` of the policy", "approve", "low.bundle", "--step", "2", "-o", "x")
+    says(ExitCode.USAGE, "is not asked", "approve", "low.bundle", "--step", "3", "--role", "operator", "-o", "x")
+    says(ExitCode.USAGE, "for", "approve", "low.bundle", "--step", "3", "--for", "100000", "-o", "x")
+    says(ExitCode.INPUT, "no such file", "approve", "nothing.bundle", "--step", "3", "-o", "x")
     says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--replaces", "low.bundle")
-    says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--from", "2")
+    says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--from", "3")
     says(
         ExitCode.REFUSED,
-        "step 2 is to stay",
+        "step 3 is to stay",
         "compile",
         "shorter.rts",
         "--replaces",
         "low.bundle",
         "--from",
-        "3",
+        "4",
         *FLIGHT,
     )
     says(ExitCode.INPUT, "is no replacement", "replace", "low.bundle", "--to", "s")
@@ -162,12 +162,12 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     other = (here / "shorter.rts").read_text().replace("bridge_inspection", "training_field").replace("@7", "@2")
     other = other.replace("    goto(bridge_a.entry, altitude = 9 m)\n", "")
     (here / "other.rts").write_text(other)
-    says(ExitCode.REFUSED, "another policy", "compile", "other.rts", "--replaces", "low.bundle", "--from", "1", *FLIGHT)
+    says(ExitCode.REFUSED, "another policy", "compile", "other.rts", "--replaces", "low.bundle", "--from", "2", *FLIGHT)
     damaged = bytearray((here / "low.bundle").read_bytes())
     damaged[len(damaged) // 2] ^= 1
     (here / "damaged.bundle").write_bytes(damaged)
-    says(ExitCode.UNTRUSTED, "key", "approve", "damaged.bundle", "--step", "2", "-o", "x")
-    says(ExitCode.USAGE, "has 4 steps", "compile", "shorter.rts", "--replaces", "low.bundle", "--from", "99", *FLIGHT)
+    says(ExitCode.UNTRUSTED, "key", "approve", "damaged.bundle", "--step", "3", "-o", "x")
+    says(ExitCode.USAGE, "has 4 steps", "compile", "shorter.rts", "--replaces", "low.bundle", "--from", "100", *FLIGHT)
     assert not (here / "x").exists()
     assert not (here / "other.replacement").exists()
 
@@ -180,7 +180,7 @@ def test_what_flies_is_stopped_also_once_the_keys_of_its_bundle_are_revoked(here
     first.write_bytes(KeyStore(data_folder()).root())
     for _ in range(2):
         assert main(["keys", "replace", whose]) == ExitCode.OK
-    answer = ["approve", "low.bundle", "--step", "2", "-o", "answer", *FLIGHT]
+    answer = ["approve", "low.bundle", "--step", "3", "-o", "answer", *FLIGHT]
     assert main([*answer, "--refuse"]) == ExitCode.OK
     assert presented(flies, here / "answer").granted == 0
     assert main(answer) == ExitCode.UNTRUSTED, "what lets it fly on is signed under the root of today"
@@ -219,12 +219,12 @@ def test_who_replaced_the_key_that_a_flight_knows_recalls_it_with_that_one(here:
     "words",
     [
         "show cut.bundle",
-        "why cut.bundle --step 0",
+        "why cut.bundle --step 1",
         "run cut.bundle --runs r",
         "doctor --connect udpin:127.0.0.1:14999 cut.bundle",
-        "approve cut.bundle --step 2 -o x",
+        "approve cut.bundle --step 3 -o x",
         "recall cut.bundle -o x",
-        "compile shorter.rts --replaces cut.bundle --from 1 --flight 00000000000000000000000000000000",
+        "compile shorter.rts --replaces cut.bundle --from 2 --flight 00000000000000000000000000000000",
     ],
 )
 def test_a_bundle_that_was_cut_is_malformed_for_everybody(
@@ -264,8 +264,8 @@ def test_what_the_flight_says_is_what_the_command_says(
     here: Path, listening: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     to = ["--to", str(listening)]
-    assert main(["approve", "low.bundle", "--step", "2", *to]) == ExitCode.OK
-    assert "approved as supervisor for 300 s: step 2" in capsys.readouterr().out
+    assert main(["approve", "low.bundle", "--step", "3", *to]) == ExitCode.OK
+    assert "approved as supervisor for 300 s: step 3" in capsys.readouterr().out
     assert main(["recall", "low.bundle", *to]) == ExitCode.REFUSED
     assert "`--policy` calls home whatever flies" in capsys.readouterr().err
     assert main(["recall", "low.bundle", *to, "--json"]) == ExitCode.REFUSED

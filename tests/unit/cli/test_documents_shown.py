@@ -47,9 +47,9 @@ def test_a_timeline_names_the_steps_that_are_in_force(log: Path, capsys: pytest.
     assert "granted as supervisor, good until" in out
     assert f"key {APPROVAL_KEY.kid.hex()}" in out
     assert "calls home the mission" in out
-    assert "steps, new from step 2" in out
+    assert "steps, new from step 3" in out
     assert max(map(len, out.splitlines())) < 240
-    assert "step 2 `return_home()`" in out, "the last step, which is the third one now"
+    assert "step 3 `return_home()`" in out, "the last step, which is the third one now"
 
 
 def test_a_decision_is_told_from_the_mission_in_force(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,7 +85,7 @@ def test_the_audit_says_what_was_signed(log: Path, capsys: pytest.CaptureFixture
         (approval, APPROVAL_KEY, "granted as supervisor, good until"),
         (lambda of: approval(of, granted=0), APPROVAL_KEY, "refused as supervisor"),
         (recall, APPROVAL_KEY, "calls home the mission"),
-        (replacement, MISSION_KEY, "new from step 2"),
+        (replacement, MISSION_KEY, "new from step 3"),
         (cancellation, MISSION_KEY, "cancels the mission"),
     ],
 )
@@ -243,4 +243,4 @@ def test_the_target_of_a_degrade_rule_is_named_as_such() -> None:
     run.until_over()
     names = Names(None)
     told = [names.tell(record) for record in map(read, run.lines) if not isinstance(record, Flaw)]
-    assert any("target of the degrade rule, at step 1" in line for line in told)
+    assert any("target of the degrade rule, at step 2" in line for line in told)

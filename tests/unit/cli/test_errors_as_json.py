@@ -24,7 +24,7 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("run missing.bundle", ExitCode.INPUT, "input"),
         ("doctor --connect nowhere", ExitCode.USAGE, "usage"),
         ("doctor --connect udpin:127.0.0.1:1 missing.bundle", ExitCode.INPUT, "input"),
-        ("approve missing.bundle --step 0 --to x", ExitCode.UNTRUSTED, "no-keys"),
+        ("approve missing.bundle --step 1 --to x", ExitCode.UNTRUSTED, "no-keys"),
         ("verify-log missing", ExitCode.UNTRUSTED, "no-keys"),
         ("show missing", ExitCode.INPUT, "input"),
         ("explain E9999", ExitCode.USAGE, "usage"),

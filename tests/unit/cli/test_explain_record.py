@@ -34,7 +34,7 @@ def words(capsys: pytest.CaptureFixture[str]) -> str:
 def test_a_decision(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert explain(log, DECISION["seq"]) == ExitCode.OK
     told = words(capsys)
-    assert f"Record {DECISION['seq']}: allow step 0" in told
+    assert f"Record {DECISION['seq']}: allow step 1" in told
     assert f"asked to begin a step, for invocation {DECISION['invocation']}" in told
     assert "decided allow: admitted, at step 8 of the rules" in told
     assert f"sent by record {SENT['seq']}" in told

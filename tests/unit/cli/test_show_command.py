@@ -116,7 +116,7 @@ def test_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "log.jsonl").write_bytes(b"".join(other_flight()))
     out = shown(tmp_path, capsys)
     assert "not verified" in out
-    assert "allow     step 0 `takeoff(" in out, "what is bound, whatever the text says"
+    assert "allow     step 1 `takeoff(" in out, "what is bound, whatever the text says"
     assert "· violated" in out
     assert f"closed after {len(other_flight()) - 1} records: aborted" in out
     assert sum("  · dispatched" in line for line in out.splitlines()) == 3
@@ -139,7 +139,7 @@ def test_a_damaged_log_is_shown_as_far_as_it_goes(tmp_path: Path, capsys: pytest
     lines[at] = lines[at].replace(b'"seq"', b'"\\u0073eq"')
     (tmp_path / "x").write_bytes(b"".join(lines))
     out = shown(tmp_path / "x", capsys)
-    assert "allow     step 0: admitted" in out
+    assert "allow     step 1: admitted" in out
     assert "follows" in out
     assert "The rest is not shown" in out
     assert f"line {at + 1} is no record" in out

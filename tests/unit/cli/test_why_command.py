@@ -31,7 +31,7 @@ def test_every_step_of_the_shipped_mission_is_admitted_as_its_contract_wants_the
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     for step in range(6):
-        found = shown(capsys, STANDARD, "--step", str(step), *AT)
+        found = shown(capsys, STANDARD, "--step", str(step + 1), *AT)
         assert (found["outcome"], found["reason"]) == ("allow", "admitted"), step
 
 
@@ -49,13 +49,13 @@ def test_a_state_by_hand(
     settings: list[str], reason: str, clause: str, would_pass: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = [word for setting in settings for word in ("--state", setting)]
-    found = shown(capsys, STANDARD, "--step", "2", *AT, *options)
+    found = shown(capsys, STANDARD, "--step", "3", *AT, *options)
     assert (found["reason"], found["clause"]) == (reason, clause)
     assert [each["words"] for each in found["would_pass"]] == would_pass
 
 
 def test_a_person_sees_each_step_what_decided_and_what_would_pass(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = why(capsys, STANDARD, "--step", "2", *AT, "--state", "battery=32 %")
+    code, out, _ = why(capsys, STANDARD, "--step", "3", *AT, "--state", "battery=32 %")
     assert code == ExitCode.OK
     assert "fallback, state/violated" in out
     assert "> require   false: `battery > 35 %`   with battery = 32 %" in out
@@ -65,7 +65,7 @@ def test_a_person_sees_each_step_what_decided_and_what_would_pass(capsys: pytest
 
 
 def test_late(capsys: pytest.CaptureFixture[str]) -> None:
-    found = shown(capsys, STANDARD, "--step", "2", *AT, "--waited", "4990")
+    found = shown(capsys, STANDARD, "--step", "3", *AT, "--waited", "4990")
     assert (found["outcome"], found["reason"]) == ("fallback", "timing/no-slack")
 
 
@@ -73,18 +73,18 @@ def test_late(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "message"),
     [
         ([STANDARD], "say which step"),
-        ([STANDARD, "--step", "6"], "there is no step 6"),
-        ([STANDARD, "--step", "0", "--state", "batery=3 %"], "did you mean `battery`?"),
-        ([STANDARD, "--step", "0", "--state", "battery"], "sets nothing"),
-        ([STANDARD, "--step", "0", "--state", "battery=3 m"], "write a ratio with one of the units `%`"),
-        ([STANDARD, "--step", "0", "--state", "battery=-1 %"], "it goes from `0 %` up to `100 %`"),
-        ([STANDARD, "--step", "0", "--state", "battery=101 %"], "the nearest value is `100 %`"),
-        ([STANDARD, "--step", "0", "--state", "battery=9 %", "--state", "battery = 9 %"], "`battery` is given twice"),
-        ([STANDARD, "--step", "0", "--state", "battery=much"], "is no value of `battery`"),
-        ([STANDARD, "--step", "0", "--state", "gps.fix=fix_4d"], "did you mean `fix_"),
-        ([STANDARD, "--step", "0", "--state", "position=here"], "is no value of `position`"),
-        ([STANDARD, "--step", "0", "--state", "position=0.5 N, 8.5 E"], "too far from the vehicle's home"),
-        ([STANDARD, "--step", "0", "--at", "noon"], "is not a UTC time"),
+        ([STANDARD, "--step", "7"], "there is no step 7"),
+        ([STANDARD, "--step", "1", "--state", "batery=3 %"], "did you mean `battery`?"),
+        ([STANDARD, "--step", "1", "--state", "battery"], "sets nothing"),
+        ([STANDARD, "--step", "1", "--state", "battery=3 m"], "write a ratio with one of the units `%`"),
+        ([STANDARD, "--step", "1", "--state", "battery=-1 %"], "it goes from `0 %` up to `100 %`"),
+        ([STANDARD, "--step", "1", "--state", "battery=101 %"], "the nearest value is `100 %`"),
+        ([STANDARD, "--step", "1", "--state", "battery=9 %", "--state", "battery = 9 %"], "`battery` is given twice"),
+        ([STANDARD, "--step", "1", "--state", "battery=much"], "is no value of `battery`"),
+        ([STANDARD, "--step", "1", "--state", "gps.fix=fix_4d"], "did you mean `fix_"),
+        ([STANDARD, "--step", "1", "--state", "position=here"], "is no value of `position`"),
+        ([STANDARD, "--step", "1", "--state", "position=0.5 N, 8.5 E"], "too far from the vehicle's home"),
+        ([STANDARD, "--step", "1", "--at", "noon"], "is not a UTC time"),
         ([STANDARD, "--record", "3"], "is no log"),
     ],
 )
@@ -97,16 +97,16 @@ def test_wrong_words(words: list[str], message: str, capsys: pytest.CaptureFixtu
 def test_what_is_no_bundle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "x.bundle"
     path.write_bytes(b"nothing of ours")
-    code, _, err = why(capsys, str(path), "--step", "0")
+    code, _, err = why(capsys, str(path), "--step", "1")
     assert code in (ExitCode.INPUT, ExitCode.UNTRUSTED)
     assert "accepted: a source" in err
-    assert why(capsys, str(tmp_path / "missing.bundle"), "--step", "0")[0] == ExitCode.INPUT
+    assert why(capsys, str(tmp_path / "missing.bundle"), "--step", "1")[0] == ExitCode.INPUT
 
 
 def test_a_source_with_an_error_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "x.rts"
     path.write_text("mission m under p@1 on q { }", encoding="utf-8")
-    code, _, err = why(capsys, str(path), "--step", "0")
+    code, _, err = why(capsys, str(path), "--step", "1")
     assert code == ExitCode.DIAGNOSTICS
     assert "E0201" in err
 
@@ -131,7 +131,7 @@ def test_a_log_that_lacks_what_is_asked_for(log: Path, capsys: pytest.CaptureFix
     code, out, err = why(capsys, str(log), "--record", "9999")
     assert (code, out) == (ExitCode.INPUT, "")
     assert "`rtshcua show` lists the records" in err
-    assert why(capsys, str(log), "--step", "1")[0] == ExitCode.USAGE
+    assert why(capsys, str(log), "--step", "2")[0] == ExitCode.USAGE
 
 
 OVER_TIME = """
@@ -172,7 +172,7 @@ def test_by_hand_a_state_has_lasted_as_long_as_conditions_look_back(
     path = tmp_path / "calm.rts"
     path.write_text(OVER_TIME, encoding="utf-8")
     options = [word for setting in settings for word in ("--state", setting)]
-    assert shown(capsys, str(path), "--step", "1", *options)["outcome"] == outcome
+    assert shown(capsys, str(path), "--step", "2", *options)["outcome"] == outcome
 
 
 CONFIRMED = """
@@ -200,7 +200,7 @@ mission up under seen@1 on surveyor {
 def test_what_follows_an_approval(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "seen.rts"
     path.write_text(CONFIRMED, encoding="utf-8")
-    asked = (str(path), "--step", "0")
+    asked = (str(path), "--step", "1")
     assert shown(capsys, *asked)["reason"] == "approval/awaited"
     assert shown(capsys, *asked, "--approved")["outcome"] == "allow"
     assert shown(capsys, *asked, "--approved", "--state", "battery=9 %")["reason"] == "state/violated"

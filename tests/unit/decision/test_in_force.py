@@ -98,9 +98,9 @@ def test_an_approval_counts_until_it_expires_and_a_refusal_for_good() -> None:
     of = flight()
     assert of.approvals(STEP, START) == ()
     receipt = take(of, approval(OF))
-    assert (receipt.accepted, receipt.text) == (True, f"step {ASKED} is granted by `supervisor`")
+    assert (receipt.accepted, receipt.text) == (True, f"step {ASKED + 1} is granted by `supervisor`")
     assert take(of, approval(OF)).slug == "already-answered"
-    assert take(of, approval(OF, granted=0)).text == f"step {ASKED} is refused by `supervisor`"
+    assert take(of, approval(OF, granted=0)).text == f"step {ASKED + 1} is refused by `supervisor`"
     assert {each.granted for each in of.approvals(STEP, START)} == {0, 1}
     assert {each.granted for each in of.approvals(STEP, later(10 * MIN))} == {0}
     assert of.approvals(OF.bundle.mission.invocations[0], START) == ()
@@ -233,7 +233,7 @@ def test_after_a_replacement_its_steps_are_in_force_and_their_answers_are_forgot
     of = flight()
     assert take(of, approval(OF)).accepted
     receipt = take(of, replacement(OF))
-    assert (receipt.accepted, receipt.text) == (True, "the mission has 3 steps now, new from 2")
+    assert (receipt.accepted, receipt.text) == (True, "the mission has 3 steps now, new from step 3")
     assert len(of.invocations) == 3
     assert of.bundle.mission.invocations[:2] == OF.bundle.mission.invocations[:2]
     assert of.approvals(STEP, START) == ()

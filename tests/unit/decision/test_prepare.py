@@ -424,19 +424,19 @@ NO_NAME = "no name: letters of ASCII, digits, `_` and `.` make one"
         (replace(MISSION, vehicle="quad-08"), "vehicle `quad-08` is not the policy's, `quad-07`"),
         (replace(MISSION, invocations=MISSION.invocations * 4097), "number of invocations 16388 is not in 0..16384"),
         (replace(MISSION, phases=("p",) * 65), "number of phases 65 is not in 0..64"),
-        (replace(MISSION, invocations=MISSION.invocations[1:]), "step 0 says it is step 1"),
-        (replace(MISSION, phases=("departure",)), "step 1: there is no phase 1"),
+        (replace(MISSION, invocations=MISSION.invocations[1:]), "step 1 says it is step 2"),
+        (replace(MISSION, phases=("departure",)), "step 2: there is no phase 1"),
         (
             replace(MISSION, invocations=(MISSION.invocations[0], replace(MISSION.invocations[0], step=1))),
             "two steps have the same id",
         ),
-        (replace(MISSION, invocations=(replace(MISSION.invocations[0], role=9),)), "step 0: there is no role 9"),
+        (replace(MISSION, invocations=(replace(MISSION.invocations[0], role=9),)), "step 1: there is no role 9"),
         *(
             (saying(f" {each.text}\n"), f"a clause says `{each.text}` in the policy's words, and is another")
             for each in (P.rules[0], P.airspace)
         ),
-        (phases(2, 0b011), "step 2: it is valid in a phase that its contract does not name"),
-        (phases(0, 0b1001), "step 0: it is valid in a phase that its contract does not name"),
+        (phases(2, 0b011), "step 3: it is valid in a phase that its contract does not name"),
+        (phases(0, 0b1001), "step 1: it is valid in a phase that its contract does not name"),
     ],
 )
 def test_a_malformed_mission(mission: Mission, what: str) -> None:

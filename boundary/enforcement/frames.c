@@ -43,13 +43,15 @@ void rt_gate_observe(rt_gate *gate, rt_bytes octets, int64_t now_us) {
     if (!rt_read_frame(octets, &heard) || heard.component != RT_MAV_COMP_ID_AUTOPILOT1)
         return;
     if (heard.message == RT_MSG_HEARTBEAT) {
-        uint8_t autopilot = heard.payload[RT_HEARTBEAT_AUTOPILOT];
+        uint8_t autopilot = heard.payload[RT_HEARTBEAT_AUTOPILOT], kind = heard.payload[RT_HEARTBEAT_TYPE];
         bool known = autopilot == RT_MAV_AUTOPILOT_PX4 || autopilot == RT_MAV_AUTOPILOT_ARDUPILOTMEGA;
-        if (gate->system == 0 && known) {
+        bool vehicle = kind < 64 && (RT_VEHICLES >> kind & 1) != 0; /* no ground station, gimbal or companion */
+        if (gate->system == 0 && known && vehicle) {
             gate->system = heard.system;
             gate->autopilot = autopilot;
+            gate->kind = kind;
         }
-        if (heard.system == gate->system) {
+        if (heard.system == gate->system && autopilot == gate->autopilot && kind == gate->kind) {
             gate->armed = (heard.payload[RT_HEARTBEAT_BASE_MODE] & RT_MAV_MODE_FLAG_SAFETY_ARMED) != 0;
             gate->armed_us = now_us;
         }

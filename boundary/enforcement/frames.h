@@ -19,7 +19,7 @@ typedef struct {
     bool here_known;
     rt_point here;
     bool started; /* a session was opened: fences stay as they are */
-    uint8_t system, autopilot;
+    uint8_t system, autopilot, kind; /* of its heartbeat */
     bool armed;
     int64_t armed_us, stands_us;
     bool types_known;

@@ -208,6 +208,7 @@ static const rt_layout rt_layouts[] = {
 #define RT_MAV_MISSION_TYPE_FENCE 1
 #define RT_POSITION_ONLY 3576
 #define RT_NO_PLACE 2147483647
+#define RT_VEHICLES UINT64_C(0xe80833fbff9f)
 #define RT_PX4_MANUAL {1, 0}
 #define RT_PX4_ALTITUDE {2, 0}
 #define RT_PX4_POSITION {3, 0}

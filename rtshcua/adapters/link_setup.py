@@ -17,10 +17,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.transport import Transport
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, Received, is_addressed
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
-from rtshcua.mavlink.modes import ARDUPILOT, KNOWN, PX4
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, is_vehicle
 from rtshcua.mavlink.signing import SignedLink, State
 
 _AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
@@ -119,6 +119,7 @@ class LinkSetup:
         self._greeted_us: int | None = None
         self._system = 0
         self._autopilot = 0
+        self._kind = (0, 0)
         self._other: int | None = None
         self._armed: tuple[bool, int] | None = None  # and when it said so
         self._landed: tuple[int, int] | None = None
@@ -165,7 +166,7 @@ class LinkSetup:
         if frame.signed:
             self._verified += self._link.accept(frame.frame, self._now_us)
         match frame.name:
-            case "HEARTBEAT":
+            case "HEARTBEAT" if _kind(message) == self._kind:
                 self._armed = bool(message.base_mode & enums.MAV_MODE_FLAG_SAFETY_ARMED), self._now_us
             case "EXTENDED_SYS_STATE":
                 self._landed = message.landed_state, self._now_us
@@ -180,13 +181,13 @@ class LinkSetup:
 
     def _is_ours(self, message: Any) -> bool:
         """Another ground station may ask for messages, too."""
-        return getattr(message, "target_component", 0) in (0, _OURS)
+        return is_addressed(message, self._system, _OURS)
 
     def _meet(self, frame: Received) -> None:
         if self._wanted is not None and frame.system != self._wanted:
             return
         if not self._system:
-            self._system, self._autopilot = frame.system, frame.message.autopilot
+            self._system, self._autopilot, self._kind = frame.system, frame.message.autopilot, _kind(frame.message)
             self._sender = Codec(frame.system, _OURS)
         elif frame.system != self._system:
             self._other = frame.system
@@ -323,9 +324,13 @@ class LinkSetup:
         return told is not None and self._now_us - told[1] <= _FRESH_US
 
 
+def _kind(heartbeat: Any) -> tuple[int, int]:
+    return heartbeat.type, heartbeat.autopilot
+
+
 def _is_autopilot(frame: Received) -> bool:
-    known = frame.name == "HEARTBEAT" and frame.message.autopilot in KNOWN
-    return known and frame.component == _AUTOPILOT
+    beats = frame.name == "HEARTBEAT" and frame.component == _AUTOPILOT
+    return beats and is_vehicle(frame.message.type, frame.message.autopilot)
 
 
 def carry_out(setup: LinkSetup, transport: Transport, now_us: Callable[[], int]) -> SetUp | Refusal:

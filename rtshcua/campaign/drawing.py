@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.faults import Fault, Mode, Voice, Way
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import AfterStep, AtTime, Incident, Scenario, Start, When
@@ -42,7 +42,7 @@ GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
         20,
         (
             faults.LinkDelay, faults.LinkJitter, faults.LinkReorder, faults.LinkLoss, faults.LinkSilence,
-            faults.LinkSilence, faults.LinkQuality,
+            faults.LinkSilence, faults.LinkQuality, faults.SecondVoice,
         ),
     ),
     (
@@ -89,6 +89,7 @@ _SOMEWHERE = Range(-60_000, 60_000, 1_000)
 #: what a parameter of a kind is drawn from, and of all kinds that name it where there is no kind before it
 RANGES: Final[Mapping[tuple[type[Fault] | None, str], Range]] = {
     (None, "for_us"): _LASTS,
+    (None, "each_us"): Range(50_000, 5 * S, 50_000, by_ratio=True),
     (None, "delay_us"): Range(50_000, 5 * S, 50_000, by_ratio=True),
     (None, "jitter_us"): Range(20_000, 2 * S, 20_000, by_ratio=True),
     (None, "part"): Range(100, 5_000, 100),
@@ -285,6 +286,8 @@ def _value(chance: Random, kind: type[Fault], name: str, space: Space) -> object
         return chance.choice((Way.BOTH, Way.BOTH, Way.UP, Way.DOWN))
     if name == "held":
         return chance.random() < 0.25
+    if name == "says":
+        return chance.choice(tuple(Voice))
     if name == "mode":
         return chance.choice(_MODES)
     if name == "message":

@@ -39,6 +39,12 @@ Message = Any
 """An instance of a generated `MAVLink_..._message` class; pymavlink ships no types."""
 
 
+def is_addressed(message: Message, system: int, component: int) -> bool:
+    """Whether a message is for this component: it names it, or everybody (0), or nobody (its kind has no target)."""
+    systems, components = (0, system), (0, component)
+    return getattr(message, "target_system", 0) in systems and getattr(message, "target_component", 0) in components
+
+
 class Kind(NamedTuple):
     """How messages of one number are decoded."""
 

@@ -10,6 +10,8 @@ MAV_TYPE_GCS: Final = 6
 #: quadrotor, coaxial, hexarotor, octorotor, tricopter, dodecarotor, decarotor
 MULTIROTORS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
 MAV_TYPE_ONBOARD_CONTROLLER: Final = 18
+#: what carries itself: of the others (ground stations, trackers, gimbals, cameras, ...) none is a vehicle
+VEHICLES: Final = frozenset({*range(5), *range(7, 18), *range(19, 26), 28, 29, 35, 43, 45, 46, 47})
 
 MAV_AUTOPILOT_ARDUPILOTMEGA: Final = 3
 MAV_AUTOPILOT_INVALID: Final = 8  # of a component that is none

@@ -11,6 +11,19 @@ ARDUPILOT: Final = enums.MAV_AUTOPILOT_ARDUPILOTMEGA
 KNOWN: Final = (PX4, ARDUPILOT)
 
 
+def is_vehicle(kind: int, autopilot: int) -> bool:
+    """Whether a HEARTBEAT of this MAV_TYPE and MAV_AUTOPILOT is of a vehicle whose autopilot is known.
+
+    A ground station, a gimbal or a companion computer is none, whatever autopilot it names.
+    """
+    return autopilot in KNOWN and kind in enums.VEHICLES
+
+
+def is_another(kind: int, autopilot: int) -> bool:
+    """Whether a HEARTBEAT is of some vehicle, whatever its autopilot."""
+    return autopilot != enums.MAV_AUTOPILOT_INVALID and kind in enums.VEHICLES
+
+
 class Px4Mode(IntEnum):
     """PX4's (`px4_custom_mode.h`), named as it tells them to people: `main << 16 | sub << 24`."""
 

@@ -209,6 +209,28 @@ class LinkSilence(LinkFault):
     held: bool = False
 
 
+class Voice(StrEnum):
+    """What somebody says under the vehicle's own ids."""
+
+    GIMBAL = "gimbal"
+    """A heartbeat of a component that is no autopilot: disarmed, in mode 0."""
+    DISARMED = "disarmed"
+    """The autopilot's own heartbeat, but disarmed."""
+    STRAYED = "strayed"
+    """The autopilot's own heartbeat, but in another mode (LAND)."""
+    ANSWERS = "answers"
+    """That commands were denied and a fence was refused, to another system."""
+
+
+@dataclass(frozen=True, slots=True)
+class SecondVoice(LinkFault):
+    """Somebody else speaks on the link under the vehicle's own ids, so often, beside the vehicle that goes on."""
+
+    says: Voice = Voice.GIMBAL
+    each_us: int = 250_000
+    for_us: int | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Stall(AutopilotFault):
     """The autopilot's loop halts: its time and its flight stand still, as recorded (arducopter-dropout).
@@ -428,6 +450,7 @@ KINDS: Mapping[str, type[Fault]] = {
     "link-loss": LinkLoss,
     "link-silence": LinkSilence,
     "link-quality": LinkQuality,
+    "second-voice": SecondVoice,
     "obstacle": Obstacle,
     "pillar": Pillar,
     "pilot": PilotMode,
@@ -479,7 +502,14 @@ UNITS: tuple[Unit, ...] = (
     Unit("", {"%": 100}, Dimension.RATIO),
 )
 #: fields that are one of some words
-WORDS: Mapping[str, tuple[str, ...]] = {"mode": tuple(Mode), "way": tuple(Way), "held": ("yes", "no")}
+WORDS: Mapping[str, tuple[str, ...]] = {
+    "mode": tuple(Mode),
+    "way": tuple(Way),
+    "held": ("yes", "no"),
+    "says": tuple(Voice),
+}
+#: and what their words are members of
+WORD_TYPES: Mapping[str, type[Mode | Way | Voice]] = {"mode": Mode, "way": Way, "says": Voice}
 #: fields that are a plain number
 COUNTS = frozenset({"copies", "shuffle"})
 #: fields that may be below zero: south and west, down, and back in time

@@ -9,6 +9,7 @@ from functools import partial
 from math import sin
 from random import Random
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -33,6 +34,9 @@ from rtshcua.simulation.streams import Reports, Streams
 from rtshcua.simulation.surroundings import Air, Surroundings
 from rtshcua.simulation.transfer import Transfer, TransferRules
 from rtshcua.simulation.vehicle import Event, Vehicle
+
+if TYPE_CHECKING:
+    from rtshcua.simulation.voices import SecondVoice
 
 TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
@@ -180,6 +184,8 @@ class Autopilot:
         """How long it goes on saying nothing, for it starts again."""
         self.taker: Taker | None = None
         """Who first took the vehicle over in flight, if somebody did."""
+        self.voices: list[SecondVoice] = []
+        """Who else speaks under its ids."""
         self.extras = config.extras
         self.link_quality = 10_000
         """What the radio tells of the link, in 1/10000."""

@@ -18,6 +18,7 @@ from rtshcua.simulation.command import Command
 from rtshcua.simulation.faults import message_number
 from rtshcua.simulation.link import Link
 from rtshcua.simulation.surroundings import Cylinder, Wind
+from rtshcua.simulation.voices import SecondVoice
 
 Effect = tuple[int, Callable[[], object]]
 """A time, and what happens then."""
@@ -118,6 +119,10 @@ def _on_link(fault: faults.LinkFault, on: Affected) -> Iterator[Effect]:
                 yield from _while(links, "silent", True, False, at_us, for_us)
         case faults.LinkQuality(at_us, quality):
             yield at_us, partial(_set, radio, "link_quality", quality)
+        case faults.SecondVoice(at_us, says, each_us, for_us):
+            voice = SecondVoice(says, each_us, at_us)
+            voices = on.autopilot.voices
+            yield from _for(at_us, for_us, partial(_begin, voices, voice), partial(_end, voices, voice))
         case _:
             raise _unknown(fault)
 
@@ -207,6 +212,14 @@ def _command(
     flags = float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
     frame = mavlink.MAV_FRAME_GLOBAL_INT
     a.flavour.commands[number](a, Command(number, p1, flags, 0.0, nan, latitude, longitude, amsl, frame, _STATION))
+
+
+def _begin(voices: list[SecondVoice], voice: SecondVoice) -> None:
+    voices.append(voice)
+
+
+def _end(voices: list[SecondVoice], voice: SecondVoice) -> None:
+    voices.remove(voice)
 
 
 def _while(

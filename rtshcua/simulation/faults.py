@@ -1,17 +1,15 @@
 """How a command line writes what goes wrong: `wind,at=20s,speed=12m/s,from=270deg`."""
 
 import re
-from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.model.faults import KINDS, UNITS, AgentFault, Fault, HostFault, Mode, Parameter, Way, parameters
+from rtshcua.model.faults import KINDS, UNITS, WORD_TYPES, AgentFault, Fault, HostFault, Parameter, parameters
 
 _QUANTITY = re.compile(r"(-?\d+(?:\.\d+)?)(\D*)", re.ASCII)
 _AT = Parameter("at", "at_us", UNITS[0], (), False, False, True)
-_WORDS: Mapping[str, type[Mode | Way]] = {"mode": Mode, "way": Way}
 _COUNTED = {"shuffle": "the seed of an order"}
 #: the kinds that a simulated vehicle can have by itself
 OF_VEHICLE = {name: kind for name, kind in KINDS.items() if not issubclass(kind, HostFault | AgentFault)}
@@ -88,4 +86,4 @@ def _word(parameter: Parameter, text: str) -> object:
         return text == "yes"
     if text not in parameter.words:
         raise ValueError(f"no such {parameter.name}: `{text}`; there are {', '.join(parameter.words)}")
-    return _WORDS[parameter.name](text)
+    return WORD_TYPES[parameter.name](text)

@@ -58,6 +58,7 @@ class Simulation:
         flavour, recorded = FLAVOURS[config.flavour], config.answers is Answers.RECORDED
         self._autopilot = Autopilot(flavour, config)
         self._face = Face(self._autopilot, config.system)
+        self._system = config.system
         self._up = Link(Random(f"{config.seed} uplink"))
         self._down = Link(Random(f"{config.seed} downlink"))
         self._now_us = self._ticked_us = 0
@@ -113,6 +114,9 @@ class Simulation:
                 self._taken_over_us = at_us
             if at_us >= face.radio_due_us:
                 down.send((face.radio(at_us),), at_us)
+            for voice in autopilot.voices:
+                if said := voice.due(autopilot, self._system, at_us):
+                    down.send(said, at_us)
             at_us += TICK_US
         now_us = self._now_us
         if to_us > now_us:

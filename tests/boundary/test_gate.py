@@ -137,7 +137,14 @@ def drawn_report(random: Random, of: Command, autopilot: int) -> bytes:
     home = HOME_AMSL + random.choice((0, 500, 9_999, 10_001))
     message = random.choice(
         (
-            m.MAVLink_heartbeat_message(2, autopilot, random.choice((0, 128)), 0, 4, 3),
+            m.MAVLink_heartbeat_message(
+                random.choice((2, 2, 2, 13, 6, 26, 255)),
+                random.choice((autopilot, autopilot, 3, 8)),
+                random.choice((0, 128)),
+                0,
+                4,
+                3,
+            ),
             m.MAVLink_global_position_int_message(0, x + off, y - off, home + above, above, 0, 0, 0, 0),
             m.MAVLink_global_position_int_message(0, x, y + off, home + above, above, 0, 0, 0, 0),
             m.MAVLink_extended_sys_state_message(0, random.randrange(5)),
@@ -159,7 +166,8 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
     there.open(command, home, now_us)
     here.close()
     there.close()
-    for report in (m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3), None)[: random.randrange(3)]:
+    first = m.MAVLink_heartbeat_message(random.choice((2, 2, 2, 6, 47, 48, 63, 64)), autopilot, 0, 0, 0, 3)
+    for report in (first, None)[: random.randrange(3)]:
         frame = pack(report, 1) if report is not None else drawn_report(random, command, autopilot)
         here.observe(frame, now_us)
         there.observe(frame, now_us)

@@ -7,7 +7,7 @@ from typing import Final
 
 import msgspec
 
-from rtshcua.adapters.doctor.examination import ExaminingDriver
+from rtshcua.adapters.doctor.examination import ExaminingDriver, Talker
 from rtshcua.adapters.doctor.settings import SETTINGS, Setting
 from rtshcua.adapters.qualification.identity import firmware_of, those_that_matter
 from rtshcua.adapters.qualification.standing import Standing
@@ -16,9 +16,9 @@ from rtshcua.adapters.vehicle.preflight import SAME_MM
 from rtshcua.adapters.vehicle.returns import ONLY_ZERO, Need
 from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_TYPE_GCS as GROUND_STATION
+from rtshcua.mavlink.modes import is_another
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import Signal
@@ -193,6 +193,10 @@ def _answers(vehicle: ExaminingDriver) -> VehicleFinding:
     return _graded("link/answers", found, "answers", advice, stops=not answers)
 
 
+def _is_vehicle(talker: Talker) -> bool:
+    return talker.kind is not None and talker.autopilot is not None and is_another(talker.kind, talker.autopilot)
+
+
 def _others(vehicle: ExaminingDriver, *, named: bool) -> Iterator[VehicleFinding]:
     stations, crowd = 0, vehicle.link.crowd  # another vehicle, as a run would refuse it
     for (system, component), talker in vehicle.talkers.items():
@@ -201,7 +205,7 @@ def _others(vehicle: ExaminingDriver, *, named: bool) -> Iterator[VehicleFinding
             yield VehicleFinding("link/component", STOP, f"another component {OURS} speaks here", "", advice)
         elif talker.kind == GROUND_STATION:
             stations += 1
-        elif system != vehicle.system and component == AUTOPILOT and talker.autopilot not in (None, NO_AUTOPILOT):
+        elif system != vehicle.system and component == AUTOPILOT and _is_vehicle(talker):
             found, advice = f"another vehicle speaks here too, system {system}", "`--system` says which one is meant"
             yield VehicleFinding("link/other-vehicle", WARN if named else STOP, found, "one vehicle", advice)
             crowd = None

@@ -34,7 +34,7 @@ from rtshcua.adapters.vehicle.manoeuvre import AGAIN_US, LATE_US
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import Received, is_addressed
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.model.flat.contract import MotionKind
@@ -299,14 +299,14 @@ class QualifyingDriver(Driver):
                 found.samples.append(
                     Sample(now_us, message.lat, message.lon, message.relative_alt, speed, -10 * message.vz)
                 )
-            case "HEARTBEAT":
+            case "HEARTBEAT" if self.speaks(message):
                 flies = self._current is not None and self._current.ended_us is None and found.takeover is None
                 if self.seen.airborne and flies:
                     found.beats.append(now_us)
                 takeover = found.takeover
                 if takeover is not None and takeover.mode_us is None and message.custom_mode != self._mode_before:
                     takeover.mode_us = now_us
-            case "COMMAND_ACK" if message.target_component in (0, OURS):
+            case "COMMAND_ACK" if is_addressed(message, self.system, OURS):
                 self._answered(message.command, message.result, now_us)
             case "COMMAND_ACK" if found.takeover is not None and found.takeover.obeyed_us is None:
                 found.takeover.obeyed_us = now_us

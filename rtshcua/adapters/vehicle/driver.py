@@ -7,7 +7,7 @@ from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages, observed, preflight
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
-from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink, is_radio
+from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink, is_radio, two_speak
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendings
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
@@ -27,10 +27,11 @@ from rtshcua.adapters.vehicle.streams import (
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import Received, is_addressed
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MULTIROTORS
+from rtshcua.mavlink.modes import is_another, is_vehicle
 from rtshcua.mavlink.parameters import value_of
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.model.flat.contract import MotionKind
@@ -64,7 +65,8 @@ class GroundQuestions(Protocol):
 
 
 class Driver:
-    """One vehicle, chosen by the first heartbeat of an autopilot that we know; frames of other systems do not count.
+    """One vehicle, chosen by the first heartbeat of one whose autopilot we know; frames of other systems do not count.
+    From then on a heartbeat under its ids that names another kind of vehicle or autopilot says nothing of it.
 
     `slack` stretches every wait for an answer or an effect. It is 1, but for a simulated vehicle that lives so much
     faster than life that the machine's own hold-ups would count as silence. `fence` False: the vehicle's own fence is
@@ -109,6 +111,8 @@ class Driver:
         self.prepares = False  # which is under way: nothing is ready, nor is a fence handed over
         self._heeded: set[str]  # what more is made of than readings
         self.system = 0
+        self._kind = (0, 0)  # its MAV_TYPE and MAV_AUTOPILOT,
+        self._strangers: set[str] = set()  # and what was said of who speaks under its ids and is of another
         #: that it is no multirotor, in words
         self.other_kind: str | None = None
         #: the vehicle's own time of day is wanted: it is asked for until it is told
@@ -195,8 +199,10 @@ class Driver:
                 self._choose(frame)
                 if self.flavour is None:
                     continue
-            _, _, system, component, _, _, _ = frame
+            _, name, system, component, _, _, _ = frame
             if system == self.system or is_radio(frame):
+                if name == "HEARTBEAT" and component == AUTOPILOT and self._is_strange(frame, now_us, events):
+                    continue
                 if component == AUTOPILOT and (watch.heard_us != now_us or watch.down or self._was_mute):
                     watch.heard_us = now_us  # one frame tells of a moment what all of that moment do
                     self._look(now_us, events)
@@ -311,9 +317,10 @@ class Driver:
     def _choose(self, frame: Received) -> None:
         if frame.name != "HEARTBEAT" or frame.component != AUTOPILOT:
             return
-        flavour = self.flavour = _FLAVOURS.get(frame.message.autopilot)
+        told = frame.message.type, frame.message.autopilot
+        flavour = self.flavour = _FLAVOURS.get(frame.message.autopilot) if is_vehicle(*told) else None
         if flavour is not None:
-            self.system = frame.system
+            self.system, self._kind = frame.system, told
             if frame.signed and not self._signed:
                 self._mute = KEYLESS
             if frame.message.type not in MULTIROTORS:
@@ -338,6 +345,25 @@ class Driver:
             self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
             for kind in (MotionKind.HOME, MotionKind.LAND):  # made ahead: when a fallback must fly there is no time
                 flavour.stages(Command(-1, "", kind, (), (), 0, 0), self.seen, frame.system)
+
+    def speaks(self, heartbeat: Message) -> bool:
+        """Whether a heartbeat under the vehicle's ids is its own, by what it says that it is."""
+        return (heartbeat.type, heartbeat.autopilot) == self._kind
+
+    def _is_strange(self, frame: Received, now_us: int, events: list[Event]) -> bool:
+        """Whether a heartbeat comes under the vehicle's ids and is not its own: of a gimbal or a companion computer
+        that was given them, or of another vehicle. It says neither how the vehicle flies nor that it is heard.
+        """
+        if self.speaks(frame.message):
+            return False
+        kind = frame.message.type, frame.message.autopilot
+        text = two_speak(self.system, f"one with MAV_TYPE {kind[0]} and MAV_AUTOPILOT {kind[1]}")
+        if is_another(*kind):
+            self.link.meets(text)
+        if text not in self._strangers:
+            self._strangers.add(text)
+            events.append(ports.Noted(now_us, text))
+        return True
 
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; whether a manoeuvre may see something new in it."""
@@ -408,7 +434,8 @@ class Driver:
         return self._commander.acknowledge(message.command, message.result, self.seen.up_us)
 
     def _is_for_us(self, message: Message) -> bool:
-        return getattr(message, "target_component", 0) in (0, OURS)
+        """Whether a message that names whom it is for is for us, or for everybody. We are of the vehicle's system."""
+        return is_addressed(message, self.system, OURS)
 
     def _hear(self, said: Sequence[Said], events: list[Event]) -> None:
         for each in said:

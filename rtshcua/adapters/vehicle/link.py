@@ -9,9 +9,9 @@ from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.enums import MAV_AUTOPILOT_INVALID as NO_AUTOPILOT
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import unsigned
+from rtshcua.mavlink.modes import is_another
 from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM, UnsignedRadio
 from rtshcua.mavlink.signing import Verifier
 from rtshcua.onboard.enforcement.frames import OURS, UNSIGNED, Gate
@@ -31,6 +31,11 @@ def is_radio(frame: Received) -> bool:
     Which vehicle's link it is about nobody can tell where several speak, so with a named `system` it is not heard.
     """
     return frame.name == "RADIO_STATUS" and (frame.system, frame.component) == (RADIO_SYSTEM, RADIO)
+
+
+def two_speak(system: int, who: str) -> str:
+    """That somebody else speaks under the ids of the vehicle, for a person."""
+    return f"two speak as {system}/{AUTOPILOT}: {who} besides the vehicle; give each component ids of its own"
 
 
 class Heard(NamedTuple):
@@ -96,14 +101,19 @@ class VehicleLink:
         if self._others is None:
             return
         for frame in self._others[elsewhere].parse(datagram, now_us):
-            is_autopilot = frame.component == AUTOPILOT and frame.name == "HEARTBEAT"
-            if not is_autopilot or frame.message.autopilot == NO_AUTOPILOT:
+            beats = frame.component == AUTOPILOT and frame.name == "HEARTBEAT"
+            if not beats or not is_another(frame.message.type, frame.message.autopilot):
                 continue
             ours, theirs = self._system, frame.system
             if theirs == ours:
                 self.crowd = f"two vehicles speak here as system {ours}: give each an id of its own"
             elif not self._named and self.crowd is None:
                 self.crowd = f"two vehicles speak here, systems {ours} and {theirs}: `--system` says which one is meant"
+
+    def meets(self, other: str) -> None:
+        """Another vehicle speaks under the ids of ours, in words: before the flight that keeps it from being ready."""
+        if self._others is not None:
+            self.crowd = other
 
     def parse(self, datagram: bytes, now_us: int) -> list[Received]:
         """The good frames in a datagram, in order; never raises, whatever the bytes."""

@@ -30,7 +30,7 @@ from rtshcua.ground.auditor.sent import parameter as setting
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
-from rtshcua.mavlink.modes import KNOWN
+from rtshcua.mavlink.modes import is_vehicle
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.wire.boundary_chain import START, after_frame
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
@@ -38,7 +38,7 @@ from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
 #: who we are
 OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
 
-_autopilot: Final = LAYOUTS[HEARTBEAT].getter("autopilot")
+_identity: Final = LAYOUTS[HEARTBEAT].getter("type autopilot")
 _base_mode: Final = LAYOUTS[HEARTBEAT].getter("base_mode")
 _landed: Final = LAYOUTS[EXTENDED_SYS_STATE].getter("landed_state")
 _heights: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("alt relative_alt")
@@ -158,6 +158,7 @@ class Frames:
         self._over = False
         self._basis: Basis | None = None
         self._autopilots: dict[int, int] = {}  # of each system that has one
+        self._kinds: dict[int, tuple[int, int]] = {}  # and its MAV_TYPE with that
         self._homes: dict[int, Home] = {}
         self._flying: dict[int, bool] = {}  # armed, as its last heartbeat said,
         self._aloft: dict[int, bool] = {}  # or not on the ground
@@ -308,9 +309,13 @@ class Frames:
         messages whether it flies, and what its fence is.
         """
         fields, system = frame.fields, frame.system
-        if frame.message == HEARTBEAT and fields and _autopilot(fields) in KNOWN:
-            self._autopilots.setdefault(system, _autopilot(fields))
-            self._flying[system] = bool(_base_mode(fields) & enums.MAV_MODE_FLAG_SAFETY_ARMED)
+        if frame.message == HEARTBEAT and fields:
+            kind, autopilot = _identity(fields)
+            if is_vehicle(kind, autopilot):
+                self._kinds.setdefault(system, (kind, autopilot))
+                self._autopilots.setdefault(system, autopilot)
+            if self._kinds.get(system) == (kind, autopilot):
+                self._flying[system] = bool(_base_mode(fields) & enums.MAV_MODE_FLAG_SAFETY_ARMED)
         elif frame.message == EXTENDED_SYS_STATE and fields:
             self._aloft[system] = _landed(fields) != enums.MAV_LANDED_STATE_ON_GROUND
         elif frame.message == PARAM_VALUE and fields:

@@ -10,7 +10,7 @@ from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import COUNT, EXAMPLES, number
 from rtshcua.ground.checker.values import typed
-from rtshcua.model.faults import KINDS, SIGNED, Fault, Mode, Parameter, Way, parameters
+from rtshcua.model.faults import KINDS, SIGNED, WORD_TYPES, Fault, Mode, Parameter, Voice, Way, parameters
 from rtshcua.model.ir.expression import Reference, Value
 from rtshcua.model.ir.scenarios import FaultCall
 from rtshcua.model.ir.skills import ArgumentValue
@@ -99,7 +99,7 @@ def _value(context: Context, call: FaultCall, parameter: Parameter, value: Value
     return _number(context, parameter, value)
 
 
-def _word(context: Context, call: FaultCall, parameter: Parameter, value: Value) -> Mode | Way | bool | None:
+def _word(context: Context, call: FaultCall, parameter: Parameter, value: Value) -> Mode | Way | Voice | bool | None:
     word = value.name if isinstance(value, Reference) else None
     if word not in parameter.words:
         words = parameter.words
@@ -113,7 +113,7 @@ def _word(context: Context, call: FaultCall, parameter: Parameter, value: Value)
         return None
     if parameter.name == "held":
         return word == "yes"
-    return Mode(word) if parameter.name == "mode" else Way(word)
+    return WORD_TYPES[parameter.name](word)
 
 
 def _name(context: Context, parameter: Parameter, value: Value) -> str | None:

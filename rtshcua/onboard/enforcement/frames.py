@@ -20,7 +20,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.framing import SIGNATURE
 from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
-from rtshcua.mavlink.modes import KNOWN
+from rtshcua.mavlink.modes import is_vehicle
 from rtshcua.mavlink.parameters import is_bytewise, value_of
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.contract import MotionKind
@@ -42,7 +42,7 @@ HOME_MOVES: Final = 10_000
 STANDS_US: Final = 3_000_000
 
 _LANDED: Final = LAYOUTS[EXTENDED_SYS_STATE].at("landed_state")
-_KIND: Final = LAYOUTS[HEARTBEAT].at("autopilot")
+_identity: Final = LAYOUTS[HEARTBEAT].getter("type autopilot")
 _BASE_MODE: Final = LAYOUTS[HEARTBEAT].at("base_mode")
 _position: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("lat lon alt relative_alt")
 
@@ -125,6 +125,7 @@ class FrameSession:
         self._started = False  # a session was opened: fences stay as they are
         self._system = 0
         self._autopilot = 0  # MAV_AUTOPILOT
+        self._kind = 0  # MAV_TYPE
         self._armed = False  # as its last heartbeat says,
         self._armed_us = 0  # and when it came
         self._stands_us = 0  # it last said that it is on the ground; 0 once it said otherwise
@@ -166,15 +167,17 @@ class FrameSession:
         return recent and not self._armed and self._session is None
 
     def observe(self, frame: bytes, now_us: int = 0) -> None:
-        """Take in one good frame from the link. The first heartbeat of an autopilot that is known settles whose."""
+        """Take in one good frame from the link. The first heartbeat of a vehicle whose autopilot is known settles
+        whose; from then on one that names another kind of vehicle or autopilot, under the same ids, says nothing of it.
+        """
         heard = read_frame(frame)
         if heard is None or heard.component != AUTOPILOT:
             return
         if heard.message == HEARTBEAT:
-            autopilot = heard.fields[_KIND]
-            if not self._system and autopilot in KNOWN:
-                self._system, self._autopilot = heard.system, autopilot
-            if heard.system == self._system:
+            kind, autopilot = _identity(heard.fields)
+            if not self._system and is_vehicle(kind, autopilot):
+                self._system, self._autopilot, self._kind = heard.system, autopilot, kind
+            if (heard.system, autopilot, kind) == (self._system, self._autopilot, self._kind):
                 self._armed = bool(heard.fields[_BASE_MODE] & enums.MAV_MODE_FLAG_SAFETY_ARMED)
                 self._armed_us = now_us
         elif heard.message == GLOBAL_POSITION_INT and heard.system == self._system:

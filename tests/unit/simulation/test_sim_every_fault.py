@@ -33,6 +33,7 @@ EXAMPLES: dict[str, Callable[[int], Fault]] = {
     "link-loss": lambda at: faults.LinkLoss(at, 5_000),
     "link-silence": faults.LinkSilence,
     "link-quality": lambda at: faults.LinkQuality(at, 4_000),
+    "second-voice": faults.SecondVoice,
     "obstacle": lambda at: faults.Obstacle(at, 9_000),
     "pillar": lambda at: faults.Pillar(at, 60_000, 30_000, 1_000, 60_000, None, 4_000, 270),
     "pilot": lambda at: faults.PilotMode(at, Mode.LOITER),

@@ -1,0 +1,176 @@
+"""What comes under the vehicle's ids and is not of it says nothing of it; an answer to somebody else is none to us."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.adapters.vehicle.driver import Driver
+from rtshcua.adapters.vehicle.link import SILENT_US
+from rtshcua.codec.frames import Codec, is_addressed
+from rtshcua.mavlink.enums import VEHICLES
+from rtshcua.model.faults import SecondVoice, Voice
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frames import OURS, FrameSession
+from rtshcua.onboard.ports import Crashed, Failed, LinkLost, Noted, Ready, Succeeded, TakenOver
+from virtual.flyer import Flyer
+from virtual.policy import POLICY
+from virtual.rows import rows
+
+S = 1_000_000
+PX4, ARDUPILOT, NONE = mavlink.MAV_AUTOPILOT_PX4, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_AUTOPILOT_INVALID
+OWN = {"px4": PX4, "ardupilot": ARDUPILOT}
+Make = Callable[..., Any]
+
+
+def beat(kind: int, autopilot: int, armed: bool = False, mode: int = 0) -> Any:
+    return mavlink.MAVLink_heartbeat_message(kind, autopilot, 128 if armed else 0, mode, 4, 3)
+
+
+def says(one: Flyer, message: Any, system: int = 1, component: int = 1) -> list[Any]:
+    """One frame more comes from the link."""
+    events, _, _ = one.vehicle.driver.receive(Codec(system, component).pack(message), one.now_us)
+    one.events += events
+    return list(events)
+
+
+def noted(one: Flyer) -> list[str]:
+    return [each.text for each in one.events if isinstance(each, Noted)]
+
+
+# ---------------------------------------------------------------- who is chosen
+
+STRANGERS = [
+    ("a ground station's script", mavlink.MAV_TYPE_GCS, PX4),
+    ("another script", mavlink.MAV_TYPE_GCS, ARDUPILOT),
+    ("a companion computer", mavlink.MAV_TYPE_ONBOARD_CONTROLLER, PX4),
+    ("a gimbal", mavlink.MAV_TYPE_GIMBAL, ARDUPILOT),
+    ("a gimbal without autopilot", mavlink.MAV_TYPE_GIMBAL, NONE),
+    ("an antenna tracker", mavlink.MAV_TYPE_ANTENNA_TRACKER, ARDUPILOT),
+    ("a camera", mavlink.MAV_TYPE_CAMERA, PX4),
+]
+
+
+@rows(("name", "kind", "autopilot"), STRANGERS)
+def test_what_is_no_vehicle_is_never_chosen_as_it(name: str, kind: int, autopilot: int) -> None:
+    driver = Driver(POLICY, FrameSession())
+    driver.receive(Codec(255, 1).pack(beat(kind, autopilot)), S)
+    assert driver.flavour is None
+    driver.receive(Codec(1, 1).pack(beat(2, PX4)), S)
+    assert driver.system == 1
+
+
+def test_every_type_of_the_dialect_is_a_vehicle_or_is_not() -> None:
+    """A type that the dialect gets anew is to be looked at."""
+    others = {
+        "ANTENNA_TRACKER", "GCS", "ONBOARD_CONTROLLER", "GIMBAL", "ADSB", "CAMERA", "CHARGING_STATION", "FLARM",
+        "SERVO", "ODID", "BATTERY", "PARACHUTE", "LOG", "OSD", "IMU", "GPS", "WINCH", "ILLUMINATOR", "GRIPPER",
+    }  # fmt: skip
+    names = {
+        number: entry.name.removeprefix("MAV_TYPE_")
+        for number, entry in mavlink.enums["MAV_TYPE"].items()
+        if not entry.name.endswith("ENUM_END")
+    }
+    assert {name for number, name in names.items() if number not in VEHICLES} == others
+
+
+@rows(("name", "kind", "autopilot"), STRANGERS)
+def test_the_gate_takes_no_other_heartbeat_for_the_vehicles(name: str, kind: int, autopilot: int) -> None:
+    gate = FrameSession()
+    on_ground = mavlink.MAVLink_extended_sys_state_message(0, 1)
+    for each in (beat(2, PX4, armed=True), on_ground, beat(kind, autopilot)):
+        gate.observe(Codec(1, 1).pack(each), 5 * S)
+    assert not gate.stands(5 * S), "it is armed, whatever a gimbal says"
+
+
+# ---------------------------------------------------------------- what is heard of it
+
+
+@pytest.mark.parametrize("kind", [(26, NONE), (18, NONE), (26, 0), (2, NONE)])
+def test_a_heartbeat_of_no_autopilot_under_its_ids_is_no_mode_and_is_noted_once(
+    aloft: Make, kind: tuple[int, int]
+) -> None:
+    one = aloft()
+    one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
+    one.wait(2)
+    before = one.vehicle.driver.seen.mode
+    for _ in range(5):
+        assert not any(isinstance(each, TakenOver | Failed | Crashed) for each in says(one, beat(*kind)))
+        one.wait(0.1)
+    assert one.vehicle.driver.seen.mode == before
+    assert one.vehicle.driver.seen.armed
+    assert isinstance(one.until((Succeeded, Failed, TakenOver), 60), Succeeded)
+    assert len([text for text in noted(one) if text.startswith("two speak as 1/1")]) == 1
+
+
+def test_a_heartbeat_of_another_under_its_ids_is_no_sign_of_life(aloft: Make) -> None:
+    one = aloft()
+    one.vehicle.lose = lambda frame: True
+    one.vehicle.hurt = lambda datagram: []
+    for _ in range(20):
+        says(one, beat(26, NONE))
+        one.wait(SILENT_US / S / 10)
+    assert any(isinstance(each, LinkLost) for each in one.events)
+
+
+@pytest.mark.parametrize("voice", [Voice.GIMBAL, Voice.ANSWERS])
+def test_the_simulated_second_voice_does_no_harm_from_the_start(flavour: str, voice: Voice) -> None:
+    one = Flyer(flavour, faults=(SecondVoice(0, voice),))
+    one.up()
+    assert isinstance(one.fly(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000), Succeeded)
+    assert isinstance(one.fly(MotionKind.LAND), Succeeded)
+
+
+@pytest.mark.parametrize("kind", [(2, ARDUPILOT), (13, PX4), (1, ARDUPILOT), (13, ARDUPILOT)])
+def test_another_vehicle_under_its_ids_keeps_it_from_being_ready(flavour: str, kind: tuple[int, int]) -> None:
+    if kind == (2, OWN[flavour]):
+        kind = (2, PX4)
+    one = Flyer(flavour)
+    while one.vehicle.driver.flavour is None:
+        one.wait(0.02)
+    says(one, beat(*kind))
+    one.wait(60)
+    assert not any(isinstance(each, Ready) for each in one.events)
+    assert (one.vehicle.driver.unready or "").startswith("two speak as 1/1")
+
+
+# ---------------------------------------------------------------- whom an answer is for
+
+ADDRESSED = [(1, OURS, True), (0, 0, True), (0, OURS, True), (1, 0, True), (2, OURS, False), (255, OURS, False),
+             (1, 190, False), (255, 190, False), (2, 0, False)]  # fmt: skip
+
+
+@rows(("system", "component", "ours"), ADDRESSED)
+def test_a_message_is_for_us_by_system_and_component(system: int, component: int, ours: bool) -> None:
+    ack = mavlink.MAVLink_command_ack_message(176, 0, 0, 0, system, component)
+    assert is_addressed(ack, 1, OURS) == ours
+
+
+def test_a_message_without_target_is_for_everybody() -> None:
+    assert is_addressed(mavlink.MAVLink_param_value_message(b"A", 1.0, 9, 1, 0), 1, OURS)
+
+
+@pytest.mark.parametrize("target", [(2, OURS), (255, OURS), (1, 190)])
+def test_a_denial_to_somebody_else_refuses_no_command(aloft: Make, target: tuple[int, int]) -> None:
+    one = aloft()
+    one.vehicle.hurt = lambda datagram: [] if datagram == b"" else [datagram]
+    lost: list[bytes] = []
+    one.vehicle.lose = lambda frame: bool(lost.append(frame)) or Codec(9, 9).parse(frame)[0].name != "COMMAND_LONG"
+    one.begin(MotionKind.LAND)
+    for command in (176, 192, 22, 400):
+        events = says(one, mavlink.MAVLink_command_ack_message(command, 4, 0, 0, *target))
+        assert not any(isinstance(each, Failed) for each in events)
+    one.vehicle.lose = lambda frame: False
+    assert isinstance(one.until((Succeeded, Failed), 90), Succeeded)
+
+
+@pytest.mark.parametrize("target", [(2, OURS), (255, 190)])
+def test_an_answer_to_somebody_else_does_not_show_that_it_hears_us(flavour: str, target: tuple[int, int]) -> None:
+    one = Flyer(flavour)
+    one.vehicle.lose = lambda frame: True
+    one.wait(1)
+    says(one, mavlink.MAVLink_command_ack_message(512, 0, 0, 0, *target))
+    one.wait(3)
+    assert one.vehicle.driver.unready is not None
+    assert not one.vehicle.driver._watch.answers

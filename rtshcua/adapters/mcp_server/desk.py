@@ -53,6 +53,7 @@ _TELLING: Final = frozenset(
     {"dispatched", "succeeded", "skipped", "replan", "violated", "failed", "time-over", "recall", "cancellation"}
 )
 _AWAITED: Final = "approval/awaited"
+_FLIES: Final = "this mission flies already, and nothing was handed in anew: `mission_status` says how it stands"
 #: the effects of which the last says whether another step is waited for
 _AFTER_REPLAN: Final = frozenset({"replan", "replacement", "dispatched", "cancellation", "recall"})
 _REPLANS: Final = (
@@ -102,6 +103,7 @@ class Desk:
         self._lock = threading.Lock()
         self._tickets: dict[str, _Ticket] = {}
         self._admitted: list[tuple[Policy, Mission]] = []  # of ours, the last one flies
+        self._latest: _Ticket | None = None  # that of the last one
 
     # ------------------------------------------------------------------------------------------ what there is
 
@@ -195,7 +197,10 @@ class Desk:
         if known is not None:
             if known.said != said:
                 raise Misused("key-reused", "the key was used for another proposal", "give each proposal its own key")
-            return {"accepted": True, "rejections": []} | known.told()
+            return {"accepted": True, "rejections": []} | self._told(known)
+        latest = self._latest
+        if latest is not None and latest.said == said and self.following.stage == "flying":
+            return {"accepted": True, "rejections": []} | self._told(latest)
         if len(self._tickets) >= MOST_TICKETS:
             raise Misused("too-many", f"this server handed in {MOST_TICKETS} proposals", "the host starts it anew")
         answer = self._missions.check(mission, _utc_us())
@@ -207,6 +212,12 @@ class Desk:
             self._tickets[name] = ticket
         threading.Thread(target=self._hand_in, args=(ticket, document, signed), daemon=True).start()
         return {"accepted": True, "rejections": [], "bounds": answer.bounds} | ticket.told()
+
+    def _told(self, ticket: _Ticket) -> dict[str, Any]:
+        """What became of a proposal that comes again; nothing is handed in for it."""
+        if ticket is self._latest and self.following.stage == "flying":
+            return ticket.told() | {"state": "flying", "text": _FLIES}
+        return ticket.told()
 
     def _signed(self, answer: Answer, first: int | None) -> tuple[bytes, tuple[Policy, Mission]]:
         policy, mission, signer = answer.policy, answer.mission, self._signer
@@ -250,6 +261,7 @@ class Desk:
         with self._lock:
             if slug == "accepted":
                 self._admitted.append(signed)
+                self._latest = ticket
             ticket.state = "admitted" if slug == "accepted" else "refused"
             ticket.slug, ticket.text = slug, text
         with self.following.turn:

@@ -26,6 +26,7 @@ from pydantic import AnyUrl
 
 from rtshcua import __version__
 from rtshcua.adapters.mcp_server.access import refusal
+from rtshcua.adapters.mcp_server.arguments import Unfit, fitted
 from rtshcua.adapters.mcp_server.connections import CONNECTION, MOST, Connection
 
 INSTRUCTIONS: Final = (
@@ -267,11 +268,14 @@ def made(opening: Opening, others: TaskGroup) -> "Server[Any, Any]":
             return _answer({"code": "no-tool", "text": "there is no such tool"}, wrong=True)
         desk = await run_sync(opening.get)
         try:
+            arguments = fitted(next(each.inputSchema for each in TOOLS if each.name == name), arguments)
             if name == "mission_status":
                 return _answer(await _status(server, desk, **arguments))
             return _answer(await run_sync(partial(getattr(desk, name), **arguments)))
         except desk.misused as error:
             return _answer({"code": error.code, "text": str(error), "repair": error.repair}, wrong=True)
+        except Unfit as error:
+            return _answer({"code": "arguments", "text": str(error), "repair": error.repair}, wrong=True)
 
     async def resources() -> list[types.Resource]:
         return [
@@ -293,7 +297,7 @@ def made(opening: Opening, others: TaskGroup) -> "Server[Any, Any]":
         subscriptions.end(server.request_context.session, uri)
 
     server.list_tools()(listed)  # type: ignore[no-untyped-call]
-    server.call_tool()(called)
+    server.call_tool(validate_input=False)(called)  # `fitted` says what to write instead
     server.list_resources()(resources)  # type: ignore[no-untyped-call]
     server.read_resource()(read)  # type: ignore[no-untyped-call]
     server.subscribe_resource()(subscribed)  # type: ignore[no-untyped-call]

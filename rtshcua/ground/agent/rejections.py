@@ -7,24 +7,29 @@ value that fits; where that says nothing, a fix of the finding does, or its help
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from fractions import Fraction
 from typing import Any, Final, NamedTuple
 
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.agent.patterns import unit_of, written
+from rtshcua.ground.agent.patterns import written
 from rtshcua.ground.agent.permitted import Permitted
+from rtshcua.ground.agent.said import decimal, said
 from rtshcua.model.flat.contract import QUANTITY
-from rtshcua.model.quantity import UNITS, Dimension
+from rtshcua.model.quantity import Dimension
 
 #: the limit of what does not belong there: it is to be left out
 ABSENT: Final[Mapping[str, Any]] = {"absent": True}
-_QUANTITY = re.compile(r"\s*(-?[0-9]{1,12}(?:\.[0-9]{1,9})?)\s*([a-zA-Z%/]*)\s*", re.ASCII)
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _MOST = 40
 _NAMES = {dict: "object", list: "array", str: "string", bool: "boolean", int: "integer"}
+_ARTICLED = {
+    "object": "an object", "array": "a list", "string": "a text", "boolean": "true or false",
+    "integer": "a whole number",
+}  # fmt: skip
+#: characters of a text that is read as JSON for advice
+_MOST_JSON = 65_536
 
 
 class Range(NamedTuple):
@@ -46,14 +51,16 @@ class Frame(NamedTuple):
 
 
 class Misfit(NamedTuple):
-    """A place that does not fit. `near` is None where the limit is `ABSENT`; `of` is what it is found by, where that
-    is another place.
+    """A place that does not fit. `near` is the value that fits and says the same, or the nearest one; None where the
+    limit is `ABSENT`, or what stands there says nothing that can be asked for. `of` is what it is found by, where that
+    is another place; `why` says what is wrong, or how it should stand there.
     """
 
     pointer: str
     limit: Mapping[str, Any]
     near: Any
     of: str = ""
+    why: str = ""
 
 
 def frame_of(schema: Mapping[str, Any], skills: Iterable[Permitted]) -> Frame:
@@ -89,24 +96,36 @@ def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[Mis
     below = [each for each in misfits if not each.of and each.pointer.startswith(f"{pointer}/")]
     above = [each for each in misfits if not each.of and pointer.startswith(f"{each.pointer}/")]
     for misfit in own or below or above:
-        yield _told(found, misfit.pointer, value, misfit.limit, misfit.near)
+        yield _told(found, misfit.pointer, value, misfit.limit, misfit.near, misfit.why)
     if not (own or below or above):
         near = _fixed(found, source)
         yield _told(found, pointer, value, None if near is None else {"one_of": [near]}, near)
 
 
-def _told(found: Diagnostic, pointer: str, value: Any, limit: Mapping[str, Any] | None, near: Any) -> dict[str, Any]:
+def _told(
+    found: Diagnostic, pointer: str, value: Any, limit: Mapping[str, Any] | None, near: Any, why: str = ""
+) -> dict[str, Any]:
     there, observed = _at(value, pointer)
+    message = found.message
+    if there and limit is not None and set(limit) == {"type"} and pointer != (found.pointer or ""):
+        message = f"{_ARTICLED[limit['type']]} is asked, and this is `{observed}`"  # `found` is the first of several
     if limit == ABSENT:
         how = f"leave `{pointer}` out"
+    elif isinstance(near, dict | list) and why:
+        how = f"{why} at `{pointer}`"
     elif near is not None:
-        how = f"write {json.dumps(near, ensure_ascii=False)} at `{pointer}`"
+        how = f"write {json.dumps(near, ensure_ascii=False)} at `{pointer}`" + (f": {why}" if why else "")
+    elif limit is not None and "least" in limit:
+        how = (f"{why}; " if why else "") + f"from {limit['least']} to {limit['most']} is permitted at `{pointer}`"
+    elif limit is not None and limit.get("one_of", limit.get("places")):
+        listed = ", ".join(json.dumps(each, ensure_ascii=False) for each in limit.get("one_of", limit.get("places")))
+        how = f"accepted at `{pointer}`: {listed}" + ("" if "one_of" in limit else ", or a place in degrees")
     else:
-        how = found.help or found.message
+        how = why or found.help or message
     return {
         "code": found.code.id,
         "field": pointer,
-        "message": found.message,
+        "message": message,
         "limit": None if limit is None else dict(limit),
         "observed": observed if there else None,
         "age_us": None,
@@ -197,7 +216,9 @@ class _Fit:
         if "anyOf" in schema:
             yield from self._step(value, at)
         elif _NAMES.get(type(value)) != schema["type"]:
-            yield Misfit(at, {"type": schema["type"]}, self._near(schema, value, of))
+            limit = {"type": schema["type"], **(self._limit(schema, of) if schema["type"] == "string" else {})}
+            near, why = self._near(schema, value, of)
+            yield Misfit(at, limit, near, why=why)
         elif schema["type"] == "object":
             yield from self._object(schema, value, at, of)
         elif schema["type"] == "array":
@@ -207,7 +228,8 @@ class _Fit:
                 else:
                     yield from self.misfits(schema["items"], each, f"{at}/{number}", of)
         elif not _fits(schema, value):
-            yield Misfit(at, self._limit(schema, of), self._near(schema, value, of))
+            near, why = self._near(schema, value, of)
+            yield Misfit(at, self._limit(schema, of), near, why=why)
 
     def _step(self, value: Any, at: str) -> Iterator[Misfit]:
         """A step: the skill that it names says what else it has."""
@@ -240,7 +262,7 @@ class _Fit:
                 yield from self.misfits(each, value[name], f"{at}/{name}", here)
             elif name in schema["required"]:
                 limit = {"required": True, **self._limit(each, here)}
-                yield Misfit(f"{at}/{name}", limit, self._near(each, None, here))
+                yield Misfit(f"{at}/{name}", limit, self._near(each, None, here)[0])
 
     def _limit(self, schema: Mapping[str, Any], of: tuple[str, str]) -> dict[str, Any]:
         span = self._frame.ranges.get(of)
@@ -248,27 +270,31 @@ class _Fit:
             return {"one_of": schema.get("enum", [schema.get("const")])}
         if span is not None:
             return {"least": written(span.low, span.dimension), "most": written(span.high, span.dimension)}
-        return {key: schema[key] for key in ("type", "pattern", "maxLength") if key in schema}
+        places = _places(schema)
+        own = {key: schema[key] for key in ("type", "pattern", "maxLength") if key in schema}
+        return own | ({"places": places} if places else {})
 
-    def _near(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> Any:
-        """The value that fits, nearest to `value` as far as that can be told."""
+    def _near(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
+        """The value that fits and says what `value` says, as far as that can be told, and why another one is asked;
+        None where nothing that fits is near to it, or nothing was said.
+        """
         span = self._frame.ranges.get(of)
         if "const" in schema:
-            return schema["const"]
+            return schema["const"], ""
         if "enum" in schema:
-            return (nearest(value, schema["enum"]) if isinstance(value, str) else None) or schema["enum"][0]
+            only = schema["enum"][0] if len(schema["enum"]) == 1 else None
+            return (nearest(value, schema["enum"]) if isinstance(value, str) else None) or only, ""
         if span is not None:
-            return written(_clamped(str(value), span), span.dimension)
-        match schema.get("type"):
-            case "object":
-                names = schema["required"]
-                return {name: self._near(schema["properties"][name], None, (of[0], name)) for name in names}
-            case "array":
-                return []
-            case "string":
-                return _name(schema, value)
-            case _:
-                return None
+            return _clamped(value, span)
+        kind = schema.get("type")
+        if kind in ("object", "array"):
+            inner = _unquoted(value) if isinstance(value, str) else None
+            if _NAMES.get(type(inner)) == kind:
+                return inner, f"write the {'list' if kind == 'array' else 'object'} itself, not a text that holds it,"
+        if kind == "object":
+            made = {name: self._near(schema["properties"][name], None, (of[0], name))[0] for name in schema["required"]}
+            return None if any(each is None for each in made.values()) else made, ""
+        return _name(schema, value) if kind == "string" else None, ""
 
 
 def _skill(step: Any) -> str:
@@ -288,27 +314,42 @@ def _fits(schema: Mapping[str, Any], value: Any) -> bool:
     return not long and ("pattern" not in schema or re.fullmatch(schema["pattern"], value) is not None)
 
 
-def _clamped(text: str, span: Range) -> int:
-    """The quantity that a text says, or else zero, within the range; without a unit it is in the schema's."""
-    said = _QUANTITY.fullmatch(text)
-    if said is None:
-        return span.low
-    unit = UNITS.get(said[2] or unit_of(span.dimension))
-    scale = Fraction(1) if unit is None else Fraction(unit.numerator, unit.denominator)
-    return min(max(round(Fraction(said[1]) * scale), span.low), span.high)
+def _clamped(value: Any, span: Range) -> tuple[str | None, str]:
+    """The quantity that a text or a number says, within the range, as the language writes it; and why that is asked."""
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        return None, ""
+    found, why = said(str(value), span.dimension)
+    if found is None:
+        return None, why
+    near = min(max(round(found), span.low), span.high)
+    if near != round(found) and why:
+        why = f"the value is {decimal(found, span.dimension)}, out of range"
+    return written(near, span.dimension), why
 
 
-def _name(schema: Mapping[str, Any], value: Any) -> str:
-    """A text that fits a pattern of names or the first place that one has, made of what was written."""
-    words: str = str(value or "")[: schema.get("maxLength", 200)]
-    pattern = schema.get("pattern")
-    named: list[str] = re.findall(r"\w+\\\.entry", pattern or "")
-    places = [each.replace("\\", "") for each in named]
-    close = nearest(words, places) if places else None
-    for text in (close, words, _NO_NAME.sub("_", words), f"m_{_NO_NAME.sub('_', words)}", *places, "a"):
-        if text is not None and _fits(schema, text):
+def _unquoted(text: str) -> Any:
+    """What a text says as JSON; None where it is none."""
+    try:
+        return json.loads(text) if len(text) <= _MOST_JSON else None
+    except (ValueError, RecursionError):
+        return None
+
+
+def _places(schema: Mapping[str, Any]) -> list[str]:
+    """The places that a pattern has by their names."""
+    return [each.replace("\\", "") for each in re.findall(r"\w+\\\.entry", schema.get("pattern", ""))]
+
+
+def _name(schema: Mapping[str, Any], value: Any) -> str | None:
+    """A text that fits a pattern of names, made of what was written; of places the one that was probably meant."""
+    words: str = (value if isinstance(value, str) else "")[: schema.get("maxLength", 200)]
+    places = _places(schema)
+    if places:
+        return nearest(words, places)
+    for text in (words, _NO_NAME.sub("_", words), f"m_{_NO_NAME.sub('_', words)}", "a"):
+        if _fits(schema, text):
             return text
-    return words
+    return None
 
 
 def _part(name: str) -> str:

@@ -112,6 +112,35 @@ def test_two_calls_with_one_key_are_one_proposal(desk: Desk, handed: list[bytes]
     assert len(handed) == 1
 
 
+def flying(desk: Desk) -> None:
+    desk.following.connected, desk.following.hello = True, {"flight": (bytes([7]) * 16).hex()}
+    desk.following.mission = {"type": "mission", "digest": (bytes([8]) * 32).hex()}
+    assert desk.following.stage == "flying"
+
+
+@pytest.mark.parametrize("key", ["one", "two"])
+def test_a_repeated_proposal_is_told_that_the_mission_flies(desk: Desk, handed: list[bytes], key: str) -> None:
+    first = desk.propose_mission(PROPOSAL, "one")
+    assert status(desk, first["ticket"]) == "admitted"
+    flying(desk)
+    again = desk.propose_mission(deepcopy(PROPOSAL), key)
+    assert (again["ticket"], again["state"], again["accepted"]) == (first["ticket"], "flying", True)
+    assert "flies already" in again["text"]
+    assert len(handed) == 1
+
+
+def test_another_proposal_or_one_after_the_flight_is_handed_in(desk: Desk, handed: list[bytes]) -> None:
+    first = desk.propose_mission(PROPOSAL, "one")
+    assert status(desk, first["ticket"]) == "admitted"
+    flying(desk)
+    other = deepcopy(PROPOSAL) | {"intent": "another"}
+    assert status(desk, desk.propose_mission(other, "two")["ticket"]) == "admitted"
+    desk.following.connected = False
+    assert desk.following.stage != "flying"
+    assert status(desk, desk.propose_mission(other, "three")["ticket"]) == "admitted"
+    assert len(handed) == 3
+
+
 def test_proposals_are_bounded(desk: Desk, handed: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(desks, "MOST_TICKETS", 1)
     assert desk.propose_mission(PROPOSAL, "one")["accepted"]

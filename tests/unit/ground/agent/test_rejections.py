@@ -74,6 +74,12 @@ def mutated(chance: random.Random) -> Any:
     return value
 
 
+def chosen(limit: dict[str, Any]) -> Any:
+    """A value of an agent's own choice, where what it wrote is near to none."""
+    some = limit.get("one_of") or limit.get("places") or [limit.get("least")]
+    return {"object": {}, "array": []}.get(limit.get("type", ""), some[0])
+
+
 def repair(value: Any, rejected: list[dict[str, Any]]) -> None:
     """Put right what can be, by pointer, limit and nearest."""
     for each in sorted(rejected, key=lambda one: -len(one["field"])):
@@ -87,6 +93,8 @@ def repair(value: Any, rejected: list[dict[str, Any]]) -> None:
                 del of[key]
             elif each["nearest"] is not None:
                 of[key] = each["nearest"]
+            else:
+                of[key] = chosen(each["limit"] or {})
         except (KeyError, IndexError, TypeError):
             continue  # what was put right around it took it along
 
@@ -128,3 +136,84 @@ def test_nothing_is_clamped_silently(missions: Missions) -> None:
     value["phases"][0]["steps"][0]["arguments"]["altitude"] = "4000 m"
     answer = missions.check(value, 0)
     assert (answer.accepted, answer.mission) == (False, None)
+
+
+ALTITUDE = "/phases/0/steps/0/arguments/altitude"
+
+
+def rejected(missions: Missions, pointer: str, given: Any) -> dict[str, Any]:
+    """The one rejection of the proposal with another value at a place; empty where it is accepted."""
+    value = deepcopy(PROPOSAL)
+    path: list[Any] = [int(part) if part.isdigit() else part for part in pointer.split("/")[1:]]
+    holder(value, tuple(path))[path[-1]] = given
+    answer = missions.check(value, 0)
+    if answer.accepted:
+        return {}
+    (found,) = [each for each in answer.rejections if each["field"] == pointer]
+    return found
+
+
+#: what stands where an altitude from 3 m to 40 m is asked, the same value as it is accepted or None, and a word of why
+ALTITUDES = (
+    ("25 meters", "25 m", "`meters`"), ("25 Metres", "25 m", "`Metres`"), ("0.02 kilometers", "20 m", "20 m"),
+    ("82 ft", "24.994 m", "82 ft is 24.9936 m"), ("82feet", "24.994 m", "24.9936 m"),
+    ("27 yd", "24.689 m", "24.6888 m"),
+    ("25\u00a0m", "25 m", "same value"), ("25\u202fm", "25 m", "same value"), ("+25 m", "25 m", "same value"),
+    ("\uff12\uff15 m", "25 m", "same value"), ("25 \uff4d", "25 m", "same value"), ("25,0 m", "25 m", "same value"),
+    ("2.5e1 m", "25 m", "same value"), ("\u0662\u0665 m", "25 m", "same value"),
+    ("25 m relative", "25 m", "same value"),
+    ("25", "25 m", "if metres are meant"), (25, "25 m", "if metres are meant"), (25.5, "25.5 m", "if metres are meant"),
+    ("4000 m", "40 m", ""), ("\u221225 m", "3 m", "-25 m, out of range"), ("200 ft", "40 m", "60.96 m, out of range"),
+    ("25 m AGL", None, "above ground"), ("25 m AMSL", None, "above sea"), ("25 m/s", None, "unit of speed"),
+    ("9 s", None, "unit of duration"), ("25 kt", None, "unit of speed"), ("25 furlongs", None, "`furlongs`"),
+    ("1,000 m", None, "two ways"), ("as high as you can", None, "no number"), ("25\u00b2 m", None, ""),
+    ("NaN", None, ""),
+    ("", None, ""), ("25 m 30 cm", None, ""), (True, None, ""), (None, None, ""), ([25], None, ""),
+    ("25..30 m", None, ""),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "same", "why"), ALTITUDES)
+def test_advice_names_the_same_value_as_it_is_accepted_or_none(
+    missions: Missions, given: Any, same: str | None, why: str
+) -> None:
+    found = rejected(missions, ALTITUDE, given)
+    assert found["nearest"] == same
+    assert why in found["repair"]
+    if same is None:
+        assert "from 3 m to 40 m" in found["repair"]
+    else:
+        assert rejected(missions, ALTITUDE, same) == {}
+
+
+@pytest.mark.parametrize("pointer", ["/phases", "/phases/0/steps", "/imports"])
+def test_a_list_as_text_is_told_as_the_list(missions: Missions, pointer: str) -> None:
+    wanted: Any = PROPOSAL
+    for part in pointer.split("/")[1:]:
+        wanted = wanted[int(part) if part.isdigit() else part]
+    found = rejected(missions, pointer, json.dumps(wanted))
+    assert found["nearest"] == wanted
+    assert "the list itself, not a text" in found["repair"]
+    assert rejected(missions, pointer, "fly")["nearest"] is None
+
+
+def test_an_object_as_text_is_told_as_the_object(missions: Missions) -> None:
+    found = rejected(missions, "/policy", json.dumps(PROPOSAL["policy"]))
+    assert found["nearest"] == PROPOSAL["policy"]
+    assert "the object itself, not a text" in found["repair"]
+
+
+def test_each_number_with_a_point_is_told_by_itself(missions: Missions) -> None:
+    value = deepcopy(PROPOSAL) | {"version": 1.0}
+    value["policy"]["version"] = 7.0
+    found = {each["field"]: each for each in missions.check(value, 0).rejections}
+    assert [found[each]["nearest"] for each in ("/version", "/policy/version")] == [1, 7]
+    assert "`7.0`" in found["/policy/version"]["message"]
+
+
+def test_a_place_that_is_none_is_told_the_places(missions: Missions) -> None:
+    pointer = "/phases/1/steps/0/arguments/target"
+    found = rejected(missions, pointer, "somewhere nice")
+    assert (found["nearest"], found["limit"]["places"]) == (None, ["bridge_a.entry", "bridge_b.entry"])
+    assert '"bridge_a.entry"' in found["repair"]
+    assert rejected(missions, pointer, "brigde_b.entry")["nearest"] == "bridge_b.entry"

@@ -1,0 +1,133 @@
+"""What a text says that is no quantity of the language, but nearly one: `25 meters`, `82 ft`, `+25 m`, `25,0 m`.
+
+Only for advice. Nothing is flown by what is read here: an agent is told how the language writes the same value, or why
+a text says none that can be asked for.
+"""
+
+import re
+import unicodedata
+from fractions import Fraction
+from typing import Final, NamedTuple
+
+from rtshcua.ground.agent.patterns import unit_of
+from rtshcua.ground.language.build.literals import MEANT
+from rtshcua.model.quantity import UNITS, Dimension
+
+_FOOT = Fraction(3048, 10)  # mm, exact since 1959
+_KNOT = Fraction(1_852_000, 3_600)  # mm/s
+#: units that people use and the language does not have: their quantity, and one of them in its canonical unit
+_FOREIGN: Final = {
+    **dict.fromkeys(("ft", "foot", "feet", "'"), (Dimension.LENGTH, _FOOT)),
+    **dict.fromkeys(("in", "inch", "inches", '"'), (Dimension.LENGTH, _FOOT / 12)),
+    **dict.fromkeys(("yd", "yard", "yards"), (Dimension.LENGTH, _FOOT * 3)),
+    **dict.fromkeys(("mi", "mile", "miles"), (Dimension.LENGTH, _FOOT * 5_280)),
+    **dict.fromkeys(("nm", "nmi"), (Dimension.LENGTH, Fraction(1_852_000))),
+    **dict.fromkeys(("kilometer", "kilometers", "kilometre", "kilometres"), (Dimension.LENGTH, Fraction(1_000_000))),
+    **dict.fromkeys(("kt", "kts", "kn", "knot", "knots"), (Dimension.SPEED, _KNOT)),
+    **dict.fromkeys(("mph", "mi/h", "miles/h"), (Dimension.SPEED, _FOOT * 5_280 / 3_600)),
+    **dict.fromkeys(("ft/s", "fps", "feet/s"), (Dimension.SPEED, _FOOT)),
+    **dict.fromkeys(("ft/min", "fpm", "feet/min"), (Dimension.SPEED, _FOOT / 60)),
+    **dict.fromkeys(("volt", "volts"), (Dimension.VOLTAGE, Fraction(1_000))),
+}  # fmt: skip
+_HOME = ("above home", "above take-off", "above takeoff", "relative")
+_GROUND = ("agl", "above ground", "above ground level", "above terrain")
+_SEA = ("amsl", "asl", "msl", "above sea", "above sea level", "above mean sea level")
+_NUMBER = re.compile(
+    r"([+-]?) ?([0-9][0-9_]{0,15}(?:[.,][0-9]{1,12})?|\.[0-9]{1,12})(?:[eE]([+-]?[0-9]{1,2}))? ?([^0-9.,].{0,60})?"
+)
+_MINUS = "\u2010\u2011\u2012\u2013\u2212\ufe63"
+#: full-width forms of ASCII, U+FF01 to U+FF5E, and how far they are from it
+_WIDE, _WIDE_END, _FROM_ASCII = 0xFF01, 0xFF5E, 0xFEE0
+
+
+class Said(NamedTuple):
+    """A value in the canonical unit of the dimension that is asked, None where none can be told; `why` says what is not
+    as the language has it, empty where nothing is.
+    """
+
+    value: Fraction | None
+    why: str
+
+
+def said(text: str, dimension: Dimension) -> Said:
+    """What a text says where a quantity of a dimension is asked."""
+    unit = unit_of(dimension)
+    plain = " ".join(_ascii(text).split())
+    found = _NUMBER.fullmatch(plain)
+    if found is None:
+        return Said(None, f"this is no number with a unit, such as `{f'20 {unit}'.rstrip()}`")
+    sign, number, exponent, rest = found.groups()
+    if re.fullmatch(r"[0-9_]+,[0-9]{3}", number):
+        return Said(None, f"`{number}` can be read in two ways: use a decimal point, and `_` between groups of digits")
+    value = Fraction(number.replace(",", ".").replace("_", "")) * (-1 if sign == "-" else 1)
+    value *= Fraction(10) ** int(exponent or 0)
+    written, datum = _apart(rest or "")
+    if datum in _GROUND or datum in _SEA:
+        above = "ground" if datum in _GROUND else "sea"
+        return Said(None, f"this is a height above {above}, and one above home is asked")
+    if not written:
+        why = f"`{number}` has no unit: write it so if {_named(dimension)} are meant" if unit else ""
+        return Said(value * (UNITS[unit].numerator if unit else 1), why)
+    known = _unit(written)
+    if known is None:
+        return Said(None, f"`{written}` is no unit known here")
+    asked = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
+    if known[0] is not asked:
+        return Said(None, f"`{written}` is a unit of {known[0].value}, and {dimension.value} is asked")
+    value *= known[1]
+    if written in UNITS:
+        usual = plain == text.strip() and sign != "+" and exponent is None and "," not in number and not datum
+        return Said(value, "" if usual else "this is how the language writes the same value")
+    return Said(value, f"`{written}` is no unit here, and {plain} is {decimal(value, dimension)}")
+
+
+def _ascii(text: str) -> str:
+    """The text with blanks, digits, signs and full-width letters of other scripts as ASCII has them."""
+    return "".join(map(_plain, text))
+
+
+def _plain(character: str) -> str:
+    if character.isdecimal():
+        return str(unicodedata.decimal(character))
+    if unicodedata.category(character) == "Zs":
+        return " "
+    if character in _MINUS:
+        return "-"
+    if _WIDE <= ord(character) <= _WIDE_END:
+        return chr(ord(character) - _FROM_ASCII)
+    return character
+
+
+def _apart(rest: str) -> tuple[str, str]:
+    """The unit, as the tables write it, and what a height counts from."""
+    folded = rest.casefold()
+    datum = next((each for each in (*_GROUND, *_SEA, *_HOME) if folded == each or folded.endswith(f" {each}")), "")
+    unit = rest[: len(rest) - len(datum)].strip()
+    return re.sub(r" ?(?:/| per ) ?", "/", unit), datum
+
+
+def _unit(written: str) -> tuple[Dimension, Fraction] | None:
+    """The quantity and the size of a unit, in whatever way it is written."""
+    folded = written.casefold()
+    parts = "/".join(MEANT.get(part, part) for part in folded.split("/"))
+    for name in (written, MEANT.get(folded, ""), parts):
+        if name in UNITS:
+            return UNITS[name].dimension, Fraction(UNITS[name].numerator, UNITS[name].denominator)
+        if name.casefold() in _FOREIGN:
+            return _FOREIGN[name.casefold()]
+    return None
+
+
+def _named(dimension: Dimension) -> str:
+    """The unit that is asked, in words."""
+    unit = unit_of(dimension)
+    words = {"m": "metres", "m/s": "metres a second", "s": "seconds", "%": "per cent", "deg": "degrees", "V": "volts"}
+    return words.get(unit, f"`{unit}`")
+
+
+def decimal(value: Fraction, dimension: Dimension) -> str:
+    """A value of the canonical unit in the unit that is asked for, with six decimals at most."""
+    unit = unit_of(dimension)
+    whole = round(value * 1_000_000 * (UNITS[unit].denominator if unit else 1) / (UNITS[unit].numerator if unit else 1))
+    digits = f"{abs(whole) // 1_000_000}.{abs(whole) % 1_000_000:06}".rstrip("0").rstrip(".")
+    return f"{'-' if whole < 0 else ''}{digits} {unit}".rstrip()

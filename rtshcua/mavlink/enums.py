@@ -13,6 +13,10 @@ MAV_TYPE_ONBOARD_CONTROLLER: Final = 18
 #: what carries itself: of the others (ground stations, trackers, gimbals, cameras, ...) none is a vehicle
 VEHICLES: Final = frozenset({*range(5), *range(7, 18), *range(19, 26), 28, 29, 35, 43, 45, 46, 47})
 
+#: a battery that feeds no motor
+MAV_BATTERY_FUNCTION_AVIONICS: Final = 3
+MAV_BATTERY_FUNCTION_PAYLOAD: Final = 4
+
 MAV_AUTOPILOT_ARDUPILOTMEGA: Final = 3
 MAV_AUTOPILOT_INVALID: Final = 8  # of a component that is none
 MAV_AUTOPILOT_PX4: Final = 12

@@ -19,7 +19,7 @@ from rtshcua.model.faults import Mode
 from rtshcua.simulation.answers import Lanes
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.command import Command
-from rtshcua.simulation.config import Answers, Boot, Estimate, Extra, SimulationConfig
+from rtshcua.simulation.config import Answers, Boot, Estimate, Extra, Purpose, SimulationConfig
 from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
 from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
 from rtshcua.simulation.handling import Handling
@@ -54,6 +54,7 @@ _GUIDED = Mode.GUIDED  # an enumeration's attributes are slow to find
 
 Handler = Callable[["Autopilot", Command], tuple[int, ...]]
 """Obeys a command or refuses it; the results (MAV_RESULT) to acknowledge with, usually one."""
+_FEEDS_MOTORS = frozenset({Purpose.FLIGHT, Purpose.PROPULSION})
 Builder = Callable[["Autopilot"], Message | None]
 """A message with what the vehicle knows now; None if it knows nothing."""
 
@@ -106,6 +107,8 @@ class Flavour(ABC):
     """Whether another mode is told by a heartbeat at once."""
     reminds: bool
     """Whether it says again and again, while disarmed, why it would not arm."""
+    names_batteries: bool
+    """Whether BATTERY_STATUS says what a battery feeds, and of which type it is."""
     transfer: TransferRules
     missions: MissionRules
     fence: FenceRules
@@ -194,6 +197,15 @@ class Autopilot:
         self.looked_down = False
         """Whether the last DISTANCE_SENSOR was of the range finder that looks down, of two."""
         self.battery = Battery(config.battery / 10_000, config.hover_us / 1_000_000)
+        #: what each battery feeds, by id, and the battery; and how often one was reported
+        self.batteries = [
+            (Purpose.FLIGHT, self.battery),
+            *(
+                (other.purpose, Battery(other.level / 10_000, config.hover_us / 1_000_000))
+                for other in config.other_batteries
+            ),
+        ]
+        self.battery_reports = 0
         self._fast = config.boot is Boot.FAST
         pace = flavour.boot.all_s / FAST_S if self._fast else 1.0
         self.sensors = Sensors(
@@ -262,7 +274,7 @@ class Autopilot:
         sensors.step(_TICK_S)
         wind = (air.north, air.east)
         load = vehicle.step(_TICK_S, wind, sensors.error, battery.level > 0, sensors.estimates)
-        battery.drain(_TICK_S, load)
+        self._drain(load)
         if sensors.late:
             sensors.follow(_TICK_S, vehicle.body)
         if self.surroundings.pillars and vehicle.in_air and self.surroundings.is_hit(vehicle.body):
@@ -295,11 +307,16 @@ class Autopilot:
         self.now_us = 0
         self.outbox.clear()
 
+    def _drain(self, load: float) -> None:
+        for purpose, battery in self.batteries:
+            if purpose in _FEEDS_MOTORS:
+                battery.drain(_TICK_S, load)
+
     def _stay_off(self) -> None:
         """Lets `TICK_US` pass for the vehicle alone: in the air it falls."""
         self.air.step(_TICK_S)
         load = self.vehicle.step(_TICK_S, (self.air.north, self.air.east), self.sensors.error, powered=False)
-        self.battery.drain(_TICK_S, load)
+        self._drain(load)
         if self.vehicle.in_air and self.surroundings.is_hit(self.vehicle.body):
             self.vehicle.crash()
         self.vehicle.events.clear()

@@ -66,6 +66,27 @@ STOCK: frozenset[Extra] = frozenset()
 EQUIPPED = frozenset({Extra.RADIO, Extra.RANGE, Extra.WIND, Extra.VOLTAGE})
 
 
+class Purpose(StrEnum):
+    """What a battery feeds, as BATTERY_STATUS says it."""
+
+    FLIGHT = "flight"
+    """MAV_BATTERY_FUNCTION_ALL: drained as the first one is."""
+    PROPULSION = "propulsion"
+    """The same of the motors alone."""
+    AVIONICS = "avionics"
+    """Feeds no motor: its level stays."""
+    PAYLOAD = "payload"
+    """The same."""
+
+
+@dataclass(frozen=True, slots=True)
+class OtherBattery:
+    """A battery beside the first one: what it feeds, and its level at the start, in 1/10000."""
+
+    purpose: Purpose
+    level: int
+
+
 @dataclass(frozen=True, slots=True)
 class SimulationConfig:
     """All that can be chosen; integers in mm, mm/s, us, 1e-7 degree and 1/10000."""
@@ -74,6 +95,8 @@ class SimulationConfig:
     system: int = 1
     home: Home = HOME
     battery: int = 10_000
+    other_batteries: tuple[OtherBattery, ...] = ()
+    """Those with the ids from 1 on; each is reported in turn with the first."""
     hover_us: int = 18 * 60 * 1_000_000
     """How long a full battery hovers."""
     cruise_mm_s: int = 5_000
@@ -113,6 +136,8 @@ class SimulationConfig:
             raise ValueError("system is an id from 1 to 255")
         if not 0 <= self.battery <= 10_000:
             raise ValueError("battery is from 0 to 10000, in 1/10000")
+        if not all(0 <= other.level <= 10_000 for other in self.other_batteries):
+            raise ValueError("the level of another battery is from 0 to 10000, in 1/10000")
         if self.hover_us <= 0:
             raise ValueError("hover time is more than nothing")
         if not 0 < self.cruise_mm_s <= self.max_speed_mm_s <= 15_000:

@@ -21,7 +21,19 @@ from pathlib import Path
 
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.simulation.autopilot import TICK_US
-from rtshcua.simulation.config import EQUIPPED, HOME, STOCK, Answers, Boot, Estimate, Extra, Kind, SimulationConfig
+from rtshcua.simulation.config import (
+    EQUIPPED,
+    HOME,
+    STOCK,
+    Answers,
+    Boot,
+    Estimate,
+    Extra,
+    Kind,
+    OtherBattery,
+    Purpose,
+    SimulationConfig,
+)
 from rtshcua.simulation.faults import parse_fault
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind
@@ -44,6 +56,14 @@ def parser() -> argparse.ArgumentParser:
         help="degrees, degrees, metres above the sea; south: --home=-35.3,149.1,584",
     )
     add("--battery", type=_number(float, 0, 100), default=100.0, help="%% at the start")
+    add(
+        "--other-battery",
+        type=_other_battery,
+        action="append",
+        default=[],
+        metavar="PURPOSE,LEVEL",
+        help=f"another battery: {', '.join(Purpose)}, and %% at the start; may be repeated",
+    )
     add("--hover", type=_number(float, 0.1, 600), default=18.0, help="minutes that a full battery hovers")
     add("--cruise", type=_number(float, 0.1, 12), default=5.0, help="m/s")
     add("--return-at", type=_number(float, 2, 1000), default=30.0, help="metres above home that a return climbs to")
@@ -74,6 +94,7 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         system=options.system,
         home=home,
         battery=round(options.battery * 100),
+        other_batteries=tuple(options.other_battery),
         hover_us=round(options.hover * 60_000_000),
         cruise_mm_s=round(options.cruise * 1000),
         return_mm=round(options.return_at * 1000),
@@ -105,6 +126,13 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
         return value
 
     return parse
+
+
+def _other_battery(text: str) -> OtherBattery:
+    purpose, _, level = text.partition(",")
+    if purpose not in set(Purpose):
+        raise argparse.ArgumentTypeError(f"`{purpose}` is none of {', '.join(Purpose)}")
+    return OtherBattery(Purpose(purpose), round(_number(float, 0, 100)(level) * 100))
 
 
 def _listed(shape: str, least: int, most: int) -> Callable[[str], list[float]]:

@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import Mode
 from rtshcua.simulation.autopilot import Autopilot, Builder
-from rtshcua.simulation.config import Extra
+from rtshcua.simulation.battery import Battery
+from rtshcua.simulation.config import Extra, Purpose
 from rtshcua.simulation.failsafe import LOW_TO_LAND
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
 
@@ -90,12 +91,12 @@ def sys_status(a: Autopilot) -> Message | None:
         healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     battery = a.battery
     return _SYS_STATUS(
-        present, enabled, healthy, 250, _millivolts(a), battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
+        present, enabled, healthy, 250, _millivolts(a, battery), battery.centiamperes, battery.percent, 0, 0, 0, 0, 0, 0
     )
 
 
-def _millivolts(a: Autopilot) -> int:
-    return a.battery.millivolts if Extra.VOLTAGE in a.extras else _NO_VOLTAGE
+def _millivolts(a: Autopilot, battery: Battery) -> int:
+    return battery.millivolts if Extra.VOLTAGE in a.extras else _NO_VOLTAGE
 
 
 def gps_raw_int(a: Autopilot) -> Message:
@@ -160,20 +161,31 @@ def vfr_hud(a: Autopilot) -> Message:
     )
 
 
+_FUNCTIONS = {
+    Purpose.FLIGHT: mavlink.MAV_BATTERY_FUNCTION_ALL,
+    Purpose.PROPULSION: mavlink.MAV_BATTERY_FUNCTION_PROPULSION,
+    Purpose.AVIONICS: mavlink.MAV_BATTERY_FUNCTION_AVIONICS,
+    Purpose.PAYLOAD: mavlink.MAV_BATTERY_FUNCTION_PAYLOAD,
+}
+
+
 def battery_status(a: Autopilot) -> Message:
-    """BATTERY_STATUS of the one battery."""
-    battery = a.battery
+    """BATTERY_STATUS of each battery in turn."""
+    number = a.battery_reports % len(a.batteries)
+    a.battery_reports += 1
+    purpose, battery = a.batteries[number]
+    told = a.flavour.names_batteries  # ArduPilot says of no battery what it feeds (recorded)
     if battery.level <= 0.07:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
     elif battery.level <= 0.15:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_LOW
     else:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_OK
-    voltages = [_millivolts(a)] + [_NO_VOLTAGE] * 9
+    voltages = [_millivolts(a, battery)] + [_NO_VOLTAGE] * 9
     return _BATTERY_STATUS(
-        0,
-        mavlink.MAV_BATTERY_FUNCTION_ALL,
-        mavlink.MAV_BATTERY_TYPE_LIPO,
+        number,
+        _FUNCTIONS[purpose] if told else mavlink.MAV_BATTERY_FUNCTION_UNKNOWN,
+        mavlink.MAV_BATTERY_TYPE_LIPO if told else mavlink.MAV_BATTERY_TYPE_UNKNOWN,
         32_767,
         voltages,
         battery.centiamperes,

@@ -111,7 +111,7 @@ def _found(
     yield from _version(vehicle, flavour)
     if qualified is not None:
         yield _qualification(vehicle, flavour, qualified)
-    yield from _readiness(vehicle)
+    yield from _readiness(vehicle, policy)
     yield from _signals(vehicle, policy, flown, unheard)
     if flown is not None:
         yield _place(vehicle)
@@ -308,7 +308,7 @@ _METRE: Final = 1_000  # mm
 _ACCURATE_MM: Final = 5_000
 
 
-def _readiness(vehicle: ExaminingDriver) -> Iterator[VehicleFinding]:
+def _readiness(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFinding]:
     """Sensors, estimator, battery, and whether it would arm."""
     seen = vehicle.seen
     if seen.airborne:
@@ -328,7 +328,7 @@ def _readiness(vehicle: ExaminingDriver) -> Iterator[VehicleFinding]:
     yield _fix(vehicle)
     found = astray or "its estimator knows place and height"
     yield _graded("sensor/estimator", found, "a place and a height", stops=astray is not None)
-    yield _battery(vehicle)
+    yield _battery(vehicle, policy)
     for text in vehicle.texts:
         yield VehicleFinding("vehicle/said", OK, f"it said, for what that is worth: {text}")
 
@@ -344,12 +344,20 @@ def _fix(vehicle: ExaminingDriver) -> VehicleFinding:
     return _graded("sensor/gps", found, f"to {_ACCURATE_MM} mm", warns=message.h_acc > _ACCURATE_MM)
 
 
-def _battery(vehicle: ExaminingDriver) -> VehicleFinding:
-    message = vehicle.latest("BATTERY_STATUS") or vehicle.latest("SYS_STATUS")
-    if message is None or message.battery_remaining < 0:
+def _battery(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
+    """The charge that a run would decide by, and of which batteries it is."""
+    slot, batteries = policy.vehicle.battery, vehicle.batteries
+    message = vehicle.latest("SYS_STATUS")
+    if slot >= 0:
+        known = vehicle.values.get(slot)
+        charge = None if known is None else f"{known // 100} %"
+    else:  # no policy of a flight: what it says of its main battery
+        charge = None if message is None or message.battery_remaining < 0 else f"{message.battery_remaining} %"
+    each = f": {batteries.summary}" if len(batteries.told) > 1 else ""
+    if charge is None:
         advice = "set up its battery monitor: an unknown charge permits nothing"
-        return VehicleFinding("sensor/battery", STOP, "it does not know its charge", "a charge in %", advice)
-    return VehicleFinding("sensor/battery", OK, f"{message.battery_remaining} %")
+        return VehicleFinding("sensor/battery", STOP, f"it does not know its charge{each}", "a charge in %", advice)
+    return VehicleFinding("sensor/battery", OK, f"{charge}{each}")
 
 
 # ---------------------------------------------------------------- what a bundle needs
@@ -394,7 +402,8 @@ def _signal(
     if unknown:
         found = f"`{signal.name}` is unknown now: {heard} comes, and says so or is not vouched for"
         return VehicleFinding(slug, bad, found, "a value")
-    interval_us, stale_ms = vehicle.streams[heard].interval_us, signal.stale_us // 1_000
+    told = next((each for slot in slots if (each := vehicle.told.get(slot))), vehicle.streams[heard])
+    interval_us, stale_ms = told.interval_us, signal.stale_us // 1_000
     every = "came once" if interval_us is None else f"every {interval_us // 1_000} ms"
     found = f"`{signal.name}`: {heard} {every}, stale after {stale_ms} ms"
     seldom = interval_us is None or interval_us * _TIMES > signal.stale_us

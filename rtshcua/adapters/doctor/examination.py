@@ -81,14 +81,18 @@ class ExaminingDriver(Driver):
         self.texts: list[str] = []  # what it said, the first few texts once each
         self.ahead_us: int | None = None  # how far the vehicle's UTC is ahead of ours
         self.answered = False  # it answered something that we asked, TIMESYNC apart
-        self.values: dict[int, int | None] = {}  # of the policy's signals, by state slot
+        self.values: dict[int, int | None] = {}  # of the policy's signals, by state slot, as a run would read them,
+        self.told: dict[int, Stream] = {}  # and how often each was told, of all instances and components the one meant
         self.parameters: VehicleParameters | None = None
         self._clock = clock
         self._ears = Codec(0, 0)
         self._asked_us: int | None = None
+        self._heard_us = 0
+        self._of_autopilot: set[str] = set()  # what the autopilot itself tells is taken from nobody else, as in a run
 
     def receive(self, datagram: bytes, now_us: int) -> Heard:
         """As any driver, and keep what was heard: who speaks, and of what is believed what it says."""
+        self._heard_us = now_us
         heard = super().receive(datagram, now_us)
         self._meet(datagram, now_us)
         for frame in heard.frames:
@@ -135,9 +139,22 @@ class ExaminingDriver(Driver):
             if frame.system != but and (key in self.talkers or len(self.talkers) < _MOST_TALKERS):
                 self.talkers.setdefault(key, Talker()).hear(frame)
 
+    def _count(self, slot: int) -> None:
+        now_us, told = self._heard_us, self.told.get(slot)
+        if told is None:
+            self.told[slot] = Stream(1, now_us, now_us, None)
+        else:
+            told.count, told.last_us = told.count + 1, now_us
+
     def _examine(self, frame: Received, now_us: int) -> None:
         """Take in what one frame of the vehicle says."""
         name, message = frame.name, frame.message
+        if frame.component == AUTOPILOT:
+            if name not in self._of_autopilot:
+                self._of_autopilot.add(name)
+                self.streams.pop(name, None)
+        elif name in self._of_autopilot:
+            return
         stream = self.streams.get(name)
         if stream is None:
             self.streams[name] = Stream(1, now_us, now_us, message)
@@ -157,5 +174,7 @@ class ExaminingDriver(Driver):
         for event in events:
             if isinstance(event, Readings):
                 self.values.update(event.values)
+                for slot, _ in event.values:
+                    self._count(slot)
             elif isinstance(event, Said) and event.text not in self.texts and len(self.texts) < _MOST_TEXTS:
                 self.texts.append(event.text)

@@ -25,7 +25,7 @@ from rtshcua.adapters.vehicle.streams import (
     plan_streams,
 )
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
-from rtshcua.adapters.vehicle.telemetry import Telemetry
+from rtshcua.adapters.vehicle.telemetry import Batteries, Telemetry
 from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
 from rtshcua.codec.frames import Received, is_addressed
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
@@ -151,6 +151,11 @@ class Driver:
         wanted = {**always, **self._telemetry.rates, **estimator, **AT_TIMES}
         return plan_streams(wanted, self._capacity, signed=self._signed)
 
+    @property
+    def batteries(self) -> Batteries:
+        """The batteries that it told of."""
+        return self._telemetry.batteries
+
     def expect(self, steps: Sequence[Invocation]) -> None:
         """These are the mission's steps from now on: what they need more often is asked for anew."""
         self._telemetry.need(self._policy, [each.contract for each in steps])
@@ -233,7 +238,7 @@ class Driver:
             events.append(ports.Ready(now_us, self._flown_by_others()))
         if self._gate_may_be_lost:
             self._renew_ahead(now_us, events, begins=False)
-        if seen.notes or self.stream_requests.notes or self.preflight.notes:
+        if seen.notes or self.stream_requests.notes or self.preflight.notes or self._telemetry.batteries.notes:
             self._tell_notes(now_us, events)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
@@ -380,7 +385,7 @@ class Driver:
             return self._acknowledge(frame, now_us) or self._asks
         self.stream_requests.heard(name, now_us, len(octets))
         if name in self._telemetry.rates:
-            values = self._telemetry.read(name, message, component, seen.estimator.doubtful(name, now_us))
+            values = self._telemetry.read(name, message, component, seen.estimator.doubtful(name, now_us), now_us)
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
         if component == AUTOPILOT and self.asks is not None:
@@ -499,7 +504,8 @@ class Driver:
             send += self._ask(now_us)
 
     def _tell_notes(self, now_us: int, events: list[Event]) -> None:
-        for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes):
+        several = self._telemetry.batteries.notes
+        for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes, several):
             events += [ports.Noted(now_us, text) for text in notes]
             notes.clear()
 

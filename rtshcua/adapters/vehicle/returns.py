@@ -3,7 +3,6 @@ proved (`decision.volume`): docs/flying/returns.md has the sources.
 """
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
@@ -73,7 +72,7 @@ class ReturnLimit(NamedTuple):
     mm: int
     need: Callable[[Vehicle], Need | None]
     may_be_off: bool = False
-    words: Mapping[float, str] = MappingProxyType({})
+    words: Mapping[float, str] = {}
     proved: str = "at the height that is proved"
 
     def wrong(self, value: float, vehicle: Vehicle) -> Wrong | None:
@@ -100,16 +99,16 @@ class ReturnLimit(NamedTuple):
 #: PX4 and ArduCopter: to a rally point instead of home, along a mission, above the terrain
 ELSEWHERE: Final = "to the place that is proved"
 ABOVE_HOME: Final = "at heights above home, as is proved"
-RETURNS_TO: Final[Mapping[float, str]] = MappingProxyType({
+RETURNS_TO: Final[Mapping[float, str]] = {
     0: "home, or a rally point that is nearer", 1: "a rally point or a mission's landing", 2: "along the mission",
     3: "the shortest of rally point, mission and home", 4: "as is shorter, home or along the mission",
     5: "a rally point or a landing that is safe",
-})  # fmt: skip
-HEIGHTS_FROM: Final[Mapping[float, str]] = MappingProxyType({0: "home", 1: "the terrain"})
+}  # fmt: skip
+HEIGHTS_FROM: Final[Mapping[float, str]] = {0: "home", 1: "the terrain"}
 
 RTL_TYPE: Final = ReturnLimit("RTL_TYPE", 1, plain, words=RETURNS_TO, proved=ELSEWHERE)
 RTL_ALT_TYPE: Final = ReturnLimit("RTL_ALT_TYPE", 1, plain, words=HEIGHTS_FROM, proved=ABOVE_HOME)
-RALLY_TOTAL: Final = ReturnLimit("RALLY_TOTAL", 1, plain, words=MappingProxyType({0: "none"}), proved=ELSEWHERE)
+RALLY_TOTAL: Final = ReturnLimit("RALLY_TOTAL", 1, plain, words={0: "none"}, proved=ELSEWHERE)
 
 
 class ReturnLimits:

@@ -1,12 +1,14 @@
 """Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final, NamedTuple, TypeAlias
 
 from rtshcua.decision.rates import Rate, rates
 from rtshcua.decision.tree import where
 from rtshcua.mavlink import dialect
+from rtshcua.mavlink.enums import MAV_BATTERY_FUNCTION_AVIONICS, MAV_BATTERY_FUNCTION_PAYLOAD
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.contract import Contract
@@ -38,8 +40,8 @@ class Telemetry:
     """Knows which messages carry which signals, and of whom each is taken.
 
     What the autopilot reports is never replaced by another component's word, and where the vehicle is and what charge
-    it has is taken from the autopilot alone. Of a sensor that there are several of, the first instance counts.
-    Raises UnknownSource.
+    it has is taken from the autopilot alone. Of a sensor that there are several of, the first instance counts, and of
+    batteries the one with the least charge, see `Batteries`. Raises UnknownSource.
     """
 
     def __init__(self, policy: Policy, contracts: Sequence[Contract] = ()) -> None:
@@ -48,6 +50,8 @@ class Telemetry:
         self._told: set[tuple[str, Where]] = set()  # what came of the autopilot: of each, always the same slots
         self._first: dict[tuple[int, str, Where], Any] = {}
         self._by_message: dict[str, list[_Carried]] = {}
+        #: the batteries of which the worst counts
+        self.batteries = Batteries(_battery_stale_us(policy))
         #: of these the autopilot's own carry all that such a message may carry, each time; where there are several
         #: instances, those of this one
         self._whole: dict[str, int | None] = {}
@@ -66,11 +70,12 @@ class Telemetry:
         self.rates = rates(policy, contracts)
 
     def read(
-        self, name: str, message: Any, component: int = AUTOPILOT, doubtful: frozenset[str] = _NONE
+        self, name: str, message: Any, component: int = AUTOPILOT, doubtful: frozenset[str] = _NONE, now_us: int = 0
     ) -> tuple[tuple[int, int | None], ...]:
         """(slot, canonical integer) of every signal that this message carries; None is "reported as not known".
 
-        So is a value that rests on a field of the autopilot's which is `doubtful`. When it was measured is not said
+        So is a value that rests on a field of the autopilot's which is `doubtful`. It comes at `now_us`.
+        When it was measured is not said
         here: see `source_time`.
         """
         carried = self._by_message.get(name)
@@ -87,6 +92,11 @@ class Telemetry:
         for fields, slots, read, selected in carried:
             if selected and not _is_selected(selected, message):
                 continue
+            if name == BATTERY and _is_charge(fields, selected):
+                if component == AUTOPILOT:
+                    told.append((name, selected))
+                    values += self.batteries.take(message, read(message), now_us)
+                continue
             if instance is not None and not self._is_first(name, instance, component, selected):
                 continue
             told.append((name, selected))
@@ -98,7 +108,7 @@ class Telemetry:
             if not self._told.issuperset(told):
                 self._told.update(told)
                 self._own.update(slot for slot, _ in values)
-            if name != "WIND" and told and not any(each.where for each in carried):
+            if name not in ("WIND", BATTERY) and told and not any(each.where for each in carried):
                 self._whole[name] = instance
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
@@ -108,6 +118,99 @@ class Telemetry:
         key = component, name, where
         first = self._first[key] = min(instance, self._first.get(key, instance))
         return bool(instance == first)
+
+
+#: the message that tells of each battery, and by which field what it holds
+BATTERY: Final = "BATTERY_STATUS"
+_CHARGE: Final = ("battery_remaining",)
+_FEEDS_NO_MOTOR: Final = frozenset({MAV_BATTERY_FUNCTION_AVIONICS, MAV_BATTERY_FUNCTION_PAYLOAD})
+#: how often another battery was reported since one that counts as silent was
+_AMONG: Final = 3
+
+
+@dataclass(slots=True)
+class _Charge:
+    """Of one battery: its charge, when it was told, and how many reports of others came since."""
+
+    value: int | None
+    at_us: int
+    since: int = 0
+
+
+class Batteries:
+    """The batteries that a vehicle flies by, of which the one with the least charge counts.
+
+    Those are all but what is said to feed avionics or a payload; ArduPilot says of no battery what it feeds, so there
+    all count. One of them that does not know its charge, or is silent for as long as makes it stale, makes it unknown.
+    """
+
+    def __init__(self, stale_us: int) -> None:
+        self._stale_us = stale_us
+        self._charges: dict[int, dict[int, _Charge]] = {}  # by slot and number
+        #: of each battery that was reported: what it feeds (MAV_BATTERY_FUNCTION), and its charge in %
+        self.told: dict[int, tuple[int, int]] = {}
+        #: what an operator should know, to be taken
+        self.notes: list[str] = []
+
+    @staticmethod
+    def flies(function: int) -> bool:
+        """Whether a battery with this MAV_BATTERY_FUNCTION counts."""
+        return function not in _FEEDS_NO_MOTOR
+
+    def take(
+        self, message: Any, readings: Sequence[tuple[int, int | None]], now_us: int
+    ) -> Sequence[tuple[int, int | None]]:
+        """One BATTERY_STATUS and what it says by itself; the readings that count."""
+        number, function = message.id, message.battery_function
+        new = number not in self.told
+        self.told[number] = function, message.battery_remaining
+        if new and len(self.told) > 1:
+            self.notes.append(f"it has {len(self.told)} batteries: {self.summary}")
+        if not self.flies(function):
+            return ()
+        return [
+            (slot, self._worst(self._charges.setdefault(slot, {}), number, value, now_us)) for slot, value in readings
+        ]
+
+    def _worst(self, charges: dict[int, "_Charge"], number: int, value: int | None, now_us: int) -> int | None:
+        for other in charges.values():
+            other.since += 1
+        charges[number] = _Charge(value, now_us)
+        known = [
+            each.value
+            for each in charges.values()
+            if each.value is not None and (now_us - each.at_us <= self._stale_us or each.since < _AMONG)
+        ]
+        return min(known) if len(known) == len(charges) else None
+
+    @property
+    def summary(self) -> str:
+        """Each battery, and which of them counts, in words."""
+        flying = [number for number, (function, _) in sorted(self.told.items()) if self.flies(function)]
+        words = [
+            f"{number} with {'an unknown charge' if charge < 0 else f'{charge} %'}" + ("" if self.flies(function) else
+            f" ({_FEEDS[function]}, which does not count)")
+            for number, (function, charge) in sorted(self.told.items())
+        ]  # fmt: skip
+        counts = ", and the one with the least charge counts" if len(flying) > 1 else ""
+        return ", ".join(words) + counts
+
+
+_FEEDS: Final = {MAV_BATTERY_FUNCTION_AVIONICS: "avionics", MAV_BATTERY_FUNCTION_PAYLOAD: "payload"}
+
+
+def _is_charge(fields: tuple[str, ...], where: Where) -> bool:
+    """Whether a signal is the charge of whatever battery, and not of one that it names."""
+    return fields == _CHARGE and not where
+
+
+def _battery_stale_us(policy: Policy) -> int:
+    """How old the charge may be; the shortest, where several signals read it."""
+    every = [
+        signal.stale_us for signal in policy.signals for source in signal.sources
+        if source.message == BATTERY and _is_charge(source.fields, source.where)
+    ]  # fmt: skip
+    return min(every, default=0)
 
 
 def _instance(message: Any) -> int | None:

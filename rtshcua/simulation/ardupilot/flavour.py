@@ -189,6 +189,7 @@ class ArduCopter(Flavour):
     coast_s = 7.0
     key_ahead_us = 60_000_000  # recorded; against what was heard before a restart (`load_signing_key`)
     handling, parameters = HANDLING, PARAMETERS
+    names_batteries = False  # recorded: function and type are 0, unknown
     bytewise = False
     commands = COMMANDS
     builders, streams = BUILDERS, DEFAULT

@@ -159,6 +159,7 @@ class Px4(Flavour):
     fix = mavlink.GPS_FIX_TYPE_3D_FIX
     coast_s = 5.0
     handling, parameters = HANDLING, PARAMETERS
+    names_batteries = True
     bytewise = True
     commands = COMMANDS
     target_timeout_us = 1_000_000

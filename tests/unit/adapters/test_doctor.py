@@ -17,7 +17,7 @@ from rtshcua.model.faults import GpsLoss, LinkLoss, MessageSilence
 from rtshcua.model.flat.policy import Policy, Speeds
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.rehearsal import unheard
-from rtshcua.simulation.config import EQUIPPED, Extra, SimulationConfig
+from rtshcua.simulation.config import EQUIPPED, Extra, OtherBattery, Purpose, SimulationConfig
 from rtshcua.simulation.place import Home
 from rtshcua.virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 from virtual import case
@@ -249,6 +249,15 @@ def test_what_lowers_or_lifts_the_way_home_stops_a_mission(
     assert (finding.verdict, finding.needed) == (MissionVerdict.WARN, needed)
     well = examine(case.simulated(flavour), policy)
     assert (stops(well), well[f"settings/{parameter[0].lower()}"].verdict) == (set(), MissionVerdict.OK)
+
+
+def test_of_several_batteries_it_says_the_one_that_a_run_would_use() -> None:
+    others = (OtherBattery(Purpose.PAYLOAD, 500), OtherBattery(Purpose.PROPULSION, 6_000))
+    found = examine(case.simulated("px4", other_batteries=others))["sensor/battery"]
+    assert found.found == (
+        "59 %: 0 with 99 %, 1 with 5 % (payload, which does not count), 2 with 59 %, and the one with the least charge "
+        "counts"
+    )
 
 
 def test_a_limit_of_the_way_home_that_is_not_answered_is_unknown() -> None:

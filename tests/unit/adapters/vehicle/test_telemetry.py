@@ -112,15 +112,59 @@ def test_the_radio_speaks_where_the_autopilot_does_not() -> None:
     assert Telemetry(POLICY).read("RADIO_STATUS", radio(80), 68) == ((LINK, 8_000),)
 
 
-def test_of_two_batteries_the_first_counts() -> None:
-    def of(instance: int, percent: int) -> Any:
-        return mavlink.MAVLink_battery_status_message(instance, 0, 0, 0, [0] * 10, 0, 0, 0, percent)
+def one_of(number: int, percent: int, function: int = 0) -> Any:
+    return mavlink.MAVLink_battery_status_message(number, function, 0, 0, [0] * 10, 0, 0, 0, percent)
 
+
+def test_of_several_flight_batteries_the_one_with_the_least_charge_counts() -> None:
+    for function in (mavlink.MAV_BATTERY_FUNCTION_UNKNOWN, mavlink.MAV_BATTERY_FUNCTION_ALL,
+                     mavlink.MAV_BATTERY_FUNCTION_PROPULSION):  # fmt: skip
+        telemetry = Telemetry(POLICY)
+        assert telemetry.read("BATTERY_STATUS", one_of(0, 80, function)) == ((BATTERY, 8_000),)
+        assert telemetry.read("BATTERY_STATUS", one_of(1, 20, function)) == ((BATTERY, 2_000),)
+        assert telemetry.read("BATTERY_STATUS", one_of(0, 79, function)) == ((BATTERY, 2_000),)
+        assert telemetry.read("BATTERY_STATUS", one_of(1, -1, function)) == ((BATTERY, None),)
+        assert telemetry.read("BATTERY_STATUS", one_of(0, 79, function)) == ((BATTERY, None),)
+        assert telemetry.batteries.notes == [
+            "it has 2 batteries: 0 with 80 %, 1 with 20 %, and the one with the least charge counts"
+        ]
+
+
+def test_a_battery_that_feeds_no_motor_does_not_count() -> None:
     telemetry = Telemetry(POLICY)
-    assert telemetry.read("BATTERY_STATUS", of(1, 95)) == ((BATTERY, 9_500),)
-    assert telemetry.read("BATTERY_STATUS", of(0, 8)) == ((BATTERY, 800),)
-    assert telemetry.read("BATTERY_STATUS", of(1, 95)) == ()
-    assert telemetry.read("BATTERY_STATUS", of(0, 7)) == ((BATTERY, 700),)
+    assert telemetry.read("BATTERY_STATUS", one_of(0, 5, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD)) == ()
+    assert telemetry.read("BATTERY_STATUS", one_of(1, 80, 1)) == ((BATTERY, 8_000),)
+    assert telemetry.read("BATTERY_STATUS", one_of(2, -1, mavlink.MAV_BATTERY_FUNCTION_AVIONICS)) == ()
+    assert telemetry.batteries.summary == (
+        "0 with 5 % (payload, which does not count), 1 with 80 %, 2 with an unknown charge (avionics, which does not "
+        "count)"
+    )
+
+
+def test_a_flight_battery_that_falls_silent_makes_the_charge_unknown() -> None:
+    telemetry = Telemetry(POLICY)
+    stale_us = next(each.stale_us for each in POLICY.signals if each.slot == BATTERY)
+
+    def read(number: int, percent: int, at_us: int) -> Any:
+        return telemetry.read("BATTERY_STATUS", one_of(number, percent), now_us=at_us)
+
+    read(0, 80, 0)
+    read(1, 70, 0)
+    later = stale_us + 1
+    assert read(0, 79, later) == read(0, 79, later) == ((BATTERY, 7_000),), "after a silence the other may still come"
+    assert read(0, 79, later) == ((BATTERY, None),)
+    assert read(1, 60, later) == ((BATTERY, 6_000),)
+
+
+def test_a_signal_may_name_one_battery() -> None:
+    index = next(number for number, each in enumerate(POLICY.signals) if each.slot == BATTERY)
+    charge = POLICY.signals[index]
+    signals = list(POLICY.signals)
+    signals[index] = replace(charge, sources=(replace(charge.sources[0], where=(("id", 1),)),))
+    telemetry = Telemetry(replace(POLICY, signals=tuple(signals)))
+    assert telemetry.read("BATTERY_STATUS", one_of(0, 20)) == ()
+    assert telemetry.read("BATTERY_STATUS", one_of(1, 70)) == ((BATTERY, 7_000),)
+    assert telemetry.read("BATTERY_STATUS", one_of(0, 10)) == ()
 
 
 def test_of_range_finders_the_one_that_looks_where_the_signal_says() -> None:

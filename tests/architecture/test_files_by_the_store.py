@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.adapters.store import writing
 from virtual.rows import rows
 
 PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
@@ -103,3 +104,24 @@ def test_files_are_opened_and_written_by_the_store_alone() -> None:
     ways = {name: each for name, each in found.items() if each}
     assert {name: each for name, each in ways.items() if name not in ALLOWED} == {}
     assert sorted(ALLOWED.keys() - ways.keys()) == [], "these may go from the list"
+
+
+def test_folders_are_made_with_a_mode_of_their_own() -> None:
+    """Without one a folder has what the umask leaves, all to everybody where it takes nothing."""
+    without = []
+    for file in sorted(PACKAGE.rglob("*.py")):
+        source = file.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(source)) if re.search(r"mkdir|makedirs|touch\(|mkfifo", source) else ():
+            match node:
+                case ast.Call(func=ast.Attribute(attr="mkdir" | "makedirs" | "touch" | "mkfifo")):
+                    path = isinstance(node.func, ast.Attribute) and ast.unparse(node.func.value) != "os"
+                    given = len(node.args) > (0 if path else 1) or any(each.arg == "mode" for each in node.keywords)
+                    if not given:
+                        without.append(f"{file.relative_to(PACKAGE)}:{node.lineno}")
+    assert [each for each in without if not each.startswith("cli/linting/touched.py")] == []
+
+
+def test_no_mode_lets_others_write() -> None:
+    modes = {name: mode for name, mode in vars(writing).items() if name.endswith(("_FILE", "_FOLDER"))}
+    assert len(modes) == 4
+    assert {name: oct(mode) for name, mode in modes.items() if mode & 0o022} == {}

@@ -21,7 +21,7 @@ from rtshcua.adapters.archive.entry import Entry, Examined, Step
 from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
 from rtshcua.adapters.files.logs import lines
 from rtshcua.adapters.store.reading import open_regular
-from rtshcua.adapters.store.writing import publish, replacing
+from rtshcua.adapters.store.writing import PRIVATE_FOLDER, publish, replacing
 from rtshcua.evidence.reading import LONGEST
 from rtshcua.wire.untrusted import Untrusted
 
@@ -211,7 +211,7 @@ def _files(folder: Folder, sound: Sequence[Examined]) -> Iterator[list[str]]:
         path = folder.log(each.entry.log)
         if each.entry.finding == "tail/torn":
             copy = folder.scratch / each.entry.log / path.name
-            copy.parent.mkdir()
+            copy.parent.mkdir(PRIVATE_FOLDER)
             with open_regular(path, folder.path) as whole:
                 _write_lines(copy, (line for line in lines(whole) if line.endswith(b"\n")))
             copies.append(copy)

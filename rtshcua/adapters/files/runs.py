@@ -9,7 +9,7 @@ import msgspec
 from rtshcua.adapters.files.evidence import SYSTEM, Disk, EvidenceFile
 from rtshcua.adapters.files.telemetry import TelemetryFile
 from rtshcua.adapters.store.reading import walk
-from rtshcua.adapters.store.writing import make_folder, naming, replace, sync_folder, write_new
+from rtshcua.adapters.store.writing import PUBLIC_FOLDER, make_folder, naming, replace, sync_folder, write_new
 
 BUNDLE, LOG, TELEMETRY, SUMMARY = "mission.bundle", "log.jsonl", "telemetry.tlog", "summary.json"
 
@@ -70,7 +70,7 @@ def _new_folder(runs: Path, name: str) -> Path:
         path = runs / (name if number == 1 else f"{name}-{number}")
         try:
             with naming(path):
-                path.mkdir()
+                path.mkdir(PUBLIC_FOLDER)
         except FileExistsError:
             number += 1
             continue

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import NamedTuple
 
-from rtshcua.adapters.store.writing import COMMON_FILE, UNFINISHED, sync_folder
+from rtshcua.adapters.store.writing import PUBLIC_FOLDER, UNFINISHED, sync_folder
 from rtshcua.adapters.store.writing import replace as put
 
 
@@ -56,7 +56,7 @@ def lay(files: Mapping[str, bytes], folder: Path, *, replace: bool = False) -> T
                 target.rename(aside / str(number))
             else:
                 undo.callback(target.unlink, missing_ok=True)
-            put(target, data, mode=COMMON_FILE, synced=False)
+            put(target, data, synced=False)
         undo.pop_all()
     shutil.rmtree(aside, ignore_errors=True)
     return None
@@ -72,7 +72,7 @@ def _blocked(targets: Mapping[Path, bytes], folder: Path) -> tuple[Path, ...]:
 def _make_folders(folder: Path, undo: ExitStack) -> None:
     for each in (*reversed(folder.parents), folder):
         if not each.is_dir():
-            each.mkdir()
+            each.mkdir(PUBLIC_FOLDER)
             undo.callback(_remove, each)
 
 

@@ -23,10 +23,9 @@ from rtshcua.adapters.store.reading import (
     unfollowed,
 )
 
-#: modes, from which the umask takes away
+#: modes of what is made; the umask takes away more, and where it takes nothing, no other user may write all the same
 PRIVATE_FILE: Final = 0o600
 PUBLIC_FILE: Final = 0o644
-COMMON_FILE: Final = 0o666
 PRIVATE_FOLDER: Final = 0o700
 PUBLIC_FOLDER: Final = 0o755
 #: what the names of files begin with that are not finished; a loss of power may leave one
@@ -121,7 +120,7 @@ def rewrite(path: Path, before: bytes, data: bytes) -> None:
                 raise Changed(errno.EBUSY, "it was changed meanwhile")
 
 
-def write_out(path: Path, data: bytes, *, mode: int = COMMON_FILE) -> None:
+def write_out(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
     """Puts what somebody asked for into the file that they named, in one step, where a link leads too, unless it leads
     out of their checkout; but for what is no file to be replaced, it is written to: `/dev/stdout`, even where that
     leads to a file. A pipe that nobody reads is not waited for. Raises NotWritten, and OSError.

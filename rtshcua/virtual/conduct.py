@@ -36,7 +36,7 @@ from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.journal import Detail, said
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor
-from rtshcua.onboard.runtime.supervisor import Supervisor
+from rtshcua.onboard.runtime.supervisor import DURATION, Supervisor
 from rtshcua.virtual.excuses import Failure
 from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
@@ -302,6 +302,7 @@ class Conduct:
         step = next(queue, None)
         supervisor: Supervisor | None = None
         stood_us: int | None = None
+        away_us = 0
         bound_us = self._flown.wait_us + 2 * self._flown.tick_us
         start_us = self._flown.start_us
         found: Detail | None = None
@@ -313,29 +314,32 @@ class Conduct:
             runs = step is not None and step.since_us < at_us
             if runs and step is not None and supervisor is None:
                 supervisor = Supervisor(self._invocations[step.step], self._policy, step.since_us + start_us)
-                found, stood_us = None, None
+                found, stood_us, away_us = None, None, 0
             silent = any(since_us <= at_us < until_us for since_us, until_us in silences)
             if runs and silent and stood_us is None:
                 stood_us = at_us
             if runs and not silent and stood_us is not None and supervisor is not None:
                 supervisor.grace.stood(now.monotonic_us - stood_us - start_us)
+                away_us += at_us - stood_us
                 stood_us = None
             for heard in turn.heard:
                 readings = Readings(heard.measured_us, heard.values)
                 if runs and not silent and found is None and supervisor is not None and monitor.hides(readings):
-                    found = supervisor.violated(monitor.state(now.monotonic_us), now)
+                    found = supervisor.violated(monitor.state(now.monotonic_us), now, away_us)
                     monitor.seen()
                 monitor.update(readings)
             monitor.observe(now)
             if not runs or supervisor is None or step is None or silent:
                 continue
             if found is None:
-                found = supervisor.violated(monitor.state(now.monotonic_us), now)
+                found = supervisor.violated(monitor.state(now.monotonic_us), now, away_us)
             ended_us = step.until_us
             if found is not None and (ended_us is None or ended_us > at_us + bound_us):
                 if ended_us is not None or life.ended_us > at_us + bound_us:
                     end = "it went on" if ended_us is None else f"it ended {(ended_us - at_us) / 1e6:.2f} s later"
-                    if not self._excused(at_us, silences, bound_us):
+                    # what answers nothing is not recorded as a silence, and counts for no time limit either
+                    mute = said(found).startswith(DURATION) and self._before(at_us, faults.LinkFault, faults.Stall)
+                    if not mute and not self._excused(at_us, silences, bound_us):
                         yield Failure(
                             "not-watched", at_us, f"{step_words(step.step)} rests on `{said(found)}`, and {end}"
                         )

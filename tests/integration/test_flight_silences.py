@@ -5,10 +5,14 @@ nothing is judged before its state is fresh. A silence longer than the policy's 
 """
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
+from rtshcua import library
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.evidence.report import Verdict
 from rtshcua.model.faults import LinkReorder, LinkSilence, Way, WindStep
@@ -18,7 +22,7 @@ from rtshcua.onboard.runtime.view import Stage
 from rtshcua.virtual.vehicle import TICK_US
 from virtual import case
 from virtual.flight import Flight, Flown
-from virtual.shipped import equipped, shipped, simulated
+from virtual.shipped import equipped, sealed, shipped, simulated
 
 FLAVOURS = ("px4", "ardupilot")
 SECONDS = (0.5, 1.0, 2.5, 3.5, 5.0, 8.0, 20.0, 45.0)
@@ -191,3 +195,45 @@ def test_a_vehicle_that_never_hears_us_again_is_not_waited_for_without_an_end(fl
 @pytest.mark.parametrize(("seconds", "way"), [*product(SECONDS, Way)])
 def test_no_silence_in_any_stage_lands_on_the_spot(flavour: str, stage: str, seconds: float, way: Way) -> None:
     lands_at_home(flavour, stage, seconds, way)
+
+
+@cache
+def hovers() -> bytes:
+    """The short mission, with a hover of 20 s: it may last 35 s."""
+    text = (library.root() / "missions" / "short.rts").read_text(encoding="utf-8")
+    with TemporaryDirectory() as folder:
+        source = Path(folder) / "short.rts"
+        source.write_text(text.replace("hover(5 s)", "hover(20 s)"), encoding="utf-8")
+        return sealed(source)
+
+
+@pytest.mark.parametrize(
+    ("flavour", "silences", "way"),
+    [
+        ("px4", (20.0,), Way.BOTH),
+        pytest.param("ardupilot", (20.0,), Way.BOTH, marks=pytest.mark.soak),
+        pytest.param("px4", (5.0, 5.0, 5.0, 5.0), Way.DOWN, marks=pytest.mark.soak),
+        ("ardupilot", (5.0, 5.0, 5.0, 5.0), Way.DOWN),
+        ("px4", (20.0,), Way.UP),
+        pytest.param("ardupilot", (20.0,), Way.UP, marks=pytest.mark.soak),
+    ],
+)
+def test_a_hover_goes_on_after_silences_that_are_longer_than_what_its_limit_leaves(
+    flavour: str, silences: tuple[float, ...], way: Way
+) -> None:
+    flight = Flight(hovers(), simulated(flavour))
+    began: list[int] = []
+
+    def each(flight: Flight) -> Sequence[Event]:
+        if running(1)(flight) and not began:
+            at_us = flight.vehicle.simulation.now_us + 4 * case.S
+            for seconds in silences:
+                began.append(at_us)
+                flight.vehicle.simulation.inject(LinkSilence(at_us, round(seconds * case.S), way))
+                at_us += round((seconds + 3) * case.S)
+        return ()
+
+    flown = flight.fly(each)
+    told = [record["detail"] for record in flown.effects("violated")]
+    assert (flown.ending, told) == (Ending.COMPLETED, [])
+    assert flown.audit().report.verdict is Verdict.VERIFIED

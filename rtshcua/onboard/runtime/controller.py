@@ -220,7 +220,9 @@ class MissionController:
         if not self.dispatcher.fly(now, answer.permit, Ref(STEP, invocation.step, -1), None):
             return self._inadmissible(now, invocation)
         prepared = self._loaded.invocations[invocation.step]
-        self._supervisor = Supervisor(prepared, self._loaded.policy, now.monotonic_us)
+        self._supervisor = Supervisor(
+            prepared, self._loaded.policy, now.monotonic_us, self.link.away_us(now.monotonic_us)
+        )
         self.stage = _RUNNING
         return False
 
@@ -232,8 +234,10 @@ class MissionController:
         return self._come_down(now, FALLBACK_LINK)
 
     def _supervise(self, now: Now) -> bool:
-        supervisor = self._supervisor
-        violated = None if supervisor is None else supervisor.violated(self.monitor.state(now.monotonic_us), now)
+        supervisor, at_us = self._supervisor, now.monotonic_us
+        violated = None
+        if supervisor is not None:
+            violated = supervisor.violated(self.monitor.state(at_us), now, self.link.away_us(at_us))
         return violated is not None and self._violated(now, violated)
 
     def _violated(self, now: Now, what: Detail) -> bool:
@@ -497,6 +501,7 @@ class MissionController:
             return None
         if active.until_us is not None:
             return active.until_us - at_us
-        if self.stage is _RUNNING and current is not None and current.contract.duration_us:
-            return active.since_us + current.contract.duration_us - at_us
+        supervisor = self._supervisor if self.stage is _RUNNING else None
+        if supervisor is not None and current is not None and current.contract.duration_us:
+            return current.contract.duration_us - supervisor.lasted_us(at_us, self.link.away_us(at_us))
         return None

@@ -66,6 +66,22 @@ class LinkSupervision:
         self._standing_us: int | None = None  # since then nothing is judged
         self._awaited: frozenset[int] = frozenset()
         self._awaits_air = False
+        self._away_us = 0  # how long the link was not up, in stretches that are over,
+        self._away_since_us: int | None = None  # and when the present one began
+
+    def away_us(self, now_us: int) -> int:
+        """How long, in sum so far, the vehicle was silent, not judged yet after that, or answered nothing: what flies
+        a step counts none of it.
+        """
+        return self._away_us + (0 if self._away_since_us is None else now_us - self._away_since_us)
+
+    def _count_away(self, now_us: int) -> None:
+        away = self._standing_us is not None or self._mute_us is not None
+        if away and self._away_since_us is None:
+            self._away_since_us = now_us
+        elif not away and self._away_since_us is not None:
+            self._away_us += now_us - self._away_since_us
+            self._away_since_us = None
 
     @property
     def down(self) -> bool:
@@ -83,6 +99,7 @@ class LinkSupervision:
             self._mute_us = None
         elif self._mute_us is None:
             self._mute_us = now_us
+        self._count_away(now_us)
 
     def lost(self, now_us: int, heard_us: int, *, takes_off: bool) -> bool:
         """The link is lost: the vehicle was last heard at `heard_us`, and what was current then will be awaited.
@@ -98,6 +115,7 @@ class LinkSupervision:
         self._standing_us = now_us if self._standing_us is None else self._standing_us
         self._awaited |= self._monitor.current(heard_us)
         self._awaits_air = self._awaits_air or takes_off
+        self._count_away(now_us)
         return True
 
     def back(self, now_us: int) -> int | None:
@@ -130,6 +148,7 @@ class LinkSupervision:
         """Whether nothing may be judged now, for fresh state may still come. To be asked while it is awaited."""
         if now_us < self._until_us and self._missing(now_us):
             self._standing_us = now_us if self._standing_us is None else self._standing_us
+            self._count_away(now_us)
             return True
         return False
 
@@ -141,6 +160,7 @@ class LinkSupervision:
         """
         stood_us = 0 if self._standing_us is None else now_us - self._standing_us
         self._standing_us = None
+        self._count_away(now_us)
         silence = None
         if self._since_us is not None:
             lasted_us = self._back_us - self._since_us

@@ -15,7 +15,7 @@ from rtshcua.onboard.runtime.journal import Detail
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.seen import seen
 
-_DURATION = "lasts longer than it may"
+DURATION = "lasts longer than it may"
 _TIMING = 5  # the step of section 4.1 that holds a decision against its deadline
 
 
@@ -48,21 +48,28 @@ class Grace:
 class Supervisor:
     """Watches one running skill. UNKNOWN that lasts longer than the contract's grace counts as FALSE (design 4.2).
 
-    While nothing is judged no grace runs, but the skill's own time does.
+    While nothing is judged no grace runs, nor does the skill's own time: what flies it counts in time with a link, too.
+    `away_us` is how long the link was not up so far, in sum (`LinkSupervision.away_us`).
     """
 
-    def __init__(self, prepared: PreparedInvocation, policy: PreparedPolicy, started_us: int) -> None:
+    def __init__(self, prepared: PreparedInvocation, policy: PreparedPolicy, started_us: int, away_us: int = 0) -> None:
         self._prepared = prepared
         self._policy = policy
         self._started_us = started_us
+        self._away_us = away_us  # when it started
         self.grace = Grace()
 
-    def violated(self, state: State, now: Now) -> Detail | None:
+    def lasted_us(self, at_us: int, away_us: int) -> int:
+        """How long the skill runs, in time with a link."""
+        return at_us - self._started_us - (away_us - self._away_us)
+
+    def violated(self, state: State, now: Now, away_us: int = 0) -> Detail | None:
         """The text of what does not hold any more, with the values that it read, or None while all does."""
         contract = self._prepared.invocation.contract
         at_us = now.monotonic_us
-        if 0 < contract.duration_us < at_us - self._started_us:
-            return _DURATION
+        if 0 < contract.duration_us < self.lasted_us(at_us, away_us):
+            away_ms = (away_us - self._away_us) // 1_000
+            return f"{DURATION}, besides {away_ms} ms without a link" if away_ms else DURATION
         text = self.grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
         return None if text is None else partial(_with_values, text, self._prepared, self._policy, state)
 

@@ -397,6 +397,61 @@ def test_grace_counts_only_the_time_in_which_the_link_is_up() -> None:
     assert run.clock.now().monotonic_us - began_us <= GRACE_US
 
 
+LIMIT_US = 40 * S
+
+
+def limited() -> Run:
+    """The third step runs, and may take 40 s."""
+    contracts = tuple(replace(one, duration_us=LIMIT_US) for one in PATIENT)
+    policy = replace(POLICY, vehicle=SHORT, signals=SIGNALS, contracts=contracts, after_silence=AfterSilence.CONTINUE)
+    invocations = tuple(replace(one, contract=contracts[one.skill]) for one in MISSION.invocations)
+    run = Run(loaded(policy, replace(MISSION, invocations=invocations))).until_flies("inspect_area")
+    run.vehicle.deaf = {"inspect_area"}
+    return run
+
+
+def violations(run: Run) -> list[str]:
+    return [record["detail"] for record in run.records if record.get("event") == "violated"]
+
+
+@pytest.mark.parametrize("gaps", [(0,), (8,), (3, 3, 3), (2, 2, 2, 2, 2, 2, 2, 2)])
+def test_the_time_limit_of_a_step_runs_in_link_time_and_its_reason_names_the_silence(gaps: tuple[int, ...]) -> None:
+    """What flies it waits in link time, too: a limit by the clock on the wall ended a hover of 20 s for a silence."""
+    run = limited()
+    began_us = run.clock.now().monotonic_us
+    away_us = 0
+    for gap in gaps:
+        if gap:
+            run.step(LinkLost(0))
+            lost_us = run.clock.now().monotonic_us
+            pass_time(run, gap * S)
+            come_back(run, 0)
+            run.tick()
+            away_us += run.clock.now().monotonic_us - lost_us
+    run.until(lambda run: "violated" in run.events)
+    lasted_us = run.clock.now().monotonic_us - began_us
+    assert abs(lasted_us - away_us - LIMIT_US) <= S * (len(gaps) + 1) // 2
+    (reason,) = violations(run)
+    assert reason.startswith("lasts longer than it may")
+    assert ("without a link" in reason) == (gaps != (0,))
+
+
+def test_the_time_limit_of_a_step_does_not_run_while_the_vehicle_answers_nothing() -> None:
+    run = limited()
+    run.step(Answering(0, answers=False))
+    for _ in range(20):
+        run.clock.advance(S)
+        run.tick()
+        if "violated" in run.events:
+            break
+    run.step(Answering(0, answers=True))
+    assert run.runtime.view(run.clock.now()).left_us > LIMIT_US - 10 * S
+    assert violations(run) == []
+    run.until(lambda run: "violated" in run.events)
+    (reason,) = violations(run)
+    assert "ms without a link" in reason
+
+
 def test_grace_of_a_waiting_step_does_not_run_through_silence() -> None:
     run = holding(AfterSilence.CONTINUE)
     run.vehicle.values[BATTERY] = None  # the way home is not known

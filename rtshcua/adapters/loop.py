@@ -5,7 +5,7 @@ evidence: a command that must be recorded first is held until its record is kept
 fallback is held for nothing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from rtshcua.model.durability import BUFFERED, SYNCED_FIRST
@@ -21,6 +21,20 @@ HELD_WAIT_US = 300
 
 
 Watch = Callable[[Now, Sequence[Event], Sequence[Action]], None]
+
+
+def append_all(sink: ports.EvidenceSink, lines: Iterable[bytes], durability: int) -> None:
+    """Give a sink lines that were made together. All of them, also where it refuses one: it takes that over all the
+    same, and a log has no holes. Raises the first OSError.
+    """
+    refused: OSError | None = None
+    for line in lines:
+        try:
+            sink.append(line, durability)
+        except OSError as error:
+            refused = refused or error
+    if refused is not None:
+        raise refused
 
 
 class _Record(NamedTuple):

@@ -8,6 +8,7 @@ import msgspec
 from rtshcua.adapters.files.runs import LOG, SUMMARY, TELEMETRY, RunFolder
 from rtshcua.adapters.files.telemetry import TelemetryFile
 from rtshcua.adapters.files.writer import EvidenceWriter
+from rtshcua.adapters.loop import append_all
 from rtshcua.cli.live.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.chain import Recorder
@@ -34,14 +35,14 @@ def close_log(
         missing.append(f"{lack} ({TELEMETRY})")
         at = now()
         with suppress(OSError):
-            if recorder.overdue(at):
-                for line in recorder.sealing(at):
-                    sink.append(line, SYNCED_FIRST)
+            append_all(sink, recorder.caught_up(at), SYNCED_FIRST)
+        with suppress(OSError):
             sink.append(recorder.effect(at, FRAMES_LOST, detail=lack), WRITTEN)
     if ending is not None:
+        lines = recorder.closing(now(), ending=ending, tlog=tlog)
         with suppress(OSError):
-            for line in recorder.closing(now(), ending=ending, tlog=tlog):
-                sink.append(line, SYNCED_FIRST)
+            append_all(sink, lines, SYNCED_FIRST)
+            for line in lines:
                 heard(line)
     trouble: OSError | None = None
     try:

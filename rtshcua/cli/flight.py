@@ -12,7 +12,7 @@ from rtshcua.adapters.clock import LinkClock, StepWatch
 from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
-from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
+from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop, append_all
 from rtshcua.adapters.preparation import Preparations
 from rtshcua.adapters.utc import CLOCK, UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
@@ -27,6 +27,7 @@ from rtshcua.cli.live.telling import Teller, plan_of
 from rtshcua.cli.live.watching import Watching
 from rtshcua.cli.log_signer import LogSigner
 from rtshcua.cli.past import LOG_BEFORE, Past
+from rtshcua.cli.read_back import ReadBack, read_back
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.simulation import SIMULATED
 from rtshcua.cli.tape import Tape
@@ -100,7 +101,7 @@ class Flight:
         self._feed = feed
         self._interrupts = interrupts
         self._tape = tape
-        self._run = run
+        self._run, self._root = run, root
         self._speed = speed
         self._early = list(events)
         self._agents = agents
@@ -127,8 +128,7 @@ class Flight:
         session = loaded.attestation.begin(boundary.key)
         boundary.begun(loaded.attestation.digest, session)
         self._recorder.attest = loaded.attestation.statement
-        for line in self._recorder.attested(now):
-            self._sink.append(line, WRITTEN)
+        append_all(self._sink, self._recorder.attested(now), WRITTEN)
         if simulated is not None:
             self._sink.append(self._recorder.effect(now, SIMULATED, detail=simulated), WRITTEN)
         if past.note:
@@ -169,13 +169,17 @@ class Flight:
         if ending is Ending.CRASHED:
             self._feed.post(Note(_CRASHED))
         missing = self._close(ending)
+        lacks = ExitCode.FULL
+        found = ReadBack(None) if missing else read_back(self._run.path / LOG, self._root)
+        if found.refused is not None:
+            missing, lacks = (found.refused,), ExitCode.EVIDENCE
         self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=not missing)
         if not missing:
             self._past.end(self._recorder.final_hash)
         code = EXIT_CODES[ending]
         if missing and code is ExitCode.OK:
-            code = ExitCode.FULL
-        summary = keep_summary(self._run, self._summary(ending, code, missing))
+            code = lacks
+        summary = keep_summary(self._run, self._summary(ending, code, missing, found.gaps_us))
         return (code if summary.whole or code is not ExitCode.OK else ExitCode.FULL), summary
 
     def settle(self) -> None:
@@ -247,6 +251,7 @@ class Flight:
     def _pass(self) -> bool:
         """Let time pass before the loop, which is told then what happened; False once somebody asked to stop."""
         self._early += self._poll()
+        self._seal_when_due()
         if sum(isinstance(each, Presented) for each in self._early) < _MOST_EARLY:
             self._early += self._handed_in()
         if self._interrupts.wish() is None:
@@ -272,6 +277,7 @@ class Flight:
     def _linger(self) -> bool:
         """Let time pass after the loop; False once somebody would not wait."""
         self._poll()
+        self._seal_when_due()
         if self._agents is not None:
             self._agents.turn_away(self._clock.now())
         return self._interrupts.wish() is not Wish.LEAVE
@@ -296,17 +302,22 @@ class Flight:
     def _note(self, event: str, detail: str) -> None:
         """Put one there, and do not wait for the disk: the loop sees what becomes of it. Raises OSError."""
         now = self._clock.now()
-        if self._recorder.overdue(now):
-            self._seal(now)
+        self._catch_up(now)
         line = self._recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST)
         self._sink.append(line, SYNCED_FIRST)
         self._told = detail
         self._watch(now, (), (Append(line, SYNCED_FIRST),))
 
-    def _seal(self, now: Now) -> None:
-        """End an epoch. Raises OSError."""
-        for line in self._recorder.sealing(now):
-            self._sink.append(line, SYNCED_FIRST)
+    def _catch_up(self, now: Now) -> None:
+        """End an epoch that is over, before anything else is recorded. Raises OSError."""
+        append_all(self._sink, self._recorder.caught_up(now), SYNCED_FIRST)
+
+    def _seal_when_due(self) -> None:
+        """End an epoch that is over, outside of the loop; the loop sees what becomes of it."""
+        now = self._clock.now()
+        if self._recorder.due(now):
+            with suppress(OSError):
+                append_all(self._sink, self._recorder.sealing(now), SYNCED_FIRST)
 
     def _look_at_utc(self) -> list[Event]:
         """The vehicle may tell the time of day after the log began: from then on it is known. By it something may have
@@ -317,6 +328,7 @@ class Flight:
             return []
         self._vehicle.driver.asks_utc = False
         now = self._clock.now()
+        self._catch_up(now)
         self._sink.append(self._recorder.effect(now, CLOCK, detail=self._utc.bound.told()), WRITTEN)
         lapsed = self._lapsed()
         if lapsed is None:
@@ -343,9 +355,8 @@ class Flight:
         now = self._clock.now()
         told = "it was told to come down" if self._runtime.homeward else "it could not be told to come down"
         self._vehicle.release()
-        if self._recorder.overdue(now):
-            with suppress(OSError):
-                self._seal(now)
+        with suppress(OSError):
+            self._catch_up(now)
         line = self._recorder.effect(now, "left", detail=f"the operator stopped watching; {told}; nothing more is sent")
         with suppress(OSError):
             self._sink.append(line, SYNCED)
@@ -363,7 +374,7 @@ class Flight:
             self._boundary.ended(self._loaded.attestation.digest)
         return missing
 
-    def _summary(self, ending: Ending, code: ExitCode, missing: tuple[str, ...]) -> Summary:
+    def _summary(self, ending: Ending, code: ExitCode, missing: tuple[str, ...], gaps_us: int) -> Summary:
         loaded, policy, mission = self._loaded, self._loaded.bundle.policy, self._loaded.bundle.mission
         flavour = self._vehicle.driver.flavour
         log = _short(self._run.path / LOG)
@@ -382,6 +393,7 @@ class Flight:
             records=self._recorder.count,
             whole=not missing,
             missing=missing,
+            gaps_us=gaps_us,
             unconfirmed=tuple(self._teller.unconfirmed),
             folder=str(self._run.path),
             log=log,

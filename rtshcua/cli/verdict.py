@@ -11,6 +11,7 @@ from rtshcua.cli.shown import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
+from rtshcua.evidence.gaps import seconds
 from rtshcua.evidence.report import Report, Verdict, cosigned
 from rtshcua.ground.auditor.audit import Audit
 
@@ -79,6 +80,7 @@ def as_object(audit: Audit, path: Path, pinned: Pin, code: ExitCode) -> dict[str
             {"name": each.name, "records": each.size + 1, "time_s": each.time_s}
             for each in (() if report.outside is None else report.outside.witnessed)
         ],
+        "gaps": [gap._asdict() for gap in report.gaps],
         "counts": dict(report.counts),
         "failure": _finding(report.failure),
         "shortfall": _finding(report.shortfall),
@@ -116,6 +118,7 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
     finding = report.failure or report.shortfall
     if finding is None:
         lines.append((style, f"{title}  {_many(report.records, 'record')}, closed and signed; {_anchored(report)}"))
+        lines += [("yellow", f"  {_gapped(report)}")] if report.gaps else []
     else:
         lines.append((style, f"{title}  at record {finding.record}, line {finding.record + 1}: {finding.slug}"))
         lines += _why(finding, failed=report.failure is not None)
@@ -147,6 +150,16 @@ def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
     yield from (("", f"  {line}") for line in wrap(meaning, WIDTH))
     if finding.slug in _HELPS:
         yield "", f"  help      {_HELPS[finding.slug]}"
+
+
+def _gapped(report: Report) -> str:
+    """That nothing was recorded for a while, for how long, and who says so."""
+    longest = max(gap.us for gap in report.gaps)
+    both = all(gap.boundary is not None for gap in report.gaps)
+    by = "the epoch keys and by the boundary" if both else "the epoch keys"
+    if len(report.gaps) == 1:
+        return f"gap of {seconds(longest)}, vouched for by {by}"
+    return f"{len(report.gaps)} gaps, of {seconds(longest)} at most, vouched for by {by}"
 
 
 def _anchored(report: Report) -> str:

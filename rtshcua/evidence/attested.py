@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.evidence.chain import BOUNDARY, BOUNDARY_LOST
 from rtshcua.evidence.finding import Claim, Finding, Flaw
+from rtshcua.evidence.gaps import STALLED
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.recovery import RECOVERED
@@ -90,6 +91,9 @@ class BoundaryEvidence:
         self._stated = False  # in this epoch
         self._recovered = False
         self._lost: tuple[int, int] | None = None  # the record that says so, and where it begins
+        #: by the number of a record of a gap, that of the statement which says that nothing is missing before
+        self.gaps: dict[int, int] = {}
+        self._gap: int | None = None
 
     def check(self, record: AnyRecord, offset: int) -> Finding | None:
         """What the boundary's evidence says against the next record, which begins at an octet of the log, or against
@@ -103,14 +107,18 @@ class BoundaryEvidence:
             return self._lose(record, offset)
         if isinstance(record, Effect) and record.event == BOUNDARY:
             found = self._stated_by(record)
+            if self._gap is not None:
+                self.gaps[self._gap], self._gap = record.seq, None
             return found.at(record.seq, offset) if isinstance(found, Flaw) else found
         if isinstance(record, Decision | Effect):
+            if isinstance(record, Effect) and record.event == STALLED:
+                self._gap = record.seq
             return self._entered(record, offset)
         flaw = None
         if isinstance(record, Seal | Close):
             flaw = self._sealed(record)
         self._recovered = self._recovered or isinstance(record, Recover)
-        self._stated = False
+        self._stated, self._gap = False, None
         return None if flaw is None else flaw.at(record.seq, offset)
 
     def _lose(self, record: Effect, offset: int) -> Finding | None:

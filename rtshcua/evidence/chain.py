@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Any, Final, Protocol
 from urllib.parse import quote
 
-from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, EpochKey
+from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, LONGEST_US, EpochKey
+from rtshcua.evidence.gaps import STALLED, detail_of
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.records import (
     FORMAT,
@@ -65,8 +66,8 @@ class Recorder:
     """
 
     __slots__ = (
-        "_certify", "_draw", "_head", "_key", "_mode", "_origin", "_public", "_signed_us", "attest", "lost",
-        "told_loss",
+        "_certify", "_draw", "_head", "_key", "_last_us", "_mode", "_origin", "_public", "_signed_us", "_told_gap",
+        "attest", "lost", "told_loss",
     )  # fmt: skip
 
     def __init__(self, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]) -> None:
@@ -76,7 +77,8 @@ class Recorder:
         self._head = Head()
         self._key: EpochKey | None = None
         self._origin = self._mode = ""
-        self._signed_us = 0  # monotonic time of the last signed record
+        self._signed_us = self._last_us = 0  # monotonic time of the last signed record, and of the last of all
+        self._told_gap = False  # in this epoch
         self.attest: Attest = nobody
         self.lost: Callable[[], str | None] = lambda: None
         #: whether it was recorded that the boundary is lost: nothing that it makes is recorded after that
@@ -169,6 +171,7 @@ class Recorder:
         head = self._head
         kind, step, link = ref
         outcome, reason, rule_step, clause, clause_at, target, target_link, valid_until_us = in_words(decided)
+        self._last_us = now.monotonic_us
         return head.add(
             Decision(  # by position, in the order of definition: a third faster than by name
                 head.prev,
@@ -218,6 +221,7 @@ class Recorder:
         """The line of something that happened; `detail` is the world's own text, kept as it came."""
         head = self._head
         kind, step, link = ref
+        self._last_us = now.monotonic_us
         return head.add(
             Effect(  # by position, as above
                 head.prev,
@@ -254,23 +258,37 @@ class Recorder:
         return (self.effect(now, BOUNDARY_LOST, detail=lost),)
 
     def sealing(self, now: Now, *, tells_loss: bool = True) -> tuple[bytes, ...]:
-        """The lines that end an epoch: what the boundary signs, and the seal. Without `tells_loss` there are none where
-        it is lost and that is not recorded yet: records of what it made before come first.
+        """The lines that end an epoch: that it ends late, what the boundary signs, and the seal. Without `tells_loss`
+        only the first of these where it is lost and that is not recorded yet: records of what it made before come
+        first.
         """
+        gap = self._gap(now)
         statement = self.attest(final=False)
         if statement is None and not tells_loss and not self.told_loss and self.lost() is not None:
+            return gap
+        return (*gap, *self._stated(now, statement), self.seal(now))
+
+    def caught_up(self, now: Now) -> tuple[bytes, ...]:
+        """The lines that must stand before anything else that is recorded: those that end an epoch which is over."""
+        return self.sealing(now) if self.overdue(now) else ()
+
+    def _gap(self, now: Now) -> tuple[bytes, ...]:
+        """The line that says for how long nothing was recorded, where the epoch is sealed too late for that."""
+        if self._told_gap or now.monotonic_us - self._signed_us <= LONGEST_US:
             return ()
-        return (*self._stated(now, statement), self.seal(now))
+        self._told_gap = True
+        return (self.effect(now, STALLED, detail=detail_of(now.monotonic_us - self._last_us)),)
 
     def closing(self, now: Now, *, ending: str, tlog: bytes | None) -> tuple[bytes, ...]:
-        """The lines that end the log: what the boundary signs at last, and the close."""
-        return (*self.attested(now, final=True), self.close(now, ending=ending, tlog=tlog))
+        """The lines that end the log: that it ends late, what the boundary signs at last, and the close."""
+        return (*self._gap(now), *self.attested(now, final=True), self.close(now, ending=ending, tlog=tlog))
 
     def seal(self, now: Now) -> bytes:
         """The end of an epoch: signed by its key, which is then dropped; it names the next one."""
         key, last = EpochKey(self._draw()), self._epoch_key()
         seal = Seal(**self._segment(now), next_key=key.public.hex(), type="seal")
-        self._key, self._signed_us = key, now.monotonic_us
+        self._key = key
+        self._begin(now.monotonic_us)
         return self._head.seal(seal, self._origin, last.public, last.sign)
 
     def recover(self, now: Now, *, discarded_bytes: int, discarded_digest: bytes) -> bytes:
@@ -313,6 +331,11 @@ class Recorder:
             "utc_us": now.utc_us,
         }
 
+    def _begin(self, at_us: int) -> None:
+        """An epoch begins."""
+        self._signed_us = self._last_us = at_us
+        self._told_gap = False
+
     def _epoch_key(self) -> EpochKey:
         assert self._key is not None, "no epoch has begun, or the log is closed"
         return self._key
@@ -321,7 +344,8 @@ class Recorder:
         """A record signed by the log key, which is then let go."""
         assert self._certify is not None, "the log key signs once"
         certify, self._certify = self._certify, None
-        self._key, self._signed_us = key, record.at_us
+        self._key = key
+        self._begin(record.at_us)
         return self._head.seal(record, self._origin, self._public, certify)
 
 

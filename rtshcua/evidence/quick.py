@@ -18,6 +18,7 @@ from typing import Final, NamedTuple
 from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Claim, Flaw
+from rtshcua.evidence.gaps import STALLED, Gap, detail_of, told
 from rtshcua.evidence.heads import START
 from rtshcua.evidence.merkle import EMPTY, Tree, leaf_hash, node_hash
 from rtshcua.evidence.reading import LONGEST, read
@@ -36,6 +37,7 @@ _GUESS: Final = 1 << 12  # octets that most signed records fit into
 
 _AT = b'","at_us":'
 _ANCHOR = b'"event":"' + ANCHORED.encode() + b'"'
+_STALLED = b'"event":"' + STALLED.encode() + b'"'
 _CHECKPOINT = b',"checkpoint":'  # no text holds it, for a quote inside a text stands behind a backslash
 
 _FORM = (
@@ -43,6 +45,7 @@ _FORM = (
     "epoch was sealed in time, that the boundary itself made what they tell of, and that decisions follow from what "
     "they record: `--audit`"
 )
+_UNTRUE: Final = Flaw("seal/gap", "a gap is recorded that the records do not have")
 _TREE = "that records are linked line by line and make up the signed tree: without `--fast`"
 
 
@@ -52,7 +55,7 @@ class Leaves(NamedTuple):
     `number` is that of the first line. `first` is what it names as the line before it and `last` what the line after
     the segment must name, both hexadecimal; `last_us` is the monotonic time of the last line, `nodes` the largest
     perfect subtrees, each with its height, that the lines make up where they stand in the tree. `anchors` are the notes
-    of anchors that were recorded.
+    of anchors that were recorded, and `gap` the time without records that was.
     """
 
     number: int
@@ -62,6 +65,7 @@ class Leaves(NamedTuple):
     last_us: int
     nodes: tuple[tuple[int, bytes], ...]
     anchors: tuple[str, ...]
+    gap: Gap | None
 
 
 class Part(NamedTuple):
@@ -120,17 +124,29 @@ def scan(data: bytes) -> Part | None:
     links = hexlify(b"".join(leaves))
     last_us = _at_us(lines[-1])
     linked = b"".join([line[10:74] for line in lines[1:]]) == links[:-64]
-    if not isinstance(signed, Genesis | Seal | Recover) or not linked or last_us is None:
+    gap = _gap(data, lines, 0 if isinstance(signed, Flaw) else signed.seq)
+    if not isinstance(signed, Genesis | Seal | Recover) or not linked or last_us is None or isinstance(gap, Flaw):
         return None
     count = len(leaves)
     nodes = tuple(_nodes(leaves, signed.seq))
-    found = Leaves(signed.seq, count, lines[0][10:74], links[-64:], last_us, nodes, _anchors(data))
+    found = Leaves(signed.seq, count, lines[0][10:74], links[-64:], last_us, nodes, _anchors(data), gap)
     return Part(sha256(data).hexdigest(), found)
 
 
 def _at_us(line: bytes) -> int | None:
     digits = line[74 + len(_AT) : 74 + len(_AT) + 17].partition(b",")[0]
     return int(digits) if line.startswith(_AT, 74) and digits.isdigit() else None
+
+
+def _gap(data: bytes, lines: list[bytes], first: int) -> Gap | Flaw | None:
+    """The gap that is recorded in a segment, if one is; a flaw where it is not what the lines say."""
+    if data.find(_STALLED) < 0:
+        return None
+    (number, *more) = [number for number, line in enumerate(lines) if _STALLED in line]
+    before, at_us, record = _at_us(lines[number - 1]), _at_us(lines[number]), read(lines[number])
+    if more or not number or before is None or at_us is None or not isinstance(record, Effect):
+        return _UNTRUE
+    return Gap(first + number, at_us - before) if record.detail == detail_of(at_us - before) else _UNTRUE
 
 
 def _anchors(data: bytes) -> tuple[str, ...]:
@@ -212,6 +228,7 @@ class _Walk:
         self._seq = self._signed_us = self._recovers = 0
         self._link = START.encode()
         self._fast = False
+        self._gaps: list[Gap] = []
 
     def begin(self) -> bool:
         genesis = self._genesis
@@ -219,16 +236,22 @@ class _Walk:
 
     def segment(self, part: Part, octets: int, record: Seal | Recover | Close) -> bool:
         """Take a segment, and the record that closes it."""
-        leaves = part.leaves
+        leaves, anew = part.leaves, isinstance(record, Recover)
         if leaves is None:
             self._fast = True
             segment = Segment(record.seq - self._seq, octets, part.digest, None)
-            return segment.records > 0 and self._signed(record, segment)
+            in_time = anew or record.at_us - self._signed_us <= LONGEST_US  # else its records say why
+            return in_time and segment.records > 0 and self._signed(record, segment)
         if leaves.number != self._tree.size:
             return False
         linked = leaves.first == self._link and leaves.last == record.prev.encode()
-        in_time = leaves.records == 1 or leaves.last_us - self._signed_us <= LONGEST_US
-        in_order = leaves.last_us <= record.at_us or isinstance(record, Recover)
+        silent_us = 0 if leaves.gap is None else leaves.gap.us
+        in_time = leaves.records == 1 or leaves.last_us - self._signed_us - silent_us <= LONGEST_US
+        in_order = leaves.last_us <= record.at_us or anew
+        if leaves.gap is not None:
+            self._gaps.append(leaves.gap._replace(signed=record.seq))
+        if not anew and record.at_us - leaves.last_us > LONGEST_US:
+            self._gaps.append(Gap(record.seq, record.at_us - leaves.last_us, record.seq))
         for height, node in leaves.nodes:
             self._tree.graft(height, node)
         self._link = leaves.last
@@ -279,8 +302,9 @@ class _Walk:
             last_us=close.at_us,
             root=root,
             proven=proven,
-            unproven=(*unproven, *unsealed(self._seals.recoveries), *form),
+            unproven=(*unproven, *unsealed(self._seals.recoveries), *map(told, self._gaps), *form),
             sealed=records,
             epochs=epochs,
+            gaps=tuple(self._gaps),
         )
         return with_anchors(report, anchored)

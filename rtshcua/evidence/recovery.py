@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 from rtshcua.evidence.chain import Recorder, origin_of
 from rtshcua.evidence.clocks import Clocks
-from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Finding, Flaw
+from rtshcua.evidence.gaps import Term
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.reading import read, shown, too_long
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal, is_signed
@@ -78,9 +78,9 @@ class Examination:
         self.genesis: Genesis | None = None
         self.reason: Finding | None = None
         self._public = None if public is None else public.hex()
-        self._clocks, self._seals = Clocks(), Seals()
+        self._clocks, self._seals, self._term = Clocks(), Seals(), Term()
         self._latest_us = 0
-        self._sealed = self._sealed_us = 0
+        self._sealed = 0
         self._closed = False
         self._whole = False  # the first line that is not kept is a record, only in the wrong place
         self._more = False  # behind what is kept stands what was written later than it was on the disk
@@ -129,14 +129,15 @@ class Examination:
     def _check_epoch(self, record: AnyRecord, line: bytes) -> Flaw | None:
         head = self.head
         if isinstance(record, Decision | Effect):
-            if head.records > MOST_RECORDS or record.at_us - self._sealed_us > LONGEST_US:
-                return Flaw("seal/missing", "its epoch should have been sealed before")
-            head.take(line)
-            return None
+            flaw = self._term.take(record, head.records)
+            if flaw is None:
+                head.take(line)
+            return flaw
         flaw = self._seals.follow(record, line, head)
         if flaw is not None:
             return flaw
-        self._sealed, self._sealed_us = head.seq, record.at_us
+        self._sealed = head.seq
+        self._term.sign(record)
         self._closed = isinstance(record, Close)
         if isinstance(record, Genesis):
             self.genesis = record

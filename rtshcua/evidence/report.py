@@ -6,6 +6,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from rtshcua.evidence.finding import Claim, Finding
+from rtshcua.evidence.gaps import Gap, told
 from rtshcua.evidence.records import Close, Genesis
 from rtshcua.evidence.seals import Recoveries
 from rtshcua.evidence.witnessing.anchors import Anchored
@@ -29,7 +30,7 @@ class Report(NamedTuple):
     `failure` is the first record that fails; `shortfall` says why a log without failure is incomplete. `root` is the
     RFC 9162 root over the sound records; `last_us` the last record's monotonic time. `sealed` of the records lie up to
     the last signature, in `epochs` and the record that signs; `anchored` of them the threshold of witnesses has
-    cosigned. `outside` is what all witnesses saw, of a log without failure.
+    cosigned. `outside` is what all witnesses saw, of a log without failure; `gaps` are the times in which it has none.
     """
 
     records: int
@@ -46,6 +47,7 @@ class Report(NamedTuple):
     epochs: int = 0
     anchored: int = 0
     outside: Anchored | None = None
+    gaps: tuple[Gap, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -116,6 +118,13 @@ def with_anchors(report: Report, anchored: Anchored) -> Report:
         when = max(seen.time_s for seen in saw)
         proven = (*proven, Claim("anchor", f"{text}, outside of the vehicle, {utc_of(when)}"))
     return report._replace(anchored=count, proven=proven, unproven=unproven, outside=anchored)
+
+
+def with_boundary(report: Report, signed: Mapping[int, int]) -> Report:
+    """A report without failure, with the gaps for which the boundary signed too, by the numbers of their records."""
+    gaps = tuple(gap._replace(boundary=signed.get(gap.record)) for gap in report.gaps)
+    unproven = (*(claim for claim in report.unproven if claim.slug != "gap"), *map(told, gaps))
+    return report._replace(gaps=gaps, unproven=unproven)
 
 
 def rejected(anchored: Anchored) -> Claim:

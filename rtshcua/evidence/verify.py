@@ -5,7 +5,7 @@
 3. the genesis: first, and only there; a known format and version
 4. the chain: numbered without gap, and each record names the hash of the line before it
 5. the clocks: monotonic time never goes back, nor does UTC by more than its stated error allows, and both go on alike
-6. the epochs: each sealed in time, by the key that the signed record before names (`seals`)
+6. the epochs: each sealed in time (`gaps`), by the key that the signed record before names (`seals`)
 7. the end: a close, or else what is missing
 
 That is section 5 of docs/log-format.md but for its steps 2 and 3. What the caller must do: trust the genesis' log key,
@@ -15,8 +15,8 @@ bundle and trust root, and derive the decisions again (`rtshcua.ground.auditor`)
 from collections.abc import Iterable
 
 from rtshcua.evidence.clocks import Clocks
-from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Finding, Flaw
+from rtshcua.evidence.gaps import Term, told
 from rtshcua.evidence.heads import START, Head
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.reading import SHOWN, may_be_torn, read, shown, too_long
@@ -42,7 +42,7 @@ class Verifier:
         self._before = 0  # where the last line began
         self._torn: bytes | None = None
         self._doubt: tuple[bytes, Finding] | None = None  # hash of the line after a broken link, and what it then is
-        self._signed_us = 0  # time of the last signed record
+        self._term = Term()
 
     @property
     def records(self) -> int:
@@ -131,16 +131,14 @@ class Verifier:
         # 6 the epochs
         head = self._head
         if isinstance(record, Decision | Effect):
-            if head.seq - head.first > MOST_RECORDS or record.at_us - self._signed_us > LONGEST_US:
-                text = f"the epoch that record {head.first} began should have been sealed before"
-                found = f"{head.records} records, {record.at_us - self._signed_us} us after it"
-                return Flaw("seal/missing", text, found, f"at most {MOST_RECORDS} records, {LONGEST_US} us")
-            head.take(line)
-            return None
+            flaw = self._term.take(record, head.seq - head.first)
+            if flaw is None:
+                head.take(line)
+            return flaw
         flaw = self.seals.follow(record, line, head)
         if flaw is not None:
             return flaw
-        self._signed_us = record.at_us
+        self._term.sign(record)
         if isinstance(record, Genesis):
             self.genesis = record
         elif isinstance(record, Close):
@@ -159,8 +157,9 @@ class Verifier:
         proven, unproven = claims(
             self.records, sealed, self.seals.epochs, self.genesis, self.close, self.failure, self.seals.recoveries
         )
+        gaps = () if self.failure is not None else self._term.all()
         if self.failure is None:
-            unproven = (*unproven, *unsealed(self.seals.recoveries))
+            unproven = (*unproven, *unsealed(self.seals.recoveries), *map(told, gaps))
         return Report(
             records=self.records,
             counts=self._counts,
@@ -174,6 +173,7 @@ class Verifier:
             unproven=unproven,
             sealed=sealed,
             epochs=self.seals.epochs,
+            gaps=gaps,
         )
 
     def _end(self) -> tuple[Finding | None, Finding | None]:

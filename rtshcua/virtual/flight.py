@@ -10,7 +10,7 @@ from typing import Any, Final, Protocol, Self
 
 import msgspec
 
-from rtshcua.adapters.loop import RunLoop
+from rtshcua.adapters.loop import RunLoop, append_all
 from rtshcua.adapters.packs import manoeuvres, packs_of
 from rtshcua.adapters.preparation import Preparations
 from rtshcua.diagnostics.refusal import Refusal
@@ -207,8 +207,7 @@ class VirtualFlight:
         )
         loaded.attestation.begin(first)
         self.recorder.attest = loaded.attestation.statement
-        for line in self.recorder.attested(now):
-            self.sink.append(line, SYNCED_FIRST)
+        append_all(self.sink, self.recorder.attested(now), SYNCED_FIRST)
         self.events: list[Event] = []
         self.steps = 0
         self._wait_us = wait_us
@@ -252,21 +251,21 @@ class VirtualFlight:
         given = each(self)
         self._early += given
         self._early += self.vehicle.poll(self.clock.now().monotonic_us, self._wait_us)
+        now = self.clock.now()
+        if self.recorder.due(now):
+            append_all(self.sink, self.recorder.sealing(now), SYNCED_FIRST)
         return not any(isinstance(event, Interrupted) for event in given)
 
     def close(self, ending: Ending) -> FlownFlight:
         """Sign and close the log of a flight that ended so; what came of it."""
         with suppress(OSError):
-            for line in self.recorder.closing(self.clock.now(), ending=ending, tlog=None):
-                self.sink.append(line, SYNCED_FIRST)
+            append_all(self.sink, self.recorder.closing(self.clock.now(), ending=ending, tlog=None), SYNCED_FIRST)
             self.sink.close()
         return self.flown(ending, self.sink.lines, self.vehicle, self.steps, self.loaded, self._root_key)
 
     def _record(self, event: str, detail: str) -> None:
         now = self.clock.now()
-        if self.recorder.overdue(now):
-            for line in self.recorder.sealing(now):
-                self.sink.append(line, SYNCED_FIRST)
+        append_all(self.sink, self.recorder.caught_up(now), SYNCED_FIRST)
         self.sink.append(self.recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST), SYNCED_FIRST)
 
     def _watch(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:

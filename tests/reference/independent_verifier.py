@@ -20,13 +20,13 @@ from reference.independent_records import LONGEST, SIGNED, Malformed, canonical,
 from reference.independent_root import Root, Untrusted, check_bundle, holds, key_id, open_root
 
 MOST_LINES, LONGEST_US = 2048, 20_000_000
-_ANCHORED = "anchored"
+_ANCHORED, _STALLED = "anchored", "stalled"
 
 
 @dataclass(frozen=True)
 class Verdict:
     """What became of a log: `closed`, `incomplete`, `broken`, `untrusted`, `anchor` or `boundary`; `line` is the first
-    bad one.
+    bad one. `gaps` are the lines before which nothing was recorded, each with its us.
     """
 
     kind: str
@@ -34,6 +34,7 @@ class Verdict:
     line: int | None = None
     lines: int = 0
     anchored: int = 0
+    gaps: tuple[tuple[int, int], ...] = ()
 
     @property
     def accepted(self) -> bool:
@@ -105,6 +106,8 @@ class Walk:
         self.epoch = 0
         self.key = b""
         self.signed_seq = self.signed_us = 0
+        self.stalled_us: int | None = None
+        self.gaps: list[tuple[int, int]] = []
         self.at_us = self.low = 0
         self.base: tuple[int, int] = (0, 0)
         self.boundary: Boundary | None = None
@@ -130,7 +133,7 @@ class Walk:
             return Verdict("boundary", *self.disputed, self.seq, anchored)
         if self.boundary is not None and self.boundary.lost:
             kind = "incomplete"
-        return Verdict(kind, "", None, self.seq, anchored)
+        return Verdict(kind, "", None, self.seq, anchored, tuple(self.gaps))
 
     def line(self, line: bytes) -> None:
         """One line more. Raises `Broken`, `Malformed` and `Untrusted`."""
@@ -145,11 +148,14 @@ class Walk:
             raise Broken("_prev")
         if self.seq == 0:
             self._trust(record)
+        silent_us = record["at_us"] - self.at_us
         self._clocks(record)
         if record["type"] in SIGNED:
             self._signed(line, record)
+            if record["type"] in ("seal", "close") and silent_us > LONGEST_US:
+                self.gaps.append((self.seq, silent_us))
         else:
-            self._epoch(record)
+            self._epoch(record, silent_us)
         self._attested(record)
         if record.get("event") == _ANCHORED:
             self.notes.append(record["detail"])
@@ -196,8 +202,16 @@ class Walk:
         self.at_us = at
         self.low = max(self.low, utc - error) if self.seq else utc - error
 
-    def _epoch(self, record: dict) -> None:
-        if self.seq - self.signed_seq > MOST_LINES or record["at_us"] - self.signed_us > LONGEST_US:
+    def _epoch(self, record: dict, silent_us: int) -> None:
+        if record.get("event") == _STALLED:
+            if self.stalled_us is not None:
+                raise Broken("a second gap in an epoch")
+            if record["detail"] != f"{silent_us} us":
+                raise Broken("a gap that is not there")
+            self.stalled_us = silent_us
+            self.gaps.append((self.seq, silent_us))
+        since_us = record["at_us"] - self.signed_us - (self.stalled_us or 0)
+        if self.seq - self.signed_seq > MOST_LINES or since_us > LONGEST_US:
             raise Broken("an epoch is not sealed")
 
     def _signed(self, line: bytes, record: dict) -> None:
@@ -228,7 +242,7 @@ class Walk:
                 raise Broken("segment")
             self.epoch += 1
         self.key = note.key or b""
-        self.signed_seq, self.signed_us = self.seq, record["at_us"]
+        self.signed_seq, self.signed_us, self.stalled_us = self.seq, record["at_us"], None
         self.segment, self.octets = hashlib.sha256(), 0
         self.sealed[self.seq] = note.text
         self.closed = kind == "close"

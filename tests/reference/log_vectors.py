@@ -146,6 +146,14 @@ def anchored() -> tuple[list[bytes], bytes]:
     return lines, (anchor(lines[4], [one]) + "\n").encode()
 
 
+def stalled() -> list[bytes]:
+    """Three gaps: before a seal with nothing else between, one of 27 s with records behind it, one before the close."""
+    return log(
+        genesis(), effect(10), seal(30_000, 1), effect(31_000), effect(58_000, event="stalled", detail="27000000 us"),
+        effect(58_500), effect(77_000), seal(77_001, 2), effect(77_002), close(140_000),
+    )  # fmt: skip
+
+
 def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
     """Name, which rule of the page is broken, lines."""
     good = sealed()
@@ -159,6 +167,19 @@ def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
     yield "later_key", "2: sealed by a later key", _with_key(good, 2)
     yield "stripped", "2: no signature", [*good[:-1], line_of(read(good[-1]) | {"checkpoint": None})]
     yield "unsealed", "3: more than 20 s and no seal", log(genesis(), effect(20_001), close(20_002))
+    gap = {"event": "stalled", "detail": "30000000 us"}
+    yield "gap_untold", "3: records after a silence that no record tells of", log(
+        genesis(), effect(0), effect(30_000, event="late", detail="30000000 us"), seal(30_000, 1), close(30_001)
+    )  # fmt: skip
+    yield "gap_longer", "3: a gap that is longer than the silence", log(
+        genesis(), effect(1), effect(30_000, **gap), seal(30_000, 1), close(30_001)
+    )  # fmt: skip
+    yield "gap_twice", "3: two gaps in an epoch", log(
+        genesis(), effect(30_000, **gap), effect(60_000, **gap), seal(60_000, 1), close(60_001)
+    )  # fmt: skip
+    yield "gap_unsealed", "3: more than 20 s besides the gap", log(
+        genesis(), effect(10_000), effect(40_000, **gap), effect(50_001), close(50_002)
+    )  # fmt: skip
     yield "clock", "5: monotonic time goes back", log(genesis(), effect(10), effect(9), close(20))
     later = genesis(received_us=MONOTONIC_US + 1)
     yield "received", "5: the bundle received after the log began", log(later, effect(10), close(20))
@@ -242,6 +263,7 @@ def made() -> dict[str, bytes]:
         "closed": (list(flight()), "closed", 0),
         "attested": (list(attested()), "closed", 0),
         "sealed": (sealed(), "closed", 0),
+        "stalled": (stalled(), "closed", 0),
         "named": (odd, "closed", 0),
         "recovered": (whole, "closed", 0),
         "anchored": (witnessed, "closed", 2),
@@ -256,6 +278,7 @@ def made() -> dict[str, bytes]:
         for name, (lines, verdict, size) in logs.items()
     }
     of["attested"]["boundary"] = digests(list(attested()))
+    of["stalled"]["gaps"] = [[2, 29_990_000], [4, 27_000_000], [9, 62_998_000]]
     rejected = {}
     for name, why, lines in _rejected():
         rejected[name] = why

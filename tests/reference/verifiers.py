@@ -32,7 +32,7 @@ OF_FORM_OF_BUNDLES = ("trust/bundle-malformed",)
 
 
 #: findings that only who held the keys can bring about, and that the quick verifier says it did not look for
-OF_FORM = ("record/", "clock/", "chain/sequence", "seal/missing", "genesis/repeated")
+OF_FORM = ("record/", "clock/", "chain/sequence", "seal/missing", "seal/gap", "genesis/repeated")
 
 
 def careful(data: bytes, pinned: bytes = ROOT_KEY, *, derive: bool = False) -> Audit:

@@ -7,6 +7,7 @@ import msgspec
 from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.cli.shown import many
 from rtshcua.diagnostics.excerpt import escaped, visible
+from rtshcua.evidence.gaps import seconds
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 
@@ -54,6 +55,8 @@ def ending(summary: Summary) -> Iterable[str]:
 def _ending(summary: Summary) -> Iterable[str]:
     counts = ", ".join(f"{count} {name}" for name, count in summary.outcomes.items() if count) or "nothing decided"
     whole = "whole" if summary.whole else "evidence NOT whole"
+    if summary.gaps_us:
+        whole += f", but for a gap of {seconds(summary.gaps_us)}: the computer stood still"
     yield f"{summary.ending}: {summary.steps_done} of {summary.steps} steps done in {duration(summary.flight_us)}"
     yield f"  decided  {counts}"
     yield from (f"  unseen   {what}: {UNCONFIRMED}" for what in summary.unconfirmed)

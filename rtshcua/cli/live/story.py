@@ -75,8 +75,9 @@ class Note(msgspec.Struct, frozen=True, tag="note", tag_field="event"):
 class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     """How the run ended; also `summary.json` of the run folder. The log proves it, this only says it.
 
-    `whole`: all evidence is on the disk; else `missing` says what is not. `unconfirmed`: the fallbacks that were sent,
-    and ended without a landing being seen.
+    `whole`: all evidence is on the disk, and the log was read back and verifies; else `missing` says what does not.
+    `gaps_us`: for how long the log has nothing, for the computer stood still. `unconfirmed`: the fallbacks that were
+    sent, and ended without a landing being seen.
     """
 
     mission: str
@@ -96,6 +97,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     log: str
     next: str
     missing: tuple[str, ...] = ()
+    gaps_us: int = 0
     unconfirmed: tuple[str, ...] = ()
 
 

@@ -25,7 +25,7 @@ from rtshcua.evidence.attested import BoundaryEvidence
 from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.records import AnyRecord, Decision, Effect, Genesis
-from rtshcua.evidence.report import Report, claims, with_anchors
+from rtshcua.evidence.report import Report, claims, with_anchors, with_boundary
 from rtshcua.evidence.verify import Verifier
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 from rtshcua.ground.auditor.frames import Frames
@@ -153,6 +153,7 @@ class Auditor:
     def _claimed(self, report: Report) -> Report:
         assert self._basis is not None
         assert self._boundary is not None
+        report = with_boundary(report, self._boundary.gaps)
         seen, unseen = self._boundary.claims()
         shortfall = report.shortfall or self._boundary.shortfall()
         report = report._replace(

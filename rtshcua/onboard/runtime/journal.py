@@ -5,6 +5,7 @@ from functools import partial
 from typing import Final
 
 from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.records import is_signed
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Command
@@ -123,8 +124,5 @@ class Journal:
 
     def _seal(self, now: Now, *, tells_loss: bool = True) -> Iterable[Append]:
         """End an epoch. Nothing waits for a seal, but it is on the disk soon: its checkpoint may be shown around."""
-        lines = self.recorder.sealing(now, tells_loss=tells_loss)
-        for line in lines[:-1]:
-            yield Append(line, WRITTEN, awaited=False)
-        for seal in lines[-1:]:
-            yield Append(seal, SYNCED_FIRST, awaited=False)
+        for line in self.recorder.sealing(now, tells_loss=tells_loss):
+            yield Append(line, SYNCED_FIRST if is_signed(line) else WRITTEN, awaited=False)

@@ -119,6 +119,14 @@ def test_entries_of_a_true_log(log: Log) -> None:
     assert log.evidence.claims()[1] == ()
 
 
+def test_the_first_statement_behind_a_gap_and_before_the_seal_vouches_for_it(log: Log) -> None:
+    assert [log.take(SEAL), log.take(effect("stalled", "9 us")), log.refuse(), log.state(), log.take(SEAL)] == [
+        None
+    ] * 5
+    assert [log.state(), log.take(SEAL)] == [None] * 2
+    assert log.evidence.gaps == {3: 5}
+
+
 def test_records_may_come_after_the_statement_that_speaks_of_them(log: Log) -> None:
     log.chain.add(Tag.REFUSED, boundary_chain.refused("permit/late", 5))
     log.chain.add(Tag.REFUSED, boundary_chain.refused("permit/used", 5))

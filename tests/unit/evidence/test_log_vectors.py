@@ -53,6 +53,7 @@ def test_the_independent_verifier(name: str, pinned: bytes) -> None:
     assert (found.kind, found.why, found.lines, found.anchored) == (
         wanted["verdict"], "", wanted["lines"], wanted["anchored"],
     )  # fmt: skip
+    assert [list(gap) for gap in found.gaps] == wanted.get("gaps", [])
 
 
 @rows("name", EXPECTED)
@@ -61,6 +62,7 @@ def test_this_verifier(name: str) -> None:
     assert report.failure is None
     assert report.verdict.value == WORDS[EXPECTED[name]["verdict"]]
     assert (report.records, report.root.hex()) == (EXPECTED[name]["lines"], EXPECTED[name]["root"])
+    assert [[gap.record, gap.us] for gap in report.gaps] == EXPECTED[name].get("gaps", [])
 
 
 @rows("name", EXPECTED)

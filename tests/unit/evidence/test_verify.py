@@ -9,7 +9,7 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from reference.resealing import line_of, note_of, resealed
-from rtshcua.evidence import verify as module
+from rtshcua.evidence import gaps
 from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.merkle import leaf_hash
@@ -335,8 +335,8 @@ def test_an_epoch_has_no_more_than_twice_as_many_records_as_its_writer_puts_in(
     log: list[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, record, seal, close = log[0], log[2], log[5], log[8]
-    assert module.MOST_RECORDS == 2_048
-    monkeypatch.setattr(module, "MOST_RECORDS", 3)
+    assert gaps.MOST_RECORDS == 2_048
+    monkeypatch.setattr(gaps, "MOST_RECORDS", 3)
     assert verify(anew([first, record, record, record, close])).verdict is Verdict.VERIFIED
     assert failure(anew([first, record, record, record, record, close])) == ("seal/missing", 4)
     more = [edit(record, at_us=5_014_000, utc_us=1_750_000_000_014_000)] * 3

@@ -1,0 +1,86 @@
+"""A computer that stands still in flight, for as long as it may and at any point of what it does: swap storms, a frozen
+group of processes, a hypervisor, a debugger. Its log proves itself, and tells how long nothing was recorded.
+"""
+
+from functools import cache
+from itertools import pairwise
+
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+from rtshcua.evidence.report import Verdict
+from rtshcua.model.faults import MessageSilence
+from rtshcua.onboard.enforcement.load import Mode
+from virtual import case
+from virtual.flight import Flight
+from virtual.stalling import TOLD_US, StallingFlight, silences
+
+#: how often a short flight looks at its clock, at least, and some more for what follows of a stall
+LOOKS = 1_300
+STALLS = some.dictionaries(some.integers(0, LOOKS), some.integers(1, 60 * case.S), min_size=1, max_size=3)
+
+
+@cache
+def bundle() -> bytes:
+    return case.seal(case.mission(case.short_steps()))
+
+
+@settings(max_examples=settings().max_examples * 2)
+@given(
+    stalls=STALLS,
+    mode=some.sampled_from((Mode.SOFTWARE, Mode.PROCESS)),
+    flavour=some.sampled_from(("px4", "ardupilot")),
+    attested=some.booleans(),
+    lost=some.none() | some.integers(0, LOOKS),
+)
+def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
+    stalls: dict[int, int], mode: Mode, flavour: str, attested: bool, lost: int | None
+) -> None:
+    """Two verifiers, written apart, agree (`audit`); no decision is derived otherwise, nothing is called forged. That
+    its boundary is lost, if it is, is told as that alone.
+    """
+    flight = StallingFlight(bundle(), flavour, stalls, mode=mode, attested=attested, lost=lost)
+    flown = flight.fly()
+    report = flown.audit().report
+    assert report.failure is None, report.failure
+    gone = any(record.get("event") == "boundary-lost" for record in flown.records)
+    assert (report.verdict is Verdict.VERIFIED) or (gone and attested), report
+    assert {(gap.record, gap.us) for gap in report.gaps if gap.us > TOLD_US} == set(silences(flown))
+    assert all(gap.signed is not None for gap in report.gaps)
+    shown = [claim.text for claim in report.unproven if claim.slug == "gap"]
+    assert len(shown) == len(report.gaps)
+    assert all("vouched for by the key that signed record" in text for text in shown)
+
+
+def test_a_gap_is_recorded_before_anything_else_and_sealed_at_once() -> None:
+    flight = StallingFlight(bundle(), "px4", {600: 30 * case.S})
+    flown = flight.fly()
+    (gap,) = flown.effects("stalled")
+    number = gap["seq"]
+    before, *behind = flown.records[number - 1 : number + 3]
+    assert gap["detail"] == f"{gap['at_us'] - before['at_us']} us"
+    assert [record.get("event", record["type"]) for record in behind] == ["stalled", "boundary", "seal"]
+    assert len({record["at_us"] for record in behind}) == 1
+    report = flown.audit().report
+    (told,) = report.gaps
+    assert (told.record, told.signed, told.boundary) == (number, number + 2, number + 1)
+    (claim,) = [claim for claim in report.unproven if claim.slug == "gap"]
+    assert f"vouched for by the key that signed record {number + 2} and by the boundary" in claim.text
+
+
+def test_a_flight_that_never_stands_still_tells_of_no_gap() -> None:
+    flown = StallingFlight(bundle(), "px4", {}).fly()
+    assert not flown.effects("stalled")
+    assert not flown.audit().report.gaps
+    times = [record["at_us"] for record in flown.records]
+    assert max(after - before for before, after in pairwise(times)) < TOLD_US
+
+
+def test_a_wait_for_parameters_is_sealed_as_a_flight_is() -> None:
+    """What is set before a flight is waited for outside of the loop, and longer than an epoch lasts."""
+    silent = MessageSilence(at_us=0, message="EXTENDED_SYS_STATE", for_us=120 * case.S)
+    flown = Flight(bundle(), case.simulated("px4", faults=(silent,)), settings={"GF_ACTION": 3}).fly()
+    assert flown.records[-1]["at_us"] - flown.records[0]["at_us"] > TOLD_US, "else nothing is shown here"
+    assert not flown.effects("stalled")
+    report = flown.audit().report
+    assert (report.failure, report.gaps) == (None, ())

@@ -1,0 +1,55 @@
+"""A run that is stopped for longer than an epoch may last, and continued: over UDP, as the kernel stops it."""
+
+import signal
+import time
+from typing import Any
+
+import pytest
+
+from virtual.sampling import each_once
+
+SPEED = 10
+#: so many seconds of flight: an epoch lasts 20 at most
+STOPPED_S = 30
+
+
+@pytest.mark.parametrize(("flavour", "mode"), each_once(("px4", "ardupilot"), ("software", "process")))
+def test_a_run_that_was_stopped_tells_of_a_gap_and_its_log_verifies(ground: Any, flavour: str, mode: str) -> None:
+    """The case: stopped in flight; the seal comes late, and nobody is accused. What `run` calls whole verifies."""
+    run = ground.run(ground.bundle(), "--mode", mode, "--flavour", flavour, speed=SPEED)
+    run.until("dispatched", step=1)
+    run.signal(signal.SIGSTOP)
+    time.sleep(STOPPED_S / SPEED)  # that it stands still for so long is what is tried
+    run.signal(signal.SIGCONT)
+    run.end()
+    log = run.log()
+    (gap,) = [record for record in log if record.get("event") == "stalled"]
+    silent_us = gap["at_us"] - log[gap["seq"] - 1]["at_us"]
+    assert gap["detail"] == f"{silent_us} us"
+    assert silent_us > 20_000_000
+    assert run.summary["whole"]
+    assert run.summary["gaps_us"] >= silent_us
+    for words in ((), ("--fast",), ("--audit",)):
+        verified = ground.start("verify-log", *words, str(run.folder), "--json").end()
+        assert verified.code == 0, verified.events
+        (said,) = verified.events
+        (told,) = [each for each in said["gaps"] if each["us"] == silent_us]
+        assert told["signed"] is not None
+        assert told["boundary"] is not None or "--audit" not in words
+        assert any(claim["slug"] == "gap" for claim in said["unproven"])
+
+
+def test_a_log_that_does_not_verify_is_not_called_whole(ground: Any) -> None:
+    """Something altered the log while it flew: a defect card does. The run reads it back before it vouches for it."""
+    run = ground.run(ground.bundle(), speed=SPEED)
+    run.until("dispatched", step=1)
+    log = run.folder / "log.jsonl"
+    with log.open("r+b") as file:
+        file.seek(log.stat().st_size - 100)
+        file.write(b"#")
+    run.end()
+    assert run.code == 9, run.stderr
+    assert not run.summary["whole"]
+    (missing,) = run.summary["missing"]
+    assert missing.startswith("`verify-log` refuses it: ")
+    assert ground.start("verify-log", str(run.folder), "--json").end().code == 9

@@ -1,0 +1,23 @@
+"""What is told of a gap, and who vouches for it."""
+
+from rtshcua.evidence.gaps import Gap, seconds, told
+from virtual.rows import rows
+
+
+@rows(
+    ("gap", "words"),
+    [
+        (Gap(7, 127_560_000, 9, 8), "the key that signed record 9 and by the boundary, which signed in record 8"),
+        (Gap(7, 127_560_000, 9), "vouched for by the key that signed record 9"),
+        (Gap(7, 127_560_000), "nobody has signed for that yet"),
+    ],
+)  # fmt: skip
+def test_it_says_how_long_it_was_and_who_vouches_for_it(gap: Gap, words: str) -> None:
+    claim = told(gap)
+    assert claim.slug == "gap"
+    assert claim.text.startswith("what happened in a gap of 127.5 s before record 7: nothing was recorded; ")
+    assert words in claim.text
+
+
+def test_seconds_are_never_rounded_up() -> None:
+    assert [seconds(us) for us in (0, 99_999, 20_000_001, 60_999_999)] == ["0.0 s", "0.0 s", "20.0 s", "60.9 s"]

@@ -23,7 +23,7 @@ from rtshcua.cli.configured import foreign
 from rtshcua.cli.interrupts import Interrupts, Wish
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note, Plan, Snapshot, Summary
-from rtshcua.cli.live.telling import Teller, plan_of
+from rtshcua.cli.live.telling import Answering, Teller, plan_of
 from rtshcua.cli.live.watching import Watching
 from rtshcua.cli.log_signer import LogSigner
 from rtshcua.cli.past import LOG_BEFORE, Past
@@ -82,7 +82,7 @@ _KNOWING = (
 class Flight:
     """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off.
     `simulated`: what the log says of a flight that was. `lapsed` says why the bundle is not to be trusted by the
-    time that the clock has now.
+    time that the clock has now. `answering`: how a person answers a step that asks.
 
     Once it is made, the first record is on the disk. Raises OSError where the disk does not take it.
     """
@@ -93,7 +93,7 @@ class Flight:
         *, bundle: bytes, root: bytes, log_key: LogSigner, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, boundary: BoundarySession, witnesses: Witnessing, utc: UtcWatch,
         lapsed: Callable[[], Refused | None], debts: OwedParameters, agents: Agents | None = None,
-        simulated: str | None = None, incidents: "Incidents | None" = None,
+        simulated: str | None = None, incidents: "Incidents | None" = None, answering: Answering | None = None,
     ) -> None:  # fmt: skip
         self._loaded = loaded
         self._vehicle = vehicle
@@ -115,7 +115,7 @@ class Flight:
         now = clock.now()
         self._start_us = now.monotonic_us
         policy, mission = loaded.bundle.policy, loaded.bundle.mission
-        self._teller = Teller(policy, mission, self._start_us)
+        self._teller = Teller(policy, mission, self._start_us, answering)
         self._steps = StepWatch()
         self._sink = EvidenceWriter(log)
         genesis = self._recorder.genesis(

@@ -36,6 +36,7 @@ from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.isolating import CODES, IN_USE, Apart, connected, started
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
+from rtshcua.cli.live.telling import Answering
 from rtshcua.cli.log_signer import LogSigner
 from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
 from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, obeys, still_flies
@@ -237,6 +238,7 @@ def _launch(order: Launch) -> ExitCode:
                 past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc, debts=debts,
                 lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, log_key.kid, loaded, clock),
                 simulated=simulation.told(order.speed, own=order.link is None), boundary=inside,
+                answering=_answering(order, run),
             )  # fmt: skip
             log_key.hand_over(_signs_no_more)  # nothing in flight needs it, so nothing in flight holds it
             if refusal is not None:
@@ -477,6 +479,15 @@ def _opened(
         if not owes:
             raise
         return False, refused
+
+
+def _answering(order: Launch, run: RunFolder) -> Answering | None:
+    """How a person answers a step of this flight; None where it has no socket."""
+    socket = order.operator_socket or order.agent_socket
+    if socket is None:
+        return None
+    handed_in = order.wait_s is not None  # a file of the run, not of whoever handed it in
+    return Answering(str(run.path / BUNDLE if handed_in else order.bundle), str(socket), ahead=order.speed != 1)
 
 
 def _agents(order: Launch, loaded: Loaded, stack: ExitStack, *, waits: bool = False) -> Agents | None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 import msgspec
 
 from rtshcua.cli.live.lines import as_json, plain
-from rtshcua.cli.live.story import Message
+from rtshcua.cli.live.story import Happened, Message
 
 EXIT_OK, EXIT_GONE = 0, 1
 
@@ -31,7 +31,8 @@ def main() -> int:
 
             draw(messages())
         else:
-            _print(as_json if sys.argv[1] == "json" else plain)
+            structured = sys.argv[1] == "json"
+            _print(as_json if structured else plain, bell=not structured and sys.stdout.isatty())
         sys.stdout.flush()
     except OSError:  # the reader left, or the disk that the output goes to is full
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or exiting would fail on it again
@@ -39,8 +40,12 @@ def main() -> int:
     return EXIT_OK
 
 
-def _print(style: Callable[[Message], Iterable[str]]) -> None:
+def _print(style: Callable[[Message], Iterable[str]], *, bell: bool) -> None:
+    rung: set[int] = set()
     for message in messages():
+        if bell and isinstance(message, Happened) and message.what.asks is not None and message.what.step not in rung:
+            rung.add(message.what.step)
+            print(end="\a")
         for line in style(message):
             print(line, flush=True)
 

@@ -1,13 +1,14 @@
 """What the screen shows, brought together from what it was told; no drawing here."""
 
 from collections import deque
+from typing import NamedTuple
 
-from rtshcua.cli.live.lines import sentence
-from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary
+from rtshcua.cli.live.lines import alarm, sentence, waiting_for
+from rtshcua.cli.live.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, tenths
 from rtshcua.model.quantity import Dimension, display
-from rtshcua.onboard.runtime.view import Reading, View
+from rtshcua.onboard.runtime.view import Reading, Stage, View
 
-_LATEST = 8
+_LATEST = 40
 _TRACK = 2_000
 _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 
@@ -17,8 +18,27 @@ _STATES = {"dispatched": "running", "succeeded": "done", "skipped": "skipped"} |
 )
 
 
+class Said(NamedTuple):
+    """A line of what happened, and the outcome of the decision that it tells (`note`: a word about the run)."""
+
+    text: str
+    outcome: str
+
+
+class _Waits(NamedTuple):
+    """The step that people are asked about, and the roles that agreed."""
+
+    step: int
+    subject: str
+    asks: Asks
+    agreed: tuple[str, ...] = ()
+
+
 class Board:
-    """The plan, the newest snapshot, the state of each step, the latest happenings, and the way flown."""
+    """The plan, the newest snapshot, the state of each step, the latest happenings, and the way flown.
+
+    `rings` counts the steps that began to wait for a person.
+    """
 
     def __init__(self) -> None:
         self.plan: Plan | None = None
@@ -26,9 +46,12 @@ class Board:
         self.summary: Summary | None = None
         self.note = ""
         self.steps: dict[int, str] = {}
-        self.latest: deque[Happening] = deque(maxlen=_LATEST)
+        self.latest: deque[Said] = deque(maxlen=_LATEST)
         self.track: deque[tuple[int, int]] = deque(maxlen=_TRACK)
         self.longest_us = 0
+        self._alarm: Happening | None = None
+        self.rings = 0
+        self._waits: _Waits | None = None
         self._counting: tuple[str, int, str] | None = None
 
     def take(self, message: Message) -> None:
@@ -42,6 +65,7 @@ class Board:
                 self._happen(what)
             case Note(text):
                 self.note = text
+                self.latest.append(Said(text, "note"))
             case Summary():
                 self.summary = message
 
@@ -49,6 +73,16 @@ class Board:
     def here(self) -> tuple[int, int] | None:
         """Where the vehicle is, in mm east and north of home."""
         return self.track[-1] if self.track else None
+
+    def banner(self, width: int) -> list[str]:
+        """What a person must see at once: whom the step waits for, with what to type, or that the flight was ended."""
+        waits, view = self._waits, self.view
+        if self._alarm is not None or waits is None:
+            return [] if self._alarm is None else alarm(self._alarm, width)
+        if view is not None and (view.stage is not Stage.DECIDING or view.step != waits.step):
+            return []
+        left_us = waits.asks.until_us - view.at_us if view is not None else None
+        return waiting_for(waits.step, waits.subject, waits.asks, left_us, waits.agreed, width)
 
     def value(self, reading: Reading) -> str:
         """A signal's value with its unit, `?` while it is not known."""
@@ -59,10 +93,11 @@ class Board:
         if signal.labels:
             return signal.labels.get(values[0], str(values[0]))
         if len(values) == 2:
-            return f"{values[0] / 1_000:.1f} m east, {values[1] / 1_000:.1f} m north"
+            x, y = map(tenths, values)
+            return f"{x.lstrip('-')} m {'W' if x[0] == '-' else 'E'}, {y.lstrip('-')} m {'S' if y[0] == '-' else 'N'}"
         dimension = _DIMENSIONS.get(signal.dimension, Dimension.COUNT)
         if dimension in (Dimension.LENGTH, Dimension.ALTITUDE, Dimension.SPEED):
-            return f"{values[0] / 1_000:.1f} {'m/s' if dimension is Dimension.SPEED else 'm'}"
+            return f"{tenths(values[0])} {'m/s' if dimension is Dimension.SPEED else 'm'}"
         return display(values[0], dimension)
 
     def _look(self, view: View) -> None:
@@ -81,7 +116,9 @@ class Board:
             self.track.append((x, y))
 
     def _happen(self, what: Happening) -> None:
-        self.latest.append(what)
+        self.latest.append(Said(line(what), what.outcome))
+        self._alarm = what if alarm(what) else self._alarm
+        self._wait(what)
         if what.step < 0 or what.subject.startswith("fallback: "):
             return
         if what.event == "decision":
@@ -89,7 +126,17 @@ class Board:
         elif what.event in _STATES:
             self.steps[what.step] = _STATES[what.event]
 
+    def _wait(self, what: Happening) -> None:
+        if what.asks is not None:
+            self.rings += self._waits is None or self._waits.step != what.step
+            self._waits = _Waits(what.step, what.subject, what.asks)
+        elif self._waits is not None and what.step == self._waits.step:
+            if what.role:
+                self._waits = self._waits._replace(agreed=(*self._waits.agreed, what.role))
+            elif what.event != "repeated":
+                self._waits = None
+
 
 def line(what: Happening) -> str:
     """A happening with its time."""
-    return f"{what.t_us / 1_000_000:8.1f} s  {sentence(what)}"
+    return f"{tenths(what.t_us // 1_000):>8} s  {sentence(what)}"

@@ -1,15 +1,29 @@
 """The view in a pipe: one plain line an event, or one JSON object."""
 
-from collections.abc import Iterable
+import shlex
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import Final
 
 import msgspec
 
-from rtshcua.cli.live.story import Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
+from rtshcua.cli.live.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.cli.shown import many
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.evidence.gaps import seconds
-from rtshcua.model.step_number import number_of
+from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
+
+#: columns of a line for a person, where it can be chosen
+WIDTH: Final = 80
+#: columns that are left beside the time of a line
+_BESIDE_TIME: Final = WIDTH - 13
+#: what ends a flight early by somebody's word
+_ALARMS: Final = {
+    "recall": "RECALLED: no further step begins. In the air the policy's contingency flies",
+    "cancellation": "CANCELLED by its proposer: no further step begins. In the air the policy's contingency flies",
+    "taken-over": "TAKEN OVER: somebody else flies the vehicle. Nothing more is sent to it",
+}
 
 
 def plain(message: Message) -> Iterable[str]:
@@ -23,6 +37,7 @@ def _plain(message: Message) -> Iterable[str]:
             yield f"mission {message.mission} under {message.policy} on {message.vehicle}, mode {message.mode}"
         case Happened(what):
             yield f"{what.t_us / 1_000_000:9.2f} s  {_sentence(what)}"
+            yield from (f"{'':11}  {each}" for each in _banner(what))
         case Note(text):
             yield f"{'':11}  {text}"
         case Summary():
@@ -45,6 +60,49 @@ def _sentence(what: Happening) -> str:
         why += f"; instead {what.target}" if what.target else ""
         why += f"; {what.waits}" if what.waits else ""
     return f"{what.outcome:<11}  {subject}{why}"
+
+
+def _banner(what: Happening) -> list[str]:
+    """What a person must not miss of a happening."""
+    if what.asks is None:
+        return alarm(what)
+    return waiting_for(what.step, what.subject, what.asks, what.asks.until_us - what.asks.asked_us, ())
+
+
+def alarm(what: Happening, width: int = _BESIDE_TIME) -> list[str]:
+    """That somebody ended the flight, in words; empty for what is no such thing."""
+    text = _ALARMS.get(what.event)
+    return [] if text is None else textwrap.wrap(f"** {text} **", width)
+
+
+def waiting_for(
+    step: int, subject: str, asks: Asks, left_us: int | None, agreed: Sequence[str], width: int = _BESIDE_TIME
+) -> list[str]:
+    """That a step waits for people: whom, how long, and what they type. `agreed` are the roles of those who did."""
+    missing = list(asks.roles)
+    for role in agreed:
+        if role in missing:
+            missing.remove(role)
+    whom = " and ".join(f"another {role}" if role in agreed else role for role in missing or asks.roles)
+    told = [*textwrap.wrap(f"** WAITS FOR A PERSON: {whom} ** {step_words(step)}, {visible(subject)}", width)]
+    left = "" if left_us is None else f"{max(0, -(-left_us // 1_000_000))} s left, then it is denied. "
+    agrees = f"{' and '.join(agreed)} agreed. " if agreed else ""
+    how = "Type in another terminal:" if asks.commands else "Nobody can answer: this run has no `--operator-socket`"
+    told += textwrap.wrap(f"{left}{agrees}{how}", width)
+    for words in asks.commands:
+        if words[words.index("--role") + 1] in (missing or asks.roles):
+            told += typed(words, width)
+    return told
+
+
+def typed(words: Sequence[str], width: int) -> list[str]:
+    """A command over as many lines as it takes, which can be copied into a shell as they are."""
+    lines = [""]
+    for word in map(shlex.quote, words):
+        if lines[-1] and len(lines[-1]) + 1 + len(word) > width - 2:
+            lines.append("  ")
+        lines[-1] += f"{' ' if lines[-1].strip() else ''}{word}"
+    return [f"{line} \\" for line in lines[:-1]] + lines[-1:]
 
 
 def ending(summary: Summary) -> Iterable[str]:

@@ -20,6 +20,28 @@ class Signal(msgspec.Struct, frozen=True):
     labels: dict[int, str]
 
 
+class Area(msgspec.Struct, frozen=True):
+    """A zone on the map: rings of corners, x0, y0, x1, y1, ... in mm east and north of home. `kind` says what it is to
+    the airspace: `inside` it must be stayed, `outside` it must be stayed, or neither (empty).
+    """
+
+    name: str
+    kind: str
+    rings: tuple[tuple[int, ...], ...]
+
+
+class Asks(msgspec.Struct, frozen=True):
+    """Whom a step waits for: a person of each of these roles, each with the command that answers as one, in words.
+
+    It is awaited from the monotonic time `asked_us` until `until_us`. Without a socket nobody can answer: no commands.
+    """
+
+    roles: tuple[str, ...]
+    asked_us: int
+    until_us: int
+    commands: tuple[tuple[str, ...], ...]
+
+
 class Plan(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
     """What is going to fly. `position` names the signal that is one, `path` holds x, y in mm of every place gone to."""
 
@@ -34,6 +56,7 @@ class Plan(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
     signals: tuple[Signal, ...]
     position: str
     path: tuple[tuple[int, int], ...]
+    areas: tuple[Area, ...] = ()
 
 
 class Snapshot(msgspec.Struct, frozen=True, tag="view", tag_field="event"):
@@ -45,7 +68,8 @@ class Snapshot(msgspec.Struct, frozen=True, tag="view", tag_field="event"):
 class Happening(msgspec.Struct, frozen=True, omit_defaults=True):
     """One record of the log, in brief: a decision (`event` is `decision`) or an effect. `t_us` is since the start.
 
-    `waits` says of a deferral what it waits for, where that is to have been observed for long enough.
+    `waits` says of a deferral what it waits for, where that is to have been observed for long enough; `asks` which
+    people. `role` is that of somebody who agreed.
     """
 
     event: str
@@ -58,6 +82,8 @@ class Happening(msgspec.Struct, frozen=True, omit_defaults=True):
     target: str = ""
     detail: str = ""
     waits: str = ""
+    role: str = ""
+    asks: Asks | None = None
 
 
 class Happened(msgspec.Struct, frozen=True, tag="happened", tag_field="event"):
@@ -102,6 +128,12 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
 
 
 Message = Plan | Snapshot | Happened | Note | Summary
+
+
+def tenths(thousandths: int) -> str:
+    """Thousandths as units with one decimal, never `-0.0`."""
+    rounded = (abs(thousandths) + 50) // 100
+    return f"{'-' if thousandths < 0 and rounded else ''}{rounded // 10}.{rounded % 10}"
 
 
 def duration(us: int) -> str:

@@ -1,22 +1,31 @@
 """From evidence lines and the loaded bundle to what the view is told, and to the counts of the summary."""
 
+from base64 import b64decode
 from collections.abc import Iterator
+from math import cos, isqrt, pi, sin
+from typing import Final, NamedTuple
 
 import msgspec
 
 from rtshcua.adapters.preparation import PERMITTED
-from rtshcua.cli.live.story import Happening, Plan, Signal, Step
+from rtshcua.cli.live.story import Area, Asks, Happening, Plan, Signal, Step
+from rtshcua.cli.showing.document import said
 from rtshcua.cli.showing.log import detail_of
 from rtshcua.cli.showing.words import call, duration
 from rtshcua.cli.unconfirmed import is_unconfirmed
+from rtshcua.decision.outline import rings
 from rtshcua.evidence.chain import BOUNDARY
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
-from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import POSITION
-from rtshcua.model.step_number import step_words
+from rtshcua.model.flat.zone import CIRCLE, Zone
+from rtshcua.model.outcome import Reason
+from rtshcua.model.step_number import number_of, step_words
+from rtshcua.wire.approval import ApprovalDocument
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
+from rtshcua.wire.untrusted import Untrusted
 
 #: the effect that puts another mission into force
 REPLACED = "replacement"
@@ -25,6 +34,29 @@ NOTHING_FLIES = "nothing: it has not left the ground, and nothing is sent"
 #: what the boundary makes of what was told anyway
 _UNTOLD = frozenset({BOUNDARY, PERMITTED})
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
+
+
+#: corners of a circle on the map, and of a zone at most
+_CORNERS: Final = 48
+_MOST_CORNERS: Final = 400
+#: how long an answer is good that a clock ahead of ours is to take, s
+_AHEAD_S: Final = 3_600
+
+
+class Answering(NamedTuple):
+    """How a person answers a step of this flight: the bundle, a socket of the flight, and whether the flight's clock
+    runs ahead of ours.
+    """
+
+    bundle: str
+    socket: str
+    ahead: bool = False
+
+
+class _Released(msgspec.Struct):
+    """When what was decided on was released."""
+
+    released_us: int = 0
 
 
 class _Line(msgspec.Struct):
@@ -41,6 +73,7 @@ class _Line(msgspec.Struct):
     clause: str | None = None
     target: str | None = None
     detail: str = ""
+    context: _Released | None = None
 
 
 _read = msgspec.json.Decoder(_Line).decode
@@ -61,20 +94,43 @@ def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> Pla
         signals=tuple(Signal(signal.name, signal.dimension, dict(signal.labels)) for signal in policy.signals),
         position=next((signal.name for signal in policy.signals if signal.kind == POSITION), ""),
         path=tuple(point for path in paths for point in zip(path[::2], path[1::2], strict=True)),
+        areas=tuple(_areas(policy)),
     )
+
+
+def _areas(policy: Policy) -> Iterator[Area]:
+    """The zones as they are drawn."""
+    airspace = policy.airspace
+    inside, outside = ((), ()) if airspace is None else (airspace.inside, airspace.outside)
+    for number, zone in enumerate(policy.zones):
+        kind = "inside" if number in inside else "outside" if number in outside else ""
+        if kind or number < policy.declared:
+            yield Area(zone.name, kind, tuple(_outline(zone)))
+
+
+def _outline(zone: Zone) -> Iterator[tuple[int, ...]]:
+    if zone.shape == CIRCLE:
+        x, y, squared = zone.data
+        radius, turns = isqrt(squared), [2 * pi * number / _CORNERS for number in range(_CORNERS)]
+        yield tuple(round(each) for turn in turns for each in (x + radius * cos(turn), y + radius * sin(turn)))
+        return
+    for ring in rings(zone):
+        yield tuple(each for corner in ring[:: 1 + len(ring) // _MOST_CORNERS] for each in corner)
 
 
 class Teller:
     """Reads each evidence line once, counts, and says what happened.
 
     `outcomes` counts every decision of the log, on steps and on links alike: as `rtshcua verify-log` does.
-    `unconfirmed` names the fallbacks of which no landing was seen.
+    `unconfirmed` names the fallbacks of which no landing was seen. `answering`: how a person answers, where one can.
     """
 
-    def __init__(self, policy: Policy, mission: Mission, start_us: int) -> None:
+    def __init__(self, policy: Policy, mission: Mission, start_us: int, answering: Answering | None = None) -> None:
         self._policy = policy
         self._mission = mission
         self._start_us = start_us
+        self._answering = answering
+        self._replaced = 0
         self._flown = False  # something was sent that may have lifted it off
         self.outcomes = dict.fromkeys(_OUTCOMES, 0)
         self.done: set[int] = set()
@@ -83,6 +139,7 @@ class Teller:
     def replace(self, mission: Mission) -> None:
         """From now on this is the mission."""
         self._mission = mission
+        self._replaced += 1
 
     def tell(self, line: bytes) -> Happening | None:
         """What a line says, if it is a decision or an effect."""
@@ -98,7 +155,7 @@ class Teller:
             waits = self._waits(clause, t_us) if record.outcome == "defer" else ""
             return Happening(
                 "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail,
-                waits,
+                waits, asks=self._asks(record),
             )  # fmt: skip
         if record.type != "effect" or record.event in _UNTOLD:
             return None
@@ -110,7 +167,33 @@ class Teller:
         if record.event == REPLACED:
             return Happening(record.event, t_us, record.step, detail=f"from {step_words(record.step)} on")
         detail = detail_of(record.event, record.detail)
-        return Happening(record.event, t_us, record.step, subject, detail=detail)
+        role = _agreed(record.detail) if record.event == "approval" else ""
+        return Happening(record.event, t_us, record.step, subject, detail=detail, role=role)
+
+    def _asks(self, record: _Line) -> Asks | None:
+        """Whom a step waits for, where it waits for people."""
+        if record.reason != Reason.AWAITING_APPROVAL.value or record.context is None:
+            return None
+        rule = next(
+            (each for each in self._policy.rules if each.kind == RuleKind.CONFIRM and each.text == record.clause), None
+        )
+        if rule is None:
+            return None
+        roles = tuple(self._policy.roles[number] for number in (rule.approver, rule.second) if number >= 0)
+        until_us = record.context.released_us + rule.within_us
+        return Asks(roles, record.at_us, until_us, tuple(self._commands(record.step, roles)))
+
+    def _commands(self, step: int, roles: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+        """What to type as each of these roles."""
+        if self._answering is None:
+            return
+        bundle, socket, ahead = self._answering
+        for role in dict.fromkeys(roles):
+            yield (
+                "rtshcua", "approve", bundle, *("--replacement", "FILE") * self._replaced,
+                "--step", str(number_of(step)), "--role", role, *(("--for", str(_AHEAD_S)) if ahead else ()),
+                "--to", socket,
+            )  # fmt: skip
 
     def _waits(self, text: str, t_us: int) -> str:
         """What is said of a clause over time, by its text, that was not observed for as long as it looks back."""
@@ -146,3 +229,12 @@ class Teller:
             return f"fallback: {invocation.contract.fallback[record.link].text}"
         targets = {rule.target.text for rule in self._policy.rules if rule.target is not None}
         return f"fallback: {targets.pop()}" if len(targets) == 1 else "fallback: what the policy degrades to"
+
+
+def _agreed(detail: str) -> str:
+    """The role of whoever agreed by the document that a log holds; empty where it is no yes."""
+    try:
+        body = said(b64decode(detail, validate=True)).body
+    except (ValueError, Untrusted):
+        return ""
+    return body.role if isinstance(body, ApprovalDocument) and body.granted else ""

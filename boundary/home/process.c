@@ -276,7 +276,8 @@ static rt_kept *read_kept(int file) {
 
 static int64_t own_time_us(clockid_t clock) {
     struct timespec now;
-    clock_gettime(clock, &now);
+    /* monotonic time goes on while the machine is suspended, as the runtime's does (adapters/clock.py) */
+    clock_gettime(clock == CLOCK_MONOTONIC ? CLOCK_BOOTTIME : clock, &now);
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 

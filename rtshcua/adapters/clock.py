@@ -11,10 +11,19 @@ from rtshcua.onboard.ports import Clock, ClockStepped
 UTC_ERROR_US = 100_000
 #: How much more it may be off after each second, in us: the kernel takes no clock for worse (500 ppm, MAXFREQ).
 DRIFT_US = 500
+#: Linux's monotonic clock stops in a suspend, and this one does not
+_BOOTTIME: int | None = getattr(time, "CLOCK_BOOTTIME", None)
+
+
+def monotonic_ns() -> int:
+    """The machine's monotonic time, which goes on while that is suspended, where the system has such a clock: else the
+    time of day, carried on by it, would stay behind, and an age too.
+    """
+    return time.clock_gettime_ns(_BOOTTIME) if _BOOTTIME is not None else time.monotonic_ns()
 
 
 def _machine_us() -> tuple[int, int]:
-    return time.monotonic_ns() // 1_000, time.time_ns() // 1_000
+    return monotonic_ns() // 1_000, time.time_ns() // 1_000
 
 
 class LinkClock(Clock, Protocol):
@@ -45,19 +54,19 @@ class SystemClock:
 
     def __init__(self, utc_error_us: int = UTC_UNKNOWN_US) -> None:
         self._utc_error_us = utc_error_us
-        self._bounded_us = time.monotonic_ns() // 1_000
+        self._bounded_us = monotonic_ns() // 1_000
         self._ahead_us = time.time_ns() // 1_000 - self._bounded_us
 
     def now(self) -> Now:
         """The present moment."""
-        monotonic_us = time.monotonic_ns() // 1_000
+        monotonic_us = monotonic_ns() // 1_000
         grown_us = (monotonic_us - self._bounded_us) * DRIFT_US // 1_000_000
         error_us = min(self._utc_error_us + grown_us, UTC_UNKNOWN_US)
         return Now(monotonic_us, monotonic_us + self._ahead_us, error_us)
 
     def bound_utc(self, error_us: int, ahead_us: int | None = None) -> None:
         """See `LinkClock`."""
-        self._utc_error_us, self._bounded_us = error_us, time.monotonic_ns() // 1_000
+        self._utc_error_us, self._bounded_us = error_us, monotonic_ns() // 1_000
         if ahead_us is not None:
             self._ahead_us = ahead_us
 

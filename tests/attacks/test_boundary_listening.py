@@ -21,6 +21,7 @@ import pytest
 
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import BoundaryError, ListeningBoundary, Measure
+from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.cli import isolating
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.refusal import Refusal
@@ -37,7 +38,7 @@ LOG_SEED, OWN_SEED = (key.private.private_bytes_raw() for key in (case.KEYS[Duty
 
 
 def now() -> Now:
-    return Now(time.monotonic_ns() // 1_000, time.time_ns() // 1_000, 1_000)
+    return Now(monotonic_ns() // 1_000, time.time_ns() // 1_000, 1_000)
 
 
 class Provisioned:

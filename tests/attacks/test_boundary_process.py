@@ -31,6 +31,7 @@ from rtshcua.adapters.boundary_process import (
     Measure,
     kept_file,
 )
+from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.files.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.adapters.store.writing import lock
 from rtshcua.cli.isolating import started
@@ -62,7 +63,7 @@ def issued_us() -> int:
 
 
 def now() -> Now:
-    return Now(time.monotonic_ns() // 1_000, time.time_ns() // 1_000, 1_000)
+    return Now(monotonic_ns() // 1_000, time.time_ns() // 1_000, 1_000)
 
 
 class Held:

@@ -18,6 +18,7 @@ from boundary.together import PIN, SIGNED_ROOT
 from reference.flat_case import S
 from reference.world import ROOT, START, VEHICLE, answer_to, request_for, sealed
 from rtshcua.adapters.boundary_process import BoundaryProcess, program
+from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
@@ -117,7 +118,7 @@ class TakenOver:
             SIGNED_ROOT, PIN, VEHICLE, folder, link_key=key, settings=encode(Preparation(0, False, 0, (write,))),
             paced=True,
         )  # fmt: skip
-        self.began_us, self.utc_us = time.monotonic_ns() // 1_000, time.time_ns() // 1_000
+        self.began_us, self.utc_us = monotonic_ns() // 1_000, time.time_ns() // 1_000
         self.simulation = vehicle.simulated(self.utc_us)
         self.caller = Caller(self.process.call, signs=True)
         made = load(

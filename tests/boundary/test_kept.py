@@ -12,6 +12,7 @@ from boundary import kept as keeping
 from boundary.together import PIN, SIGNED_ROOT
 from reference.world import MISSION, POLICY, START, VEHICLE, sealed
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
+from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State, timestamp_in, timestamp_of
@@ -66,14 +67,14 @@ def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_beli
 
     process, gate = begin()
     frames = [vehicle.sign(beat, 0) for _ in range(heard)]
-    now_us = time.monotonic_ns() // 1_000
+    now_us = monotonic_ns() // 1_000
     assert all(gate.accept(frame, now_us) for frame in frames)
     while keeping.read(kept_file(tmp_path, VEHICLE)).link.streams.get((1, 1, 0), 0) < timestamp_in(frames[0]):
-        gate.accept(frames[0], time.monotonic_ns() // 1_000)  # a replay; each call lets it keep what is due
+        gate.accept(frames[0], monotonic_ns() // 1_000)  # a replay; each call lets it keep what is due
     os.kill(process.pid, signal.SIGKILL)
     process.close()
     process, gate = begin()
-    now_us = time.monotonic_ns() // 1_000
+    now_us = monotonic_ns() // 1_000
     assert not gate.accept(frames[0], now_us)
     assert gate.accept(vehicle.sign(beat, 0), now_us)
     process.close()

@@ -10,7 +10,6 @@ import json
 import os
 import signal
 import struct
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -36,6 +35,7 @@ from reference.flat_case import MIN, MISSION, POLICY, S, state
 from reference.world import MISSION_KEY, ROOT, ROOT_KEY, START, VEHICLE, read_answer, request_for, sealed
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
+from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.files.replay import FileReplayStore
 from rtshcua.adapters.vehicle import messages
 from rtshcua.diagnostics.refusal import Refusal
@@ -177,7 +177,7 @@ class Together:
         self.caller = Caller(self.process.call, signs=key is not None)
         self.us, self._link = START.monotonic_us, None
         if key is not None:
-            self.us = time.monotonic_ns() // 10_000 * 10 + 10_000
+            self.us = monotonic_ns() // 10_000 * 10 + 10_000
             self._link = self._synchronous(key.read_bytes())
             self._vehicle = SignedLink(key.read_bytes(), self._link.state, EPOCH_US, self.us, link=1)
             self._stranger = SignedLink(key.read_bytes(), self._link.state, EPOCH_US, self.us, link=2)

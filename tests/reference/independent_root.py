@@ -43,14 +43,33 @@ def key_id(duty: str, public: bytes) -> bytes:
     return hashlib.sha256(b"rtshcua/key\0rtshcua/duty/" + duty.encode() + b"\0" + public).digest()[:16]
 
 
+_P = 2**255 - 19
+#: y of the points of small order, as section 6 of the page lists them
+_WEAK = {0, 1, _P - 1} | {
+    int.from_bytes(bytes.fromhex(text), "little")
+    for text in (
+        "26e8958fc2b227b045c3f489f2ef98f0d5dfac05d3c63339b13802886d53fc05",
+        "c7176a703d4dd84fba3c0b760d10670f2a2053fa2c39ccc64ec7fd7792ac037a",
+    )
+}
+
+
 @lru_cache(maxsize=1024)  # of one flight many logs are made
 def holds(public: bytes, signature: bytes, message: bytes) -> bool:
-    """Whether an Ed25519 signature holds."""
+    """Whether an Ed25519 signature counts: section 6 of the page."""
+    if len(public) != 32 or len(signature) != 64 or weak(public) or weak(signature[:32]):
+        return False
     try:
         Ed25519PublicKey.from_public_bytes(public).verify(signature, message)
     except (InvalidSignature, ValueError):
         return False
     return True
+
+
+def weak(point: bytes) -> bool:
+    """Whether the octets of a point are not in canonical form, or of small order."""
+    y = int.from_bytes(point, "little") & ((1 << 255) - 1)
+    return y >= _P or y in _WEAK
 
 
 def open_root(envelope: bytes, pinned: bytes, now_us: int) -> Root:
@@ -163,7 +182,7 @@ def _body(payload: bytes) -> dict:
         case _:
             raise Untrusted("not a trust root, version 2")
     for key in body["keys"]:
-        if set(key) != _KEY_FIELDS or len(key["public"]) != 32:
+        if set(key) != _KEY_FIELDS or len(key["public"]) != 32 or weak(key["public"]):
             raise Untrusted("not a key")
         approves = key["duty"] == "approval"
         if (key["policies"] and key["duty"] != "mission") or (key["person"] and not approves):

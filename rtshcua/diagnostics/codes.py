@@ -216,6 +216,9 @@ MISSION_TIME = _code("E0809", "mission-time", "a mission may last longer than it
 MISSION_STEPS = _code("E0810", "mission-steps", "a mission has more steps than it says, or than fit on board")
 MISSION_ENERGY = _code("E0811", "mission-energy", "a mission may need more energy than it says")
 OVER_CHARGE = _code("E0812", "over-charge", "a mission may need more energy than a full charge")
+RETURN_ENERGY = _code(
+    "E0815", "return-energy", "a return may take more of the charge than its skill says", Severity.WARNING
+)
 STEP_ENERGY = _code("E0814", "step-energy", "a step may take more of the charge than its skill says")
 
 # E09: mission specifications (structured input of an agent)
@@ -283,6 +286,12 @@ UNKNOWN_IGNORE = _code(
 )
 KEPT_FROM_LANDING = _code(
     "E1312", "kept-from-landing", "a `degrade` turns a request to land into a flight", Severity.WARNING
+)
+NEVER_TAKES_OFF = _code(
+    "E1313",
+    "never-takes-off",
+    "a rule or contract waits on the ground for what is known only in flight",
+    Severity.WARNING,
 )
 
 # E14: tests and where they start from

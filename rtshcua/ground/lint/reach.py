@@ -67,6 +67,14 @@ def is_unbounded(policy: Policy) -> bool:
     return all(reach.belongs_to(policy.zones[number]) for number in within)
 
 
+def region_of(zone: Zone) -> Region:
+    """A zone as a region of the plane, without its times; a circle is no smaller than it is."""
+    if zone.shape == CIRCLE:
+        x, y, squared = zone.data
+        return Region(Disc((x, y), isqrt(squared) + 1), zone.floor, zone.ceiling)
+    return Region(cornered(rings_of(zone)), zone.floor, zone.ceiling)
+
+
 def _distance(zone: Zone) -> int:
     """A distance from home that a zone keeps at least; 0 where home may lie in it."""
     if zone.shape == CIRCLE:

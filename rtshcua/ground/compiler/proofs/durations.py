@@ -27,6 +27,7 @@ from rtshcua.decision.flying import (
 from rtshcua.decision.prepare import PreparedInvocation, PreparedLink
 from rtshcua.decision.values import TRUE, interval
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.sizes import named_at
 from rtshcua.ground.compiler.mission import argument_span
@@ -80,7 +81,7 @@ def prove(
         nearer = _nearer(ground, step, invocation, starts[0].height, takes, min(fits, contract.duration_us))
         _too_long(ground, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest)
     energy = charge(speeds, time_us)
-    # of a return the mission's bound counts the way home, if that is more
+    # a return is never refused for want of charge, and the mission's bound counts the way home, if that is more
     home = invocation.invocation.plan.kind == MotionKind.HOME
     if len(ground.context.report.found) == before and energy > contract.energy and not home:
         fits = min(fits, contract.duration_us or fits)
@@ -90,6 +91,8 @@ def prove(
         _links(ground, step, invocation, starts, slowest)
     if len(ground.context.report.found) > before:
         return None
+    if home and energy > contract.energy:
+        _too_much(ground, step, "the return", contract, energy, code=codes.RETURN_ENERGY)
     return StepBound(contract.name, time_us, energy)
 
 
@@ -265,20 +268,28 @@ def _too_long(
 
 
 def _too_much(
-    ground: Ground, step: Step, what: str, contract: Contract, energy: int, nearer: _Fix | None = None
+    ground: Ground,
+    step: Step,
+    what: str,
+    contract: Contract,
+    energy: int,
+    nearer: _Fix | None = None,
+    code: Code = codes.STEP_ENERGY,
 ) -> None:
     skill = ground.context.symbols.skills[step.skill.text]
     own = None if step.overrides is None else step.overrides.energy
     declared = own or skill.energy
     assert declared is not None
     needed = -(-energy // 10) * 10  # to a tenth of a percent
+    size = None if own is not None else named_at(ground.context.report, skill, declared.span)
+    enough = display(needed, Dimension.RATIO)
+    more = f"`energy at most {enough}`" if size is None else f"`sizes {contract.name}({size} = {enough})`"
     ground.context.report.add(
-        codes.STEP_ENERGY,
+        code,
         step.span if nearer is None else nearer[0],
-        f"{what} takes up to {display(needed, Dimension.RATIO)} of a full charge, and `{contract.name}` takes at most "
+        f"{what} takes up to {enough} of a full charge, and `{contract.name}` takes at most "
         f"{display(contract.energy, Dimension.RATIO)}",
-        help=f"write `energy at most {display(needed, Dimension.RATIO)}`, or fly a shorter path, or faster; "
-        f"{_counted(ground)}",
+        help=f"write {more}, or fly a shorter path, or faster; {_counted(ground)}",
         labels=[(declared.span, "declared here"), *_declared(ground)],
         fix=nearer,
         amount=energy,

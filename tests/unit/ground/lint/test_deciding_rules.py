@@ -98,8 +98,8 @@ WIDE = "polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)"
     [
         (FAR, "inside city outside far", True),
         (BOX, "inside city outside far", True),
-        (NEAR, "inside city outside far", False),
-        (BOX.replace("47.59", "47.49"), "inside city outside far", False),  # 11 km away, of 13 within reach
+        (NEAR, "outside far", False),
+        (BOX.replace("47.59", "47.49"), "outside far", False),  # 11 km away, of 13 within reach
         ("circle(47.3977 N, 8.5456 E, 20 km)", "inside far", True),
         ("circle(47.3977 N, 8.5456 E, 20 km) ceiling 50 m", "inside far", False),
         ("circle(47.3977 N, 8.5456 E, 20 km) active 08:00 .. 18:00", "inside far", False),
@@ -114,7 +114,16 @@ WIDE = "polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)"
         ("union(wide, home)", "inside far", True),
         ("difference(wide, home)", "inside far", False),
         (f"{NEAR} floor 5 km above home", "inside city outside far", True),
-        (f"{NEAR} floor 3 km above home", "inside city outside far", False),
+        (f"{NEAR} floor 3 km above home", "inside city outside far", True),  # the city ends at 120 m
+        (f"{NEAR} floor 3 km above home", "outside far", False),
+        (NEAR, "inside city outside far", True),  # within reach, and north of the city
+        ("circle(47.3977 N, 8.5800 E, 300 m)", "inside city outside far", True),  # within reach, 2 km from the city
+        ("circle(47.3977 N, 8.5800 E, 300 m)", "outside far", False),
+        ("circle(47.3977 N, 8.5800 E, 300 m) active 08:00 .. 18:00", "inside city outside far", True),
+        ("circle(47.3977 N, 8.5530 E, 300 m)", "inside city outside far", False),  # it reaches into the city
+        ("circle(47.3977 N, 8.5456 E, 100 m) floor 119 m above home", "inside city outside far", False),
+        ("circle(47.3977 N, 8.5456 E, 100 m) floor 120 m above home", "inside city outside far", True),
+        ("difference(wide, city)", "inside city outside far", True),
     ],
 )
 def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, idle: bool) -> None:
@@ -142,9 +151,20 @@ def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, 
         ("permit goto by role operator when altitude >= 0 m", False),
         ("permit goto by role operator through agent, operator when battery > 0 %", False),
         ("permit goto by role operator when target inside wide", False),
-        ("permit goto by role operator when altitude <= 30 m", True),
+        ("permit goto by role operator when altitude <= 30 m", False),
+        ("permit goto by role operator when altitude <= 30 m airspace outside school", False),
+        ("permit goto by role operator when altitude <= 30 m and height < 20 m airspace outside school", False),
+        ("permit goto by role operator when altitude <= 30 m airspace inside city outside school", True),
+        ("permit goto by role operator when altitude <= 30 m and target inside city airspace outside school", True),
+        ("permit goto by role operator when altitude <= 30 m forbid goto by any when target outside city", True),
+        ("permit goto by role operator when altitude <= 30 m and battery > 50 % airspace outside school", True),
+        ("permit inspect_area by role operator when altitude <= 30 m airspace outside school", False),
+        (
+            "permit goto by role operator when altitude <= 30 m permit goto by role supervisor when target inside city",
+            False,
+        ),
         ("permit goto by role operator when altitude >= 0 m forbid goto by any when altitude < 0 m", False),
-        ("permit goto by role operator when altitude >= 0 m forbid goto by any when altitude < 6 m", True),
+        ("permit goto by role operator when altitude >= 0 m forbid goto by any when altitude < 6 m", False),
         ("permit goto, inspect_area by role operator when altitude <= 60 m", False),
     ],
 )
@@ -197,3 +217,56 @@ def test_a_degrade_that_keeps_from_landing(rules: str, how_many: int) -> None:
 )
 def test_authority_that_is_broader_than_anyone_means(rules: str, broad: bool) -> None:
     assert ("E1303" in codes(f"{rules} airspace inside city", WORLD)) == broad
+
+
+# ---------------------------------------------------------------------------------------------------- E1313
+
+ON = "vehicle equipped"  # tuned to estimate the wind
+
+
+@rows(
+    ("rules", "grounded"),
+    [
+        ("permit takeoff by role operator forbid takeoff by any when wind.speed > 8 m/s", True),
+        ("permit takeoff, goto by role operator forbid takeoff, goto by any when wind.speed > 8 m/s", True),
+        ("permit takeoff by role operator forbid takeoff by any when not wind.speed <= 8 m/s", True),
+        ("permit takeoff by role operator forbid takeoff by any when wind.speed > 8 m/s or battery < 30 %", True),
+        ("permit takeoff by role operator forbid takeoff by any when wind.speed > 8 m/s and height > 10 m", False),
+        ("permit takeoff by role operator forbid takeoff by any when wind.speed > 8 m/s and altitude > 30 m", False),
+        ("permit takeoff by role operator forbid goto by any when wind.speed > 8 m/s", False),
+        ("permit takeoff by role operator forbid takeoff by any when battery < 50 %", False),
+        ("permit takeoff by role operator forbid takeoff by any", False),  # it never flies, and says so
+        ("permit takeoff by role operator degrade takeoff when wind.speed > 8 m/s to return_home", True),
+        ("permit takeoff by role operator degrade takeoff when wind.speed > 8 m/s to return_home where fitted", True),
+        ("permit goto by role operator degrade goto when wind.speed > 8 m/s to return_home", False),
+        (
+            "permit takeoff by role operator confirm takeoff when wind.speed > 8 m/s by role supervisor within 30 s",
+            True,
+        ),
+        ("permit takeoff by role operator when wind.speed < 8 m/s", True),
+        ("permit takeoff by role operator when wind.speed < 8 m/s permit takeoff by role supervisor", False),
+        ("permit takeoff by role operator when wind.speed < 8 m/s or battery > 50 %", False),
+        ("permit goto by role operator when wind.speed < 8 m/s", False),
+    ],
+)
+def test_what_waits_on_the_ground_for_the_wind(rules: str, grounded: bool) -> None:
+    found = codes(rules, WORLD)
+    assert ("E1313" in found) == grounded, found
+
+
+@rows(
+    ("clause", "grounded"),
+    [
+        ("require wind.speed < 8 m/s where fitted", True),
+        ("assume wind.speed < 8 m/s where fitted", True),
+        ("require battery > 40 %", False),
+        ("require wind.speed < 8 m/s or height < 5 m where fitted", False),
+    ],
+)
+def test_a_contract_that_waits_on_the_ground_for_the_wind(clause: str, grounded: bool) -> None:
+    rise = (
+        "skill rise(top: altitude in 5 m .. 50 m) { motion climb to top class tactical deadline 5 s valid for 40 min "
+        f"lasts at most 1 min {clause} fallback return_home, emergency_land energy at most 5 % }}"
+    )
+    found = codes("permit rise by role operator", WORLD + rise)
+    assert ("E1313" in found) == grounded, found

@@ -30,6 +30,7 @@ from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
 from rtshcua.codec.frames import Received, is_addressed
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
+from rtshcua.mavlink.enums import MAV_MODE_FLAG_SAFETY_ARMED as ARMED
 from rtshcua.mavlink.enums import MULTIROTORS
 from rtshcua.mavlink.modes import is_another, is_vehicle
 from rtshcua.mavlink.parameters import value_of
@@ -126,6 +127,7 @@ class Driver:
         self.left: Left | None = None
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
+        self._left_mode: int | None = None  # one report says that it left this mode, by nobody of ours
         self._others: str | None = None  # what showed that somebody else flies it: nothing of ours is begun any more
         self._unsent: int | None = None  # the token of a command of which no frame left yet
         self._moving = False  # a frame that moves the vehicle is among those to be packed
@@ -182,8 +184,23 @@ class Driver:
         if self.prepares:
             return self.other_kind or self.link.crowd or "its parameters are being set"
         keyless = mute if self._mute == KEYLESS else None  # why its clock is not known either
-        waits = self.other_kind or self.link.crowd or keyless or self.source.unready or mute or self.preflight.astray
+        waits = (
+            self.other_kind
+            or self.link.crowd
+            or self._contradicted
+            or keyless
+            or self.source.unready
+            or mute
+            or self.preflight.astray
+        )
         return waits or self.seen.unready or self.preflight.unready
+
+    @property
+    def _contradicted(self) -> str | None:
+        """That reports under its ids contradict each other, in words."""
+        if not self._aids.contradictions.stand(self.seen.now_us):
+            return None
+        return f"two speak as {self.system}/{AUTOPILOT}: its mode, or whether it is armed, is reported both ways"
 
     @property
     def keyless(self) -> bool:
@@ -276,6 +293,9 @@ class Driver:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
         if self._others is not None:  # also where this was on its way while the takeover showed
             return [ports.Failed(now_us, command.token, "taken-over", self._others)], []
+        contradicted = None if self._flies or self._manoeuvre is not None else self._contradicted
+        if contradicted is not None:
+            return [ports.Failed(now_us, command.token, "two-speak", contradicted)], []
         self.link.begin()
         before = modes_of(self.left, flavour) if self._manoeuvre is None else self._manoeuvre.modes
         try:
@@ -335,7 +355,9 @@ class Driver:
             needed = [group for group in self._telemetry.sources if not group <= IN_THE_AIR]
             self.stream_requests = StreamRequests(self.plan(flavour), needed)
             slack = self._commander.slack
-            self._aids = Aids(flavour, Brakes.of(self._policy.vehicle), self._commander)
+            self._aids = Aids(
+                flavour, Brakes.of(self._policy.vehicle), self._commander, clock=self.source.clock, signed=self._signed
+            )
             self.settings = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
             self.preflight = Preflight(
                 self._policy,
@@ -351,6 +373,12 @@ class Driver:
             for kind in (MotionKind.HOME, MotionKind.LAND):  # made ahead: when a fallback must fly there is no time
                 flavour.stages(Command(-1, "", kind, (), (), 0, 0), self.seen, frame.system)
 
+    def _hears_both(self, heartbeat: Message, now_us: int) -> bool:
+        """Whether heartbeats as the vehicle's own contradict each other, by now."""
+        contradictions = self._aids.contradictions
+        contradictions.report((heartbeat.custom_mode, heartbeat.base_mode & ARMED), now_us)
+        return contradictions.stand(now_us)
+
     def speaks(self, heartbeat: Message) -> bool:
         """Whether a heartbeat under the vehicle's ids is its own, by what it says that it is."""
         return (heartbeat.type, heartbeat.autopilot) == self._kind
@@ -360,6 +388,7 @@ class Driver:
         that was given them, or of another vehicle. It says neither how the vehicle flies nor that it is heard.
         """
         if self.speaks(frame.message):
+            self.seen.disputed = self._hears_both(frame.message, now_us)
             return False
         kind = frame.message.type, frame.message.autopilot
         text = two_speak(self.system, f"one with MAV_TYPE {kind[0]} and MAV_AUTOPILOT {kind[1]}")
@@ -400,6 +429,7 @@ class Driver:
             self._others = "crashed"
         if name == "HEARTBEAT":
             self._watch_mode(before, now_us, events)
+            self._doubt(now_us, send)
         elif name == "STATUSTEXT":
             self._hear(self._texts.take(message, now_us), events)
         elif name in _OF_PREFLIGHT and self._is_for_us(message):
@@ -452,9 +482,14 @@ class Driver:
         mode, flavour = self.seen.mode, self.flavour
         if self._manoeuvre is not None or self._released or not self.seen.airborne or mode is None or flavour is None:
             return
+        left, self._left_mode = self._left_mode, None
+        before = before if left is None else left
         if before in (None, mode) or (before, mode) in flavour.natural:
             return
         if not arrives(self.left, flavour, before, mode):
+            if left is None and not self._signed:  # the next report has to say so, too
+                self._left_mode = before
+                return
             self._others = flavour.mode_name(mode)
             events.append(ports.TakenOver(now_us, self._others))
 
@@ -500,7 +535,23 @@ class Driver:
         for event in happened:
             if isinstance(event, ports.TakenOver):
                 self._others = event.how
+        self._doubt(now_us, send)
         if manoeuvre.waits:
+            send += self._ask(now_us)
+
+    def _doubt(self, now_us: int, send: list[Message]) -> None:
+        """What one report shows is asked after at once; what the next one contradicted is told."""
+        aids = self._aids
+        suspicion = aids.suspicion
+        if suspicion.refuted is not None:
+            self.seen.notes.append(
+                f"two speak as {self.system}/{AUTOPILOT}: `{suspicion.refuted}` was reported, and the next report says "
+                "otherwise; what the vehicle does counts"
+            )
+            suspicion.refuted = None
+        doubts = suspicion.stands or self.seen.disarms or self._left_mode is not None
+        aids.query.doubt(doubts)
+        if doubts and now_us >= aids.query.due_us:
             send += self._ask(now_us)
 
     def _tell_notes(self, now_us: int, events: list[Event]) -> None:

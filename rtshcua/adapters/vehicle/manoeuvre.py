@@ -14,7 +14,9 @@ from rtshcua.adapters.vehicle.effects import apart, still
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, Stage
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.adapters.vehicle.supervision import MODE_BEATS, NEVER, Brakes, BrakingWatch, StageProgress, TargetWatch
+from rtshcua.adapters.vehicle.suspicion import CROSSED_US, Contradictions, Suspicion
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event, Failed, Obeyed, Succeeded, TakenOver
 
@@ -128,6 +130,8 @@ AGAIN_US: Final = 100_000
 IDLE_US: Final = 1_000_000
 #: and while something does, where the mode is streamed fast enough.
 STREAMED_US: Final = 300_000
+#: What one report shows is asked after so often, until another confirms it.
+CONFIRM_US: Final = 20_000
 #: So long after the mode a target may be told that was asked for with it. One that has none to tell of tells nothing:
 #: ArduCopter accepts the question then, PX4 denies it.
 TARGET_US: Final = 100_000
@@ -151,6 +155,7 @@ class WhoFliesQuery:
         self.due_us = 0
         self._came: tuple[int, int] | None = None  # how many reports of mode and target had, when a frame began to wait
         self._target = False  # the frame waits for a target, too
+        self._doubts = False  # what was reported is to be confirmed
         #: when the frame waits no longer for a target; None while it waits for the mode, or for nothing
         self.ends_us: int | None = None
 
@@ -180,6 +185,12 @@ class WhoFliesQuery:
             self.ends_us = now_us + self._target_us
         return now_us >= self.ends_us
 
+    def doubt(self, doubts: bool) -> None:
+        """Whether what was reported is to be confirmed: then it is asked at once, and again and again."""
+        if doubts and not self._doubts:
+            self.due_us = 0
+        self._doubts = doubts
+
     def sent(self) -> None:
         """The frame left, or is not wanted any more: the next one asks anew."""
         self._came, self._target, self.ends_us = None, False, None
@@ -187,7 +198,9 @@ class WhoFliesQuery:
     def due(self, system: int, seen: ObservedVehicle, now_us: int, *, flies: bool) -> list[Message]:
         """The question to put now, if one is due. `flies`: something of ours does, or the vehicle is in the air."""
         half_us = self._within_us // 2
-        if self._came is not None:
+        if self._doubts:
+            every_us = CONFIRM_US
+        elif self._came is not None:
             every_us = AGAIN_US
         elif not flies:
             every_us = IDLE_US
@@ -198,11 +211,12 @@ class WhoFliesQuery:
         if self._asked_us is not None and now_us - self._asked_us < every_us:
             if every_us == STREAMED_US:  # until the last heartbeat is too old for that
                 self.due_us = min(self._asked_us + every_us, (seen.heartbeat_us or 0) + half_us)
-            elif flies:
+            elif flies or self._doubts:
                 self.due_us = self._asked_us + every_us
             return []
-        self._asked_us, self.due_us = now_us, now_us + min(half_us, AGAIN_US)
-        names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if self._target else ("HEARTBEAT",)
+        self._asked_us = now_us
+        self.due_us = now_us + min(half_us, CONFIRM_US if self._doubts else AGAIN_US)
+        names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if self._target or self._doubts else ("HEARTBEAT",)
         return [messages.request(system, name) for name in names]
 
 
@@ -224,12 +238,37 @@ _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
 class Aids:
     """What serves all manoeuvres of a vehicle in turn."""
 
-    def __init__(self, flavour: AutopilotFlavour, brakes: Brakes, commander: Commander) -> None:
+    def __init__(
+        self, flavour: AutopilotFlavour, brakes: Brakes, commander: Commander, *, clock: VehicleClock,
+        signed: bool = False,
+    ) -> None:  # fmt: skip
         self.flavour = flavour
         self.brakes = brakes
         self.commander = commander
         self.query = WhoFliesQuery(flavour.mode_within_us, commander.slack)
         self.targets = TargetWatch()
+        self.suspicion = Suspicion()
+        #: of its mode and its motors
+        self.contradictions = Contradictions()
+        self.sent_us: int | None = None
+        """When a frame that moves the vehicle last left, in link time."""
+        self._clock = clock
+        self._signed = signed
+
+    def is_near_ours(self, up_us: int) -> bool:
+        """Whether a frame of ours may have undone by now what a report shows."""
+        within_us = CROSSED_US * self.commander.slack + (self._clock.round_trip_us or 0)
+        return self.sent_us is not None and up_us - self.sent_us <= within_us
+
+    def sure(self, found: tuple[str, str, int] | None, seen: ObservedVehicle) -> str | None:
+        """What is sure of what shows that somebody else flies, or that the motors stopped: nobody can put in a frame
+        where there is a key.
+        """
+        suspicion = self.suspicion
+        if found is None and not suspicion.stands:
+            return None
+        at_once = self._signed or self.is_near_ours(seen.up_us)
+        return suspicion.judge(found, seen.up_us, disputed=self.contradictions.stand(seen.now_us), at_once=at_once)
 
 
 class Manoeuvre:
@@ -287,11 +326,12 @@ class Manoeuvre:
         send, events = self._advance(seen, now_us)
         if self._is_newly_obeyed(seen):
             events = [Obeyed(now_us, self.token, seen.target if self._aids.targets.compares else None), *events]
-        self.due_us = now_us if self._changed else self._due_us(seen, now_us)
+        looks = self._changed or self._aids.suspicion.stands  # then a report that brings nothing new confirms
+        self.due_us = now_us if looks else self._due_us(seen, now_us)
         return send, events
 
     def _advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
-        how = self._taken_over(seen)
+        how = self._aids.sure(self._taken_over(seen), seen)
         if how is not None:
             self.over = self._taken = True
             return [], [TakenOver(now_us, how)]
@@ -336,6 +376,8 @@ class Manoeuvre:
     def _may_send(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether it is known well enough who flies, for a frame that moves the vehicle (docs/adr/0034)."""
         query, urgent = self._aids.query, self._command.kind in _URGENT
+        if self._aids.suspicion.stands:
+            return False
         if urgent and query.is_young(seen, now_us):
             return True
         return query.is_newer(seen, now_us, target=self._aids.targets.compares and not urgent)
@@ -350,6 +392,7 @@ class Manoeuvre:
         if self._left[0].spare and self._is_done(seen):
             return []  # the next one may leave at once
         self._aids.query.sent()
+        self._aids.sent_us = seen.up_us
         return self._commander.start(self._left[0], seen.up_us)
 
     def _again(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
@@ -364,6 +407,7 @@ class Manoeuvre:
             return []
         self._aids.query.sent()
         self._aids.targets.told_again()
+        self._aids.sent_us = seen.up_us
         return commander.due(seen.up_us)
 
     @property
@@ -434,8 +478,9 @@ class Manoeuvre:
         away = apart(*here, *self._stands)
         return "did-not-hold" if away > 2 * HOLDS_WITHIN or (away > HOLDS_WITHIN and not still(seen)) else None
 
-    def _taken_over(self, seen: ObservedVehicle) -> str | None:
-        """What shows that somebody else flies: a mode, a landing, a failsafe or a target that is not of ours.
+    def _taken_over(self, seen: ObservedVehicle) -> tuple[str, str, int] | None:
+        """What shows that somebody else flies: a mode, a landing, a failsafe or a target that is not of ours; its kind,
+        what it is, and how many reports of its kind there were.
 
         A mode may belong to this stage or, until its own mode showed, to those before.
         """
@@ -448,13 +493,15 @@ class Manoeuvre:
             self._before, self._accepted = frozenset(), None
             self._aids.targets.obeyed()
         elif seen.mode not in self._before or self._was_taken_back(seen):
-            return self._flavour.mode_name(seen.mode)
+            return "mode", self._flavour.mode_name(seen.mode), seen.beats
         self._was_landing = self._was_landing and seen.landing
         if seen.landing and not homeward and not self._was_landing:
-            return "landing"
+            return "landing", "landing", seen.landings
         if seen.critical and seen.airborne and not homeward and self._flavour.critical_acts:
-            return "failsafe"
-        return "another target" if self._aids.targets.is_foreign(seen) else None
+            return "failsafe", "failsafe", seen.beats
+        if self._aids.targets.is_foreign(seen):
+            return "target", "another target", seen.targets
+        return None
 
     def _was_taken_back(self, seen: ObservedVehicle) -> bool:
         """Whether our mode was accepted, and another shows in several reports since: somebody chose it again."""

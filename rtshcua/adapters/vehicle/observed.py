@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from math import acos, cos, degrees, hypot, isfinite
 from typing import Any, Final
 
+from rtshcua.adapters.vehicle.suspicion import UNBROKEN_US
 from rtshcua.mavlink import enums
 
 #: ESTIMATOR_STATUS_FLAGS, EKF_STATUS_FLAGS
@@ -167,13 +168,19 @@ class ObservedVehicle:
     so now, of a position that is not old. `target` is where the autopilot says that it flies to. `descent` is how fast
     it sinks and `tilt` how many degrees it leans (`tilt_us`: told then), whoever vouches for that. `beats` counts
     heartbeats and `targets` reports of a target (`target_us`: told last); `up_us` is link time, see `LinkWatch`.
-    `notes` collects what an operator should know.
+    `notes` collects what an operator should know. `disarms`: one heartbeat says that the motors are off; they count as
+    off when the next one says so, too, or, while two speak under its ids (`disputed`), when nothing else is said for a
+    while. `landings` counts reports of `landed_state`.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
     mode: int | None = None
     armed: bool = False
+    disarms: bool = False
+    disputed: bool = False
+    _disarms_us: int = 0
     landed_state: int = 0
+    landings: int = 0
     latitude: int = 0
     longitude: int = 0
     located: bool = False
@@ -231,13 +238,15 @@ class ObservedVehicle:
                 self.tilt, self.tilt_us = _tilt(message.roll, message.pitch), now_us
             case "HEARTBEAT":
                 self.mode = message.custom_mode
-                self.armed = bool(message.base_mode & enums.MAV_MODE_FLAG_SAFETY_ARMED)
+                armed = bool(message.base_mode & enums.MAV_MODE_FLAG_SAFETY_ARMED)
+                self._count_motors(armed=armed)
                 self.heartbeat_us = now_us
                 self.beats += 1
                 self._judge(message.system_status)
                 return True
             case "EXTENDED_SYS_STATE":
                 was, self.landed_state = self.landed_state, message.landed_state
+                self.landings += 1
                 return bool(was != self.landed_state)
             case "GLOBAL_POSITION_INT" if at_us is not None and now_us - at_us <= STALE_US:
                 self._place(message, now_us)
@@ -352,6 +361,15 @@ class ObservedVehicle:
         if self.prearm_text:
             return f": {self.prearm_text}"
         return f": {', '.join(self.unwell)} not healthy" if self.unwell else ""
+
+    def _count_motors(self, *, armed: bool) -> None:
+        """Motors that stop end a flight, so one report of it is not enough; nor are several while two speak."""
+        if armed or not self.armed:
+            self.armed, self.disarms = armed, False
+        elif not self.disarms:
+            self.disarms, self._disarms_us = True, self.up_us
+        elif not self.disputed or self.up_us - self._disarms_us >= UNBROKEN_US:
+            self.armed = self.disarms = False
 
     def _judge(self, status: int) -> None:
         """A failsafe need not change the mode: a low battery on the way home does not."""

@@ -175,6 +175,8 @@ WINDOW_US: Final = 1_000_000
 _UNIX_US: Final = 10**15  # 2001; as a time since boot it would be 31 years
 _WRAP, _HALF = 1 << 32, 1 << 31
 _NUMBERS, _AHEAD = 256, 128
+#: frames whose numbers go on from before a jump, until it counts as none of the vehicle's
+_GOES_ON: Final = 6
 _FIELDS: Final = ("time_boot_ms", "time_boot_us", "time_usec")
 _LENGTHS: Final = {"ms": 1_000, "us": 1}
 
@@ -208,6 +210,7 @@ class SourceTime:
         #: the last frame's place in the order of sending: its number, counted on where numbers begin again
         self.place = 0
         self._order: list[int | None] = [None] * _NUMBERS  # the same for each number of the last round
+        self._aside: tuple[int, int] | None = None  # what number goes on from before the last jump, after how many
         self._held_us = self._held_before_us = 0  # the largest delay of a frame that was overtaken, and the one before
         self._window_us = 0
 
@@ -333,6 +336,19 @@ class SourceTime:
             self._held_before_us = self._held_us if recent else 0
             self._held_us, self._window_us = 0, now_us
 
+    def _goes_on(self, number: int) -> bool:
+        """Whether the numbers go on from before the last jump, so often that it was none of the vehicle's: one frame
+        with a number far ahead must not have all that the vehicle says count as overtaken.
+        """
+        if self._aside is None or number != self._aside[0]:
+            return False
+        times = self._aside[1] + 1
+        self._aside = (number + 1) % _NUMBERS, times
+        if times < _GOES_ON:
+            return False
+        self._newest, self._aside = number, None
+        return True
+
     def _follow(self, number: int, at_us: int | None, now_us: int) -> int | None:
         """Keep the order of sending, by the frame's number; when this frame was sent, at the earliest."""
         if (number - self._newest) % _NUMBERS == 1:  # the next one, as nearly all are
@@ -342,12 +358,17 @@ class SourceTime:
             self._order[number] = sent_us
             self._newest, self._came_us = number, now_us
             self.place = self._count = self._count + 1
+            self._aside = None
             return sent_us
+        if self._goes_on(number):
+            self.place = self._count = self._count + 1
+            return self._sent_us
         sent_us, newest, order = self._sent_us, self._newest, self._order
         fresh = at_us is not None and (sent_us is None or at_us > sent_us)
         ahead = (number - newest) % _NUMBERS
         if 0 < ahead < _AHEAD or now_us - self._came_us > GAP_US:
             if ahead > 1:
+                self._aside = (newest + 1) % _NUMBERS, 0
                 for skipped in range(newest + 1, newest + ahead):
                     order[skipped % _NUMBERS] = sent_us
             if fresh:

@@ -221,9 +221,23 @@ def test_a_mode_that_changes_in_the_air_is_taken_over_without_a_manoeuvre_of_our
     one.beat(flies, armed=True)
     assert one.taken() == []
     one.beat(other, armed=True)
+    assert one.taken() == [], "the next report has to say so, too: anybody can put in one frame"
+    one.beat(other, armed=True)
     assert one.taken() == [name]
     one.beat(other, armed=True)
     assert one.taken() == [name]
+
+
+def test_one_report_of_another_mode_among_those_of_the_flown_one_takes_nothing_over() -> None:
+    one = Bench()
+    one.landed(1)
+    one.beat(Px4Mode.HOLD, armed=True)
+    one.landed(2)
+    for _ in range(3):
+        one.beat(Px4Mode.HOLD, armed=True)
+        one.beat(Px4Mode.LAND, armed=True)
+    one.beat(Px4Mode.HOLD, armed=True)
+    assert one.taken() == []
 
 
 def test_the_end_of_a_takeoff_and_what_happens_on_the_ground_take_nothing_over() -> None:

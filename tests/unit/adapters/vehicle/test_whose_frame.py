@@ -10,7 +10,7 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.link import SILENT_US
 from rtshcua.codec.frames import Codec, is_addressed
 from rtshcua.mavlink.enums import VEHICLES
-from rtshcua.model.faults import SecondVoice, Voice
+from rtshcua.model.faults import Mode, PilotMode, SecondVoice, Voice
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
 from rtshcua.onboard.ports import Crashed, Failed, LinkLost, Noted, Ready, Succeeded, TakenOver
@@ -174,3 +174,92 @@ def test_an_answer_to_somebody_else_does_not_show_that_it_hears_us(flavour: str,
     one.wait(3)
     assert one.vehicle.driver.unready is not None
     assert not one.vehicle.driver._watch.answers
+
+
+# ---------------------------------------------------------------- one frame that is forged, on a link without a key
+
+ON_THE_GROUND, IN_AIR, LANDING = 1, 2, 4
+MODES = {"px4": 0x0606_0000, "ardupilot": 9}
+
+
+def own(one: Flyer, *, armed: bool = True, mode: int | None = None, state: int = 4) -> Any:
+    """A heartbeat as the vehicle's own, with another mode, disarmed or critical."""
+    flavour = "px4" if one.vehicle.driver.flavour.autopilot == PX4 else "ardupilot"
+    told = one.vehicle.driver.seen.mode if mode is None else mode
+    return mavlink.MAVLink_heartbeat_message(2, OWN[flavour], 128 if armed else 0, told, state, 3)
+
+
+def elsewhere() -> Any:
+    return mavlink.MAVLink_position_target_global_int_message(
+        0, 5, 0, 473_000_000, 85_000_000, 600.0, 0, 0, 0, 0, 0, 0, 0, 0
+    )
+
+
+FORGED: dict[str, Callable[[Flyer], Any]] = {
+    "another mode": lambda one: own(one, mode=99),
+    "motors off": lambda one: own(one, armed=False),
+    "a critical state": lambda one: own(one, state=5),
+    "on the ground": lambda one: mavlink.MAVLink_extended_sys_state_message(0, ON_THE_GROUND),
+    "landing": lambda one: mavlink.MAVLink_extended_sys_state_message(0, LANDING),
+    "another target": lambda one: elsewhere(),
+    "no fix": lambda one: mavlink.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, 0, 0, 0, 0, 0),
+    "on its side": lambda one: mavlink.MAVLink_attitude_message(0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+}
+BAD = TakenOver | Failed | Crashed
+
+
+@pytest.mark.parametrize("name", FORGED)
+@pytest.mark.parametrize("after_s", [2.0, 2.31, 4.07])
+def test_one_forged_frame_ends_no_leg(aloft: Make, name: str, after_s: float) -> None:
+    one = aloft()
+    one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
+    one.wait(after_s)
+    says(one, FORGED[name](one))
+    end = one.until((Succeeded, Failed, TakenOver, Crashed), 60)
+    assert isinstance(end, Succeeded), end
+
+
+@pytest.mark.parametrize("name", ["motors off", "on the ground"])
+def test_one_forged_frame_ends_no_takeoff(flavour: str, name: str) -> None:
+    one = Flyer(flavour)
+    one.until(Ready)
+    one.begin(MotionKind.CLIMB, altitude=20_000)
+    while not one.vehicle.driver.seen.armed:
+        one.wait(0.02)
+    one.wait(0.5)
+    says(one, FORGED[name](one))
+    assert isinstance(one.until((Succeeded, Failed, TakenOver, Crashed), 60), Succeeded)
+
+
+@pytest.mark.parametrize("says_", [Voice.STRAYED, Voice.DISARMED])
+@pytest.mark.parametrize("each_us", [100_000, 250_000, 1_000_000])
+def test_who_contradicts_the_vehicle_in_the_air_is_noted_and_ends_nothing(
+    aloft: Make, says_: Voice, each_us: int
+) -> None:
+    one = aloft()
+    one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
+    one.wait(2)
+    one.vehicle.simulation.inject(SecondVoice(one.vehicle.simulation.now_us, says_, each_us, 20 * S))
+    end = one.until((Succeeded, Failed, TakenOver, Crashed), 60)
+    assert isinstance(end, Succeeded), end
+    if says_ is Voice.STRAYED:
+        assert any(text.startswith("two speak as 1/1") for text in noted(one))
+
+
+@pytest.mark.parametrize("says_", [Voice.STRAYED])
+def test_what_contradicts_the_vehicle_on_the_ground_keeps_it_from_being_ready(flavour: str, says_: Voice) -> None:
+    one = Flyer(flavour, faults=(SecondVoice(0, says_, 250_000, 30 * S),))
+    one.wait(20)
+    assert not any(isinstance(each, Ready) for each in one.events)
+    assert (one.vehicle.driver.unready or "").startswith("two speak as 1/1")
+    one.until(Ready, 60)
+
+
+def test_a_takeover_is_still_seen_beside_a_voice_that_contradicts_the_vehicle(aloft: Make) -> None:
+    one = aloft()
+    one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
+    one.wait(2)
+    one.vehicle.simulation.inject(SecondVoice(one.vehicle.simulation.now_us, Voice.STRAYED, 250_000, 60 * S))
+    one.wait(4)
+    one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us, Mode.RETURN))
+    assert isinstance(one.until((Succeeded, Failed, TakenOver), 6), TakenOver)

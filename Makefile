@@ -22,7 +22,7 @@ setup: ## make .venv and the boundary in C, or bring them up to date
 	@.make/boundary
 
 demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, verify its log
-	@.make/demo
+	@$(BIN)/python .make/demo
 
 test: setup ## run the tests; decision, wire and evidence covered in full
 	$(BIN)/pytest -n $(JOBS) --cov --cov-report term

@@ -76,12 +76,15 @@ def _call(row: Row, words: list[str]) -> int:
         import typer
         from typer.main import get_command
 
+        from rtshcua.cli.option_groups import grouped
+
         command = get_command(import_module(row.module).app)
     finally:
         if collecting:
             gc.enable()
     _unguarded(command)
     _reflowed(command)
+    grouped(command, row.name)
     try:
         with command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context:
             return int(cast("int | None", command.invoke(context)) or ExitCode.OK)

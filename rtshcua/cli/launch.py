@@ -113,7 +113,7 @@ class Launch:
     policy alone, and for so many seconds at most it waits for the one that flies. `boundary_user`: the user and group
     that a boundary of its own process runs as; `unbuilt`, that there is none only because its program is missing.
     `boundary_socket`: where a boundary listens that has the keys, of the log, of its own and of the link; `listening`
-    is that boundary once it is connected, or why it is not.
+    is that boundary once it is connected, or why it is not. `transport`: `link`, where it is open already.
     """
 
     bundle: Path
@@ -148,6 +148,7 @@ class Launch:
     boundary_key: Path | None = None
     boundary_socket: Path | None = None
     listening: ListeningBoundary | Refused | None = None
+    transport: Transport | None = None
 
 
 def launch(order: Launch) -> ExitCode:
@@ -190,7 +191,7 @@ def _launch(order: Launch) -> ExitCode:
             driver = _driver(order, loaded, slack, signing)
             driver.prepares = not order.dry_run and bool(order.settings or debts.left)
             driver.left = None if past is None else past.left(bundle, loaded)
-            transport = transport or _open(order.link)
+            transport = transport or _open(order)
             vehicle = ConnectedVehicle(transport, driver, clock, tape.keep)
             stack.callback(vehicle.close)
             if driver.shortfall is not None:
@@ -201,7 +202,8 @@ def _launch(order: Launch) -> ExitCode:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
             agents = agents or _agents(order, loaded, stack)
             vehicle.driver.asks_utc = utc.waits
-            events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
+            hurried = not order.dry_run and _broke_off(past) and _may_have_flown(order, loaded)
+            events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
             lapsed = _lapsed(bundle, signed_root, log_key.kid, loaded, clock)
             _expect_current(lapsed, resumed=not order.dry_run and order.sortie is None)
@@ -503,7 +505,7 @@ def _stand_by(order: Launch, loaded: Loaded, stack: ExitStack) -> tuple[Transpor
     """The way to a vehicle, and the sockets, of a run that waits, until the stack is closed: its flight has both.
     Raises `Refused` and OSError.
     """
-    transport = _open(order.link)
+    transport = _open(order)
     stack.callback(transport.close)
     if isinstance(transport, UdpTransport) and order.link is None:
         stack.enter_context(_simulate(order, loaded, transport.port))
@@ -528,7 +530,8 @@ def _wait(
         vehicle = ConnectedVehicle(transport, driver, clock, lambda at_us, frame: None)
         if driver.shortfall is not None:
             raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
-        events = meet(order.link, order.system, vehicle, clock, interrupts, signing)
+        hurried = _broke_off(past)
+        events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
         broken_off = None if past is None else _broken_off(order, past, base, vehicle, clock, events)
         if broken_off is not None:
             (data, loaded), under = broken_off
@@ -893,8 +896,11 @@ def _driver(order: Launch, loaded: Loaded, slack: int, signing: Signing) -> Driv
         raise Refused(ExitCode.REFUSED, "unknown-source", str(error)) from None
 
 
-def _open(link: Address | None) -> Transport:
+def _open(order: Launch) -> Transport:
     """The way to the vehicle; to our own simulated one, a port that the system chooses. Raises `Refused`."""
+    if order.transport is not None:
+        return order.transport
+    link = order.link
     if link is None:
         link = Address(Way.UDP_IN, _LOOPBACK, 0)
     try:

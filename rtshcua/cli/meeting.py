@@ -70,10 +70,11 @@ def unmet(where: str, seconds: float, system: int | None, rejected: str | None, 
 
 def meet(
     link: Address | None, system: int | None, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts,
-    signing: Signing,
+    signing: Signing, *, hurried: bool,
 ) -> list[Event]:  # fmt: skip
     """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
-    nothing begins; what happened meanwhile. `link` None: our own simulated vehicle. Raises `Refused`.
+    nothing begins; what happened meanwhile. `link` None: our own simulated vehicle. `hurried`: a flight may have broken
+    off in the air; then a second vehicle is not waited for, so that the first is told to come down. Raises `Refused`.
     """
     events: list[Event] = []
     until_s = time.monotonic() + HEARTBEAT_S
@@ -84,7 +85,7 @@ def meet(
             where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
             raise Refused(ExitCode.LINK, *unmet(where, HEARTBEAT_S, system, signing.rejected, vehicle.silence))
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
-    until_s = time.monotonic() + (0 if link is None else ANOTHER_S)
+    until_s = time.monotonic() + (0 if link is None or hurried else ANOTHER_S)
     while time.monotonic() < until_s and vehicle.driver.link.crowd is None:
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     if vehicle.driver.link.crowd is not None:

@@ -17,12 +17,13 @@ import typer
 from rtshcua.adapters.boundary_process import program
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import Address, AddressError
+from rtshcua.adapters.vehicle.address import Address, AddressError, Way
+from rtshcua.adapters.vehicle.transport import Transport, open_transport
 from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.configured import Settings, settings_of
 from rtshcua.cli.connection import LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_text, duration_us
 from rtshcua.cli.faults import fail, misaddressed, tell
-from rtshcua.cli.launch import Launch, Refused, launch
+from rtshcua.cli.refused import Refused
 from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import Mode
@@ -162,6 +163,10 @@ def run(
     if too_fast is not None:
         return fail(ExitCode.USAGE, *too_fast)
     with ExitStack() as stack:
+        # what comes from now on is kept by the system: a heartbeat need not be waited for once all is loaded
+        transport = _listening(link, stack)
+        from rtshcua.cli.launch import Launch, launch
+
         state = state_dir or state_folder()
         if fresh_state:
             state = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rtshcua-")))
@@ -172,6 +177,7 @@ def run(
         order = Launch(
             bundle=bundle,
             link=link,
+            transport=transport,
             simulator=words if incidents is None else incidents.words,
             mode=mode,
             unbuilt=unbuilt,
@@ -205,6 +211,20 @@ def run(
             return launch(order)
         except Refused as refused:
             return _say(refused, as_json=as_json)
+
+
+def _listening(link: Address | None, stack: ExitStack) -> Transport | None:
+    """The port at which a vehicle is heard, until the stack is closed, if it can be had; else whoever flies opens it,
+    and says why not.
+    """
+    if link is None or link.way is not Way.UDP_IN:
+        return None
+    try:
+        transport = open_transport(link)
+    except OSError:
+        return None
+    stack.callback(transport.close)
+    return transport
 
 
 def _incidents(text: str, flavour: Kind | None, seed: int | None) -> "Incidents":

@@ -9,7 +9,6 @@ from rtshcua.model.faults import WindStep
 from rtshcua.model.flat.policy import Policy
 from rtshcua.simulation.config import Kind
 from rtshcua.simulation.faults import OF_VEHICLE, parse_fault
-from rtshcua.virtual.fitting import fitting
 
 _BARE = re.compile(r"\d+(\.\d+)?", re.ASCII)
 _WIND = ("speed", "m/s"), ("from", "deg"), ("gust", "m/s")
@@ -99,6 +98,8 @@ def arguments(
 
 def of_policy(policy: Policy) -> list[str]:
     """Options that make it the vehicle of a policy: its home, its endurance, its return, no faster, what it reads."""
+    from rtshcua.virtual.fitting import fitting  # the simulation's parameters, which a flight of another vehicle lacks
+
     fits = fitting(policy)
     home = fits.home
     return [

@@ -373,6 +373,73 @@ def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
     return bytes.fromhex(said.flight)
 
 
+class FlightFollower:
+    """A connection that stays: what the flight at `path` tells, and what is handed in to it. Raises OSError where none
+    listens, or it does not say which flight it is.
+    """
+
+    def __init__(self, path: Path, *, patience_s: float = 10.0) -> None:
+        self._number = 0
+        self._path = path
+        self._link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._waiting = b""
+        self._ahead: list[bytes | Answered] = []
+        #: the id of the flight, as it says itself
+        self.flight = b""
+        try:
+            self._link.settimeout(patience_s)
+            _connect(self._link, path)
+            while not self.flight:
+                told = self.receive()
+                if told is None:
+                    raise ConnectionResetError(errno.ECONNRESET, "the flight hung up", str(path))
+                self._ahead += told
+        except BaseException:
+            self._link.close()
+            raise
+
+    def fileno(self) -> int:
+        """The descriptor to wait for before `receive`."""
+        return self._link.fileno()
+
+    def receive(self) -> list[bytes | Answered] | None:
+        """What came: records as their lines, and answers; None where the flight hung up. Raises OSError for a peer that
+        says what no flight says.
+        """
+        ahead, self._ahead = self._ahead, []
+        if ahead and self.flight:
+            return ahead
+        try:
+            chunk = self._link.recv(_CHUNK)
+        except ConnectionResetError:
+            return None
+        if not chunk:
+            return None
+        *lines, self._waiting = (self._waiting + chunk).split(b"\n")
+        if len(self._waiting) > LONGEST_TOLD:
+            raise ConnectionError("what listens there is no flight: its line does not end")
+        found: list[bytes | Answered] = []
+        for line in lines:
+            said = _told(line)
+            if said.type == "hello" and not self.flight:
+                if _FLIGHT.fullmatch(said.flight) is None:
+                    raise ConnectionError(f"what listens at `{self._path}` says no id of a flight")
+                self.flight = bytes.fromhex(said.flight)
+            found.append(Answered(said.slug, said.text) if said.type == "answer" else line + b"\n")
+        return found
+
+    def hand_in(self, document: bytes) -> None:
+        """Hand a document in; what becomes of it comes with `receive`. Raises OSError."""
+        self._number += 1
+        self._link.sendall(msgspec.json.encode({"id": self._number, "document": b64encode(document).decode()}) + b"\n")
+
+    def __enter__(self) -> "FlightFollower":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._link.close()
+
+
 def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s: float) -> _Line:
     """The first line that is wanted, after sending one; tried again where the queue is full, or there is no place.
 
@@ -395,16 +462,7 @@ def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s:
 def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_s: float) -> _Line:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
         link.settimeout(max(until_s - time.monotonic(), AGAIN_S))
-        try:
-            link.connect(str(path))
-        except BlockingIOError:  # others wait to be taken in, as many as may: unix(7) does not let us wait too
-            raise
-        except OSError as error:
-            if path.exists() and not path.is_socket():
-                raise OSError(errno.ENXIO, "no agent socket of a flight", str(path)) from None
-            if error.errno is None:
-                raise OSError(errno.ENAMETOOLONG, "the path is too long for a socket", str(path)) from None
-            raise OSError(error.errno, error.strerror, str(path)) from None
+        _connect(link, path)
         link.sendall(line)
         waiting = b""
         while (left_s := until_s - time.monotonic()) > 0:
@@ -420,6 +478,20 @@ def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_
             if len(waiting) > LONGEST_TOLD:
                 raise ConnectionError("what listens there is no flight: its line does not end")
     raise TimeoutError("the flight did not answer")
+
+
+def _connect(link: socket.socket, path: Path) -> None:
+    """Raises OSError, which names the path; BlockingIOError where others wait to be taken in, as many as may."""
+    try:
+        link.connect(str(path))
+    except BlockingIOError:  # unix(7) does not let us wait too
+        raise
+    except OSError as error:
+        if path.exists() and not path.is_socket():
+            raise OSError(errno.ENXIO, "no agent socket of a flight", str(path)) from None
+        if error.errno is None:
+            raise OSError(errno.ENAMETOOLONG, "the path is too long for a socket", str(path)) from None
+        raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 def _told(line: bytes) -> _Line:

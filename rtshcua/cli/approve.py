@@ -8,10 +8,7 @@ import typer
 
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.documents import (
-    MOST_S,
-    WHERE,
-    WHOSE,
+from rtshcua.cli.document_options import (
     ApprovalKey,
     AsJson,
     FlightId,
@@ -20,11 +17,8 @@ from rtshcua.cli.documents import (
     PassphraseFile,
     Person,
     SignedRoot,
-    deliver,
-    expect_sense,
-    flight_id,
-    subject,
 )
+from rtshcua.cli.documents import MOST_S, WHERE, WHOSE, deliver, expect_sense, flight_id, subject
 from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
 from rtshcua.cli.shown import shorten

@@ -1,4 +1,4 @@
-"""What the commands that sign or hand in a document for a flight share: what it is about, and where it goes."""
+"""Documents that are signed for a flight: what they are about, and where they go. Without typer: a recall hurries."""
 
 import json
 import re
@@ -6,9 +6,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
-
-import typer
 
 from rtshcua.adapters.agent_socket import flight_at, hand_in
 from rtshcua.adapters.files.folders import data_folder
@@ -33,25 +30,8 @@ from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
-# ---------------------------------------------------------------- the options that they share
-
-FlyingBundle = Annotated[Path, typer.Argument(help="the bundle that flies")]
-FlightSocket = Annotated[Path | None, typer.Option(metavar="SOCKET", help="the flight's operator or agent socket")]
-FlightId = Annotated[
-    str | None, typer.Option(metavar="ID", help="the flight: its id, or a socket of it [default: --to]")
-]
-Person = Annotated[
-    str | None, typer.Option("--as", metavar="NAME", help="who you are, where the key store has several people")
-]
-SignedRoot = Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")]
-ApprovalKey = Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")]
-PassphraseFile = Annotated[Path | None, typer.Option(help="a file with the key's passphrase")]
-AsJson = Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")]
 #: the longest that a document may be good for, in s
 MOST_S = MAX_LIFE_US // 1_000_000
-
-# ---------------------------------------------------------------- what they do alike
-
 NO_HELP: Mapping[str, str] = MappingProxyType({})
 _FLIGHT = re.compile(r"[0-9a-f]{32}")
 #: help for what a document may be handed to

@@ -27,7 +27,7 @@ from rtshcua.adapters.vehicle.address import parse as parse_address
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli import attesting
 from rtshcua.cli.connection import System
-from rtshcua.cli.documents import AsJson
+from rtshcua.cli.document_options import AsJson
 from rtshcua.cli.faults import code_of, fail, misaddressed, refuse, untrusted
 from rtshcua.cli.meeting import unopened
 from rtshcua.cli.refused import Refused

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.store.reading import read_regular
-from rtshcua.cli.documents import AsJson, deliver
+from rtshcua.cli.document_options import AsJson
+from rtshcua.cli.documents import deliver
 from rtshcua.cli.faults import fail
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire import names

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -273,3 +275,60 @@ def test_what_the_flight_says_is_what_the_command_says(
     assert said == {"slug": "expired", "text": "the flight refused it: as it says (expired)", "exit": "refused"}
     assert main(["recall", "low.bundle", *to]) == ExitCode.REFUSED
     assert "the flight refused it" in capsys.readouterr().err
+
+
+def test_a_recall_that_was_signed_before_is_sent_without_a_key(
+    here: Path, listening: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["recall", "low.bundle", "-o", "home", *FLIGHT]) == ExitCode.OK
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(here / "empty"))
+    send = ["recall", "--send", "home", "--to", str(listening)]
+    assert main(send) == ExitCode.OK
+    assert "sent `home`: as it says" in capsys.readouterr().out
+    assert main(send) == ExitCode.REFUSED
+    assert "`--policy` calls home whatever flies" in capsys.readouterr().err
+    assert main(send) == ExitCode.REFUSED
+    assert "sign another one" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["--send", "home"], ExitCode.USAGE, "it goes with `--to SOCKET`"),
+        (["low.bundle", "--send", "home", "--to", "s"], ExitCode.USAGE, "without a bundle"),
+        (["--send", "low.bundle", "--to", "s"], ExitCode.INPUT, ""),
+        (["--send", "none", "--to", "s"], ExitCode.INPUT, "no such file or directory: `none`"),
+        (["--to", "s"], ExitCode.USAGE, "give its bundle"),
+    ],
+)
+def test_what_is_no_recall_is_not_sent(
+    here: Path, capsys: pytest.CaptureFixture[str], words: list[str], code: ExitCode, said: str
+) -> None:
+    assert main(["recall", "low.bundle", "-o", "home", *FLIGHT]) == ExitCode.OK
+    capsys.readouterr()
+    assert main(["recall", *words]) == code
+    assert said in capsys.readouterr().err
+
+
+def test_an_operator_follows_a_flight_and_calls_it_home(here: Path, listening: Path) -> None:
+    words = [str(Path(sys.executable).with_name("rtshcua")), "operator", "low.bundle", "--to", str(listening), "--json"]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as console:
+        assert console.stdin is not None
+        assert console.stdout is not None
+        lines = (json.loads(line) for line in console.stdout)
+
+        def typed(text: str, *events: str) -> None:
+            print(text, file=console.stdin, flush=True)
+            assert tuple(next(lines)["event"] for _ in events) == events
+
+        assert [next(lines)["event"] for _ in range(2)] == ["following", "ready"]
+        typed("fly on", "ready")
+        typed("recall", "sent", "accepted")
+        typed("policy", "sent", "refused")
+        typed("quit", "left")
+        assert console.wait(30) == ExitCode.REFUSED, "by the last answer"
+
+
+def test_an_operator_of_no_flight_is_told_so(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["operator", "low.bundle", "--to", "none"]) == ExitCode.INPUT
+    assert "no such file or directory: `none`" in capsys.readouterr().err

@@ -13,7 +13,8 @@
 #define RT_MAX_KNOWN (RT_MAX_INVOCATIONS + RT_MAX_REPLACEMENTS * 2048)
 
 /* Status of wire/response.py: whether `enforce` decided, and if not, why. */
-typedef enum { RT_DECIDED = 0, RT_MALFORMED = 1, RT_UNKNOWN_STEP = 2, RT_NOT_CURRENT = 3 } rt_status;
+typedef enum { RT_DECIDED = 0, RT_MALFORMED = 1, RT_UNKNOWN_STEP = 2, RT_NOT_CURRENT = 3,
+               RT_CLOCK_APART = 4, RT_CLOCK_UNKNOWN = 5 } rt_status;
 
 /* The verified bundle and its invocations; after a replacement, with those of the mission that flies now. */
 typedef struct {

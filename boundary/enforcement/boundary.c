@@ -4,10 +4,37 @@
 #include "wire/octets.h"
 
 #define CLOCKS_PART_US 3000000LL
-#define APART_US 2000000LL
 
 bool rt_is_apart(int64_t now_us, int64_t own_us) {
-    return own_us >= 0 && (now_us > own_us + APART_US || now_us < own_us - APART_US);
+    return own_us >= 0 && (now_us > own_us + RT_APART_US || now_us < own_us - RT_APART_US);
+}
+
+int64_t rt_own_now(const rt_boundary *boundary, const rt_now *named, int64_t own_us, rt_now *now) {
+    if (own_us < 0) {
+        *now = *named;
+        return RT_UTC_SHARED;
+    }
+    rt_clock_now(&boundary->clock, own_us, now);
+    return boundary->clock.source;
+}
+
+/* Why a time of day that is named is not decided by: RT_DECIDED where it is. */
+static uint8_t disowned(const rt_boundary *boundary, const rt_now *named, int64_t own_us) {
+    rt_now own;
+    int64_t source = rt_own_now(boundary, named, own_us, &own);
+    if (source == RT_UTC_SHARED || rt_bears_out(&own, named)) return RT_DECIDED;
+    return source == RT_UTC_UNKNOWN ? RT_CLOCK_UNKNOWN : RT_CLOCK_APART;
+}
+
+/* Once it is known what time it is, keys that were taken for good by a clock that nobody vouched for are looked at by it. */
+static bool is_dated(rt_boundary *boundary, int64_t own_us) {
+    const rt_bundle *bundle = &boundary->session.in_force.bundle;
+    rt_now own;
+    if (boundary->dated || own_us < 0 || boundary->clock.source == RT_UTC_UNKNOWN) return true;
+    rt_clock_now(&boundary->clock, own_us, &own);
+    boundary->dated = own.utc_us < boundary->root.expires_at_us && rt_key_refusal(bundle->policy_key, boundary->vehicle, own.utc_us) == NULL &&
+                      rt_check_proposer(bundle->mission_key, &bundle->policy, &bundle->mission, 0, false, own.utc_us) == NULL;
+    return boundary->dated;
 }
 
 static bool keeps_time(rt_boundary *boundary, const rt_now *now) {
@@ -104,7 +131,10 @@ uint32_t rt_enforce(rt_boundary *boundary, rt_bytes request, int64_t own_us, uin
     /* a release to come would move the deadline */
     if (now_us < boundary->now_us || now_us < asked->released_us || !keeps_time(boundary, &asked->now))
         return undecided(boundary, RT_MALFORMED, request, out);
+    uint8_t clock = disowned(boundary, &asked->now, own_us);
+    if (clock != RT_DECIDED) return undecided(boundary, clock, request, out);
     boundary->now_us = now_us;
+    if (!is_dated(boundary, own_us)) boundary->executor.called_off = boundary->session.in_force.recalled = true;
     rt_status turn = rt_turn_of(&boundary->session, asked->kind, asked->step, asked->link);
     if (turn != RT_DECIDED)
         return undecided(boundary, (uint8_t)turn, request, out);
@@ -120,7 +150,7 @@ rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup) {
     /* not the whole: of what a bundle may fill most is never touched, and needs no memory */
     boundary->loaded = boundary->opened = boundary->to_keep = false;
     boundary->bundle_size = boundary->document_size = boundary->document_count = 0;
-    boundary->flights = 0;
+    boundary->flights = boundary->challenges = 0;
     boundary->serial = 1;
     rt_issuer_begin(&boundary->issuer, setup->settings, setup->owed);
     memset(&boundary->executor, 0, sizeof boundary->executor);
@@ -134,6 +164,7 @@ rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup) {
     boundary->has_log_key = setup->has_log_key;
     rt_refusal refused = rt_open_root(setup->root, setup->pinned, setup->now.utc_us, &boundary->root);
     if (refused != NULL) return refused;
+    rt_clock_begin(&boundary->clock, &setup->now, setup->stated_us);
     rt_gate *gate = &boundary->executor.gate;
     gate->signs = setup->signs;
     if (setup->signs)
@@ -149,11 +180,17 @@ static void policy_name(const rt_boundary *boundary, uint8_t name[RT_DIGEST_BYTE
     rt_sha256_end(&hash, name);
 }
 
-rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *now) {
+rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *named, int64_t own_us) {
+    rt_now by_us; /* by our own time of day, whatever is named: by what this machine has where that is not known */
+    const int64_t source = rt_own_now(boundary, named, own_us, &by_us);
+    const rt_now *now = &by_us;
+    by_us.monotonic_us = named->monotonic_us;
     rt_session *session = &boundary->session;
     rt_executor *executor = &boundary->executor;
     rt_invocation invocation;
     if (boundary->loaded && executor->flies) return "flies";
+    if (source != RT_UTC_SHARED && source != RT_UTC_UNKNOWN && by_us.utc_us >= boundary->root.expires_at_us) return "root-expired";
+    boundary->dated = source != RT_UTC_UNKNOWN;
     boundary->loaded = boundary->opened = boundary->ahead_known = false;
     rt_refusal refused = rt_session_begin(session, (rt_bytes){boundary->bundle, boundary->bundle_size}, &boundary->root,
                                           boundary->vehicle, flight, now);
@@ -198,15 +235,19 @@ bool rt_give_back(rt_boundary *boundary) {
     return true;
 }
 
-uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, uint8_t *out) {
+uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, int64_t own_us, uint8_t *out) {
+    const uint8_t clock = disowned(boundary, now, own_us);
     rt_taken taken = {RT_OF_UNKNOWN, NULL, -1, -1, -1, 0};
     const rt_bytes document = {boundary->documents[boundary->document_count], boundary->document_size};
     if (now->monotonic_us < boundary->now_us) {
         taken.refused = "time-went-back";
     } else if (!keeps_time(boundary, now)) {
         taken.refused = "time-of-day-set";
+    } else if (clock != RT_DECIDED) {
+        taken.refused = clock == RT_CLOCK_UNKNOWN ? "clock-unknown" : "clock-apart";
     } else {
         boundary->now_us = now->monotonic_us;
+        if (!is_dated(boundary, own_us)) boundary->session.in_force.recalled = true;
         rt_take_document(&boundary->session, document, now, released, &taken);
         boundary->executor.called_off = rt_called_off(&boundary->session);
         if (taken.refused == NULL && taken.kind == RT_OF_REPLACEMENT) boundary->document_count++;
@@ -278,10 +319,12 @@ rt_refusal rt_begin_log(rt_boundary *boundary, rt_bytes checkpoint, uint8_t sign
     return NULL;
 }
 
-uint32_t rt_attested(rt_boundary *boundary, bool final, uint8_t *out) {
+uint32_t rt_attested(rt_boundary *boundary, const rt_now *named, int64_t own_us, bool final, uint8_t *out) {
+    rt_now now;
+    const int64_t source = rt_own_now(boundary, named, own_us, &now);
     if (!boundary->attests || boundary->chain.over) return 0;
     boundary->chain.over = final;
     if (final) keep_session(boundary);
     return rt_sign_statement(&boundary->chain, boundary->keys->boundary, boundary->session.in_force.flight, boundary->attestation,
-                             boundary->before, final, out);
+                             boundary->before, source, &now, final, out);
 }

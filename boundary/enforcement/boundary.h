@@ -3,6 +3,7 @@
 #ifndef RT_ENFORCEMENT_BOUNDARY_H
 #define RT_ENFORCEMENT_BOUNDARY_H
 
+#include "clock.h"
 #include "decision/session.h"
 #include "executor.h"
 #include "kept.h"
@@ -27,7 +28,8 @@ typedef struct {
     bool has_key;          /* and so has the boundary itself */
     bool has_log_key;      /* it signs the log of a flight */
     const rt_preparation *settings, *owed; /* what is set of the vehicle, and what is owed to it; NULL for nothing */
-    rt_now now;
+    rt_now now;         /* by the machine's clock; its error as the kernel says it, RT_UTC_UNKNOWN_US where it does not */
+    int64_t stated_us;  /* what an operator says that this clock is off by at most, -1 for nothing */
 } rt_setup;
 
 typedef struct {
@@ -45,6 +47,9 @@ typedef struct {
     uint64_t serial;   /* of the next permit */
     int64_t version;   /* of the policy: latched, a newer one comes with another bundle, after landing */
     int64_t now_us;    /* of the last request: time does not go back */
+    rt_clock clock;    /* its own, where it has one */
+    bool dated;        /* whether by that clock the keys of the bundle were good */
+    uint64_t challenges; /* how many were drawn */
     bool ahead_known;
     int64_t ahead_us;  /* UTC less monotonic time, as it was first told */
     rt_request asked;  /* the request that is being decided */
@@ -68,10 +73,10 @@ rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup);
 
 /* Open the bundle that was handed over, for a flight of this id, received now: its mission is opened, once. What is in force is
    given up, also where the bundle is refused; not while something of it flies. */
-rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *now);
+rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *named, int64_t own_us);
 
 /* Take in the document that was handed over; its receipt goes into `out`, of 256 octets; how many there are. */
-uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, uint8_t *out);
+uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, int64_t own_us, uint8_t *out);
 
 /* Whether something may fly: of what is in force something was sent, now or by a boundary before this one. */
 bool rt_may_fly(const rt_boundary *boundary);
@@ -82,7 +87,10 @@ bool rt_give_back(rt_boundary *boundary);
 /* Begin a session of the boundary's own evidence: the one behind that which it kept, or the one that is proposed with the digest of
    the one before, where that has a greater number. False without a key, and for a second time. Then sign how far it got into `out` of RT_MAX_STATEMENT octets; 0 where nothing is signed. */
 bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_DIGEST_BYTES]);
-uint32_t rt_attested(rt_boundary *boundary, bool final, uint8_t *out);
+uint32_t rt_attested(rt_boundary *boundary, const rt_now *named, int64_t own_us, bool final, uint8_t *out);
+
+/* Where the time of day is from, and what it is by it: our own, or, where `own_us` is -1, what a caller names. */
+int64_t rt_own_now(const rt_boundary *boundary, const rt_now *named, int64_t own_us, rt_now *now);
 
 /* Sign the checkpoint that begins the log of the flight that is in force, once; nothing else is signed with this key. */
 rt_refusal rt_begin_log(rt_boundary *boundary, rt_bytes checkpoint, uint8_t signature[RT_SIGNATURE_BYTES]);

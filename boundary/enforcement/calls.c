@@ -38,7 +38,14 @@ static uint32_t permitted(rt_refusal refused, const rt_permit *permit, uint8_t *
     return (uint32_t)(at - out);
 }
 
-static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, uint8_t *out) {
+static bool take_now(reader *call, rt_now *now) {
+    now->monotonic_us = take(call, 8);
+    now->utc_us = take(call, 8);
+    now->utc_error_us = take(call, 8);
+    return !call->short_ && is_time(now->monotonic_us) && is_time(now->utc_us) && is_time(now->utc_error_us);
+}
+
+static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, int64_t own_us, uint8_t *out) {
     uint8_t bare[RT_LARGEST_FRAME];
     rt_gate *gate = &boundary->executor.gate;
     rt_heard heard = RT_ACCEPTED;
@@ -46,9 +53,11 @@ static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, u
         heard = rt_accept_frame(&gate->signer, frame, now_us);
         const bool whole = frame.size > RT_HEADER && frame.size == RT_HEADER + (uint32_t)frame.at[1] + RT_CHECKSUM + RT_SIGNATURE;
         if (heard == RT_ACCEPTED && frame.size <= sizeof bare && whole) {
+            const uint8_t link = frame.at[frame.size - RT_SIGNATURE];
             memcpy(bare, frame.at, frame.size);
             rt_set_flags(bare, 0);
             frame = (rt_bytes){bare, frame.size - RT_SIGNATURE};
+            if (own_us >= 0) rt_clock_hear(&boundary->clock, frame, link, own_us);
         }
     }
     if (heard == RT_ACCEPTED)
@@ -78,20 +87,50 @@ static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_byte
     return NULL;
 }
 
+/* What nobody guesses: the keyed digest of a word and a count. */
+static void draw(const rt_boundary *boundary, rt_bytes domain, uint64_t number, uint8_t digest[RT_DIGEST_BYTES]) {
+    uint8_t count[8];
+    for (uint32_t octet = 0; octet < 8; octet++) count[octet] = (uint8_t)(number >> 8 * octet & 0xFF);
+    const rt_bytes parts[] = {domain, {count, sizeof count}};
+    rt_hmac_sha256((rt_bytes){boundary->keys->session, RT_KEY_BYTES}, parts, 2, digest);
+}
+
 /* The id of the flight that begins next: nobody gives it one that was flown before. */
 static void next_flight(const rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BYTES]) {
     static const uint8_t domain[] = "rtshcua/flight";
-    uint8_t digest[RT_DIGEST_BYTES], count[8];
-    for (uint32_t octet = 0; octet < 8; octet++) count[octet] = (uint8_t)(boundary->flights >> 8 * octet & 0xFF);
-    const rt_bytes parts[] = {{domain, sizeof domain}, {count, sizeof count}};
-    rt_hmac_sha256((rt_bytes){boundary->keys->session, RT_KEY_BYTES}, parts, 2, digest);
+    uint8_t digest[RT_DIGEST_BYTES];
+    draw(boundary, (rt_bytes){domain, sizeof domain}, boundary->flights, digest);
     memcpy(flight, digest, RT_FLIGHT_BYTES);
 }
 
-static uint32_t load(rt_boundary *boundary, const rt_now *now, uint8_t *out) {
+/* TIME: what time it is, and what the vehicle is asked where that is not known and its link has a key. */
+static uint32_t answer_time(rt_boundary *boundary, bool settle, int64_t own_us, uint8_t *out) {
+    static const uint8_t domain[] = "rtshcua/challenge";
+    static const rt_now nobody = {0, 0, RT_UTC_UNKNOWN_US};
+    uint8_t digest[RT_DIGEST_BYTES], *at = out;
+    rt_clock *clock = &boundary->clock;
+    rt_now now;
+    if (own_us >= 0 && settle) rt_clock_settle(clock, own_us);
+    if (own_us >= 0 && boundary->executor.gate.signs && rt_clock_asks(clock, own_us)) {
+        draw(boundary, (rt_bytes){domain, sizeof domain}, boundary->challenges++, digest);
+        int64_t number = 0;
+        for (uint32_t octet = 0; octet < 7; octet++) number = number << 8 | digest[octet];
+        rt_clock_challenge(clock, number + 1, own_us);
+    }
+    const int64_t source = rt_own_now(boundary, &nobody, own_us, &now);
+    rt_put(&at, 0, 1);
+    rt_put(&at, (uint64_t)source, 1);
+    rt_put(&at, (uint64_t)now.monotonic_us, 8);
+    rt_put(&at, (uint64_t)now.utc_us, 8);
+    rt_put(&at, (uint64_t)now.utc_error_us, 8);
+    rt_put(&at, (uint64_t)(own_us < 0 ? 0 : rt_clock_number(clock)), 8);
+    return (uint32_t)(at - out);
+}
+
+static uint32_t load(rt_boundary *boundary, const rt_now *now, int64_t own_us, uint8_t *out) {
     rt_refusal refused;
     next_flight(boundary, out + 1);
-    refused = rt_load(boundary, out + 1, now);
+    refused = rt_load(boundary, out + 1, now, own_us);
     if (refused != NULL) return refuse(refused, out);
     boundary->flights++;
     out[0] = 0;
@@ -102,19 +141,17 @@ static uint32_t load(rt_boundary *boundary, const rt_now *now, uint8_t *out) {
 /* LOAD and PRESENT: about what was handed over in parts. */
 static uint32_t answer_staged(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
     rt_now now;
-    now.monotonic_us = take(left, 8);
-    now.utc_us = take(left, 8);
-    now.utc_error_us = take(left, 8);
+    const bool timed = take_now(left, &now);
     int64_t released = kind == RT_CALL_PRESENT ? take(left, 4) : 0;
     int64_t size = take(left, 4);
     bool sound = !left->short_ && left->at == left->end && released >= 0;
-    if (!sound || !is_time(now.monotonic_us) || !is_time(now.utc_us) || !is_time(now.utc_error_us)) return refuse("malformed", out);
+    if (!sound || !timed) return refuse("malformed", out);
     if (size != (kind == RT_CALL_LOAD ? boundary->bundle_size : boundary->document_size)) return refuse("malformed", out);
     if (rt_is_apart(now.monotonic_us, own_us)) return refuse("time-apart", out);
-    if (kind == RT_CALL_LOAD) return load(boundary, &now, out);
+    if (kind == RT_CALL_LOAD) return load(boundary, &now, own_us, out);
     if (!boundary->loaded) return refuse("not-loaded", out);
     out[0] = 0;
-    return 1 + rt_present(boundary, &now, released, out + 1);
+    return 1 + rt_present(boundary, &now, released, own_us, out + 1);
 }
 
 /* What is set of the vehicle before a flight, and put back after it. */
@@ -183,6 +220,7 @@ static uint32_t answer_ahead(rt_boundary *boundary, reader *left, int64_t own_us
 uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t *out) {
     reader left = {call.at, call.at + call.size, false};
     int64_t kind = take(&left, 1), now_us;
+    rt_now now;
     rt_refusal refused = "malformed";
     uint32_t size = 0;
     switch (kind) {
@@ -224,7 +262,7 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
             refused = NULL;
             break;
         }
-        if (kind == RT_CALL_OBSERVE) return observe(boundary, rest_of(&left), now_us, out);
+        if (kind == RT_CALL_OBSERVE) return observe(boundary, rest_of(&left), now_us, own_us, out);
         refused = rt_gate_seal(&boundary->executor.gate, rest_of(&left), now_us, out + 1, &size);
         break;
     case RT_CALL_BEGIN:
@@ -236,10 +274,15 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
         memcpy(out + 9, boundary->before, RT_DIGEST_BYTES);
         size = 8 + RT_DIGEST_BYTES;
         break;
-    case RT_CALL_STATEMENT:
-        size = rt_attested(boundary, take(&left, 1) != 0, out + 1);
+    case RT_CALL_STATEMENT: {
+        const bool final = take(&left, 1) != 0;
+        if (!take_now(&left, &now)) break;
+        size = rt_attested(boundary, &now, own_us, final, out + 1);
         refused = size > 0 ? NULL : "no-boundary-key";
         break;
+    }
+    case RT_CALL_TIME:
+        return left.end - left.at == 1 ? answer_time(boundary, take(&left, 1) != 0, own_us, out) : refuse("malformed", out);
     case RT_CALL_FLIGHT:
         next_flight(boundary, out + 1);
         size = RT_FLIGHT_BYTES;

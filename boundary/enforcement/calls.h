@@ -21,7 +21,7 @@ enum {
     RT_CALL_OBSERVE = 10, /* now (8), a frame as it came -> what was made of it (1): rt_heard */
     RT_CALL_SEAL = 11,    /* now (8), a frame -> the octets to send */
     RT_CALL_BEGIN = 12,     /* session (8), the digest of the one before (32): what is proposed -> those that it is */
-    RT_CALL_STATEMENT = 13, /* whether it is the last (1) -> a signed statement of the boundary's own evidence */
+    RT_CALL_STATEMENT = 13, /* whether it is the last (1), now (24) -> a signed statement of the boundary's own evidence */
     RT_CALL_DIGEST = 14,    /* -> the digest of that (32) */
     RT_CALL_PERMIT = 15,    /* now (8), what is to be set -> its preparation permit */
     RT_CALL_PREPARE = 16,   /* now (8), a preparation permit */
@@ -30,7 +30,9 @@ enum {
     RT_CALL_AHEAD = 19, /* now (8), kind (1), link (1), the standing permit (56), then each frame of the link: size (2), octets
                            -> the serial of the link's permit (8), then the signature of each frame (13) if the link has a key */
     RT_CALL_FLIGHT = 20, /* -> the id of the flight that the next bundle begins (16) */
-    RT_CALL_LOG = 21     /* the checkpoint that begins the log of the flight -> its signature by the log's key (64) */
+    RT_CALL_LOG = 21,    /* the checkpoint that begins the log of the flight -> its signature by the log's key (64) */
+    RT_CALL_TIME = 22    /* whether no more is waited for (1) -> where the time of day is from (1), now by it (24), and the number that
+                            the vehicle is to send back in TIMESYNC (8), 0 for none */
 };
 
 #define RT_MAX_PART 60000 /* octets */

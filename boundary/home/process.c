@@ -2,12 +2,16 @@
    given at its start: the trust root, the identity of the vehicle, the keys and one file of its own.
 
        rtshcua-boundary --socket FD --root FD --pin HEX --vehicle IDENTITY --kept FD [--link-key FD] [--boundary-key FD] [--log-key FD]
-                        [--user UID --group GID] [--settings FD] [--owed FD] [--paced]
-       rtshcua-boundary --socket FD --folder PATH [--keys PATH] [--paced]
+                        [--user UID --group GID] [--settings FD] [--owed FD] [--utc-error US] [--paced]
+       rtshcua-boundary --socket FD --folder PATH [--keys PATH] [--utc-error US] [--paced]
        rtshcua-boundary --socket FD --measures [--user UID --group GID]
 
    SETTINGS are the parameters that are set of the vehicle before a flight, OWED those that an earlier run set and did not put back,
    each as the body of a preparation (wire/preparation.h).
+
+   It holds to the time of day that the machine has, where the kernel says that this is synchronised; else to that of the vehicle, where
+   its link has a key; else, with `--utc-error`, to the machine's all the same, which is off by so many us at most. With `--paced` it
+   has no clock: time is simulated.
 
    With `--folder` somebody else listened, as systemd does, and another user connected. The address of the socket ends in the identity
    of the vehicle, and PATH/IDENTITY, which nobody else may look into, holds what the other options say: `root.trust`, `root.pin`,
@@ -37,6 +41,8 @@
 #include <sys/random.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/timex.h>
 #include <sys/types.h>
 #include <sys/un.h>
 #include <time.h>
@@ -60,6 +66,7 @@ typedef struct {
     int socket, root, kept, link_key, boundary_key, log_key, settings, owed;
     const char *vehicle, *pin, *folder, *keys;
     uint32_t user, group;
+    int64_t utc_error;
     int paced, measures;
 } options;
 
@@ -70,8 +77,17 @@ static int number(const char *text, uint32_t *value) {
     return *text != 0 && *end == 0 && found <= 0x7FFFFFFF;
 }
 
+/* A time in us, for which such an error may be stated. */
+static int number_of_us(const char *text, int64_t *value) {
+    char *end;
+    errno = 0;
+    const unsigned long long found = strtoull(text, &end, 10);
+    *value = (int64_t)found;
+    return *text != 0 && *end == 0 && errno == 0 && found <= RT_UTC_UNKNOWN_US;
+}
+
 static int read_options(int count, char **words, options *given) {
-    *given = (options){-1, -1, -1, -1, -1, -1, -1, -1, NULL, NULL, NULL, NULL, 0, 0, 0, 0};
+    *given = (options){-1, -1, -1, -1, -1, -1, -1, -1, NULL, NULL, NULL, NULL, 0, 0, -1, 0, 0};
     struct { const char *name; int *file; } files[] = {
         {"--socket", &given->socket}, {"--root", &given->root}, {"--kept", &given->kept},
         {"--link-key", &given->link_key}, {"--boundary-key", &given->boundary_key}, {"--log-key", &given->log_key},
@@ -104,6 +120,8 @@ static int read_options(int count, char **words, options *given) {
             known = 1, given->folder = said;
         else if (strcmp(name, "--keys") == 0)
             known = 1, given->keys = said;
+        else if (strcmp(name, "--utc-error") == 0)
+            known = number_of_us(said, &given->utc_error);
         else if (strcmp(name, "--user") == 0)
             known = number(said, &given->user);
         else if (strcmp(name, "--group") == 0)
@@ -281,6 +299,16 @@ static int64_t own_time_us(clockid_t clock) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
+/* The machine's clock, with the error that the kernel vouches for: `kernel_error_us` of adapters/utc.py. */
+static rt_now machine_now(void) {
+    struct timex asked;
+    rt_now now = {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), RT_UTC_UNKNOWN_US};
+    memset(&asked, 0, sizeof asked); /* no mode: nothing is set */
+    long state = syscall(SYS_adjtimex, &asked);
+    if (state >= 0 && state != TIME_ERROR && (asked.status & STA_UNSYNC) == 0 && asked.maxerror >= 0) now.utc_error_us = asked.maxerror;
+    return now;
+}
+
 /* The link's timestamps: our own so many ahead of what was used, each peer's as it was last heard (signing.py says why). */
 static void gather(rt_kept *kept, int64_t ahead) {
     rt_signed_link *link = &boundary.executor.gate.signer;
@@ -398,8 +426,7 @@ static int begin(options *given, rt_keys *keys, uint32_t *measures) {
     const rt_setup setup = {
         keys, kept, root_bytes, {pin, pinned},
         {(const uint8_t *)given->vehicle, (uint32_t)strlen(given->vehicle)}, given->link_key >= 0, given->boundary_key >= 0,
-        given->log_key >= 0, meant, left,
-        {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), 0}};
+        given->log_key >= 0, meant, left, machine_now(), given->utc_error};
     return rt_boundary_begin(&boundary, &setup) == NULL ? FINE : UNTRUSTED;
 }
 
@@ -437,6 +464,10 @@ int main(int count, char **words) {
             return give(kept, 1) && size == 0 ? FINE : IO;
         }
         int64_t now_us = own_time_us(CLOCK_MONOTONIC);
+        if (call[0] == RT_CALL_TIME && !given.paced && boundary.clock.source == RT_UTC_UNKNOWN) { /* it may be synchronised by now */
+            const rt_now machine = machine_now();
+            rt_clock_look(&boundary.clock, &machine);
+        }
         uint32_t answered = rt_answer(&boundary, (rt_bytes){call, (uint32_t)size}, given.paced ? -1 : now_us, result);
         /* what must outlive us is on the disk before anybody acts on the answer */
         const rt_gate *gate = &boundary.executor.gate;

@@ -23,14 +23,23 @@ static rt_refusal permit_of(rt_bytes sealed, rt_permit *permit) {
 }
 
 bool rt_give_back(rt_boundary *of) { return EITHER(); }
-rt_refusal rt_load(rt_boundary *of, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *now) { return refused(); }
-uint32_t rt_present(rt_boundary *of, const rt_now *now, int64_t released, uint8_t *receipt) { return written(receipt, 256); }
+rt_refusal rt_load(rt_boundary *of, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *now, int64_t own_us) { return refused(); }
+uint32_t rt_present(rt_boundary *of, const rt_now *now, int64_t released, int64_t own_us, uint8_t *receipt) { return written(receipt, 256); }
 bool rt_is_apart(int64_t now_us, int64_t own_us) { return EITHER(); }
+int64_t rt_own_now(const rt_boundary *of, const rt_now *named, int64_t own_us, rt_now *now) {
+    ANY(*now);
+    return WITHIN(0, 4);
+}
+void rt_clock_settle(rt_clock *clock, int64_t monotonic_us) {}
+bool rt_clock_asks(const rt_clock *clock, int64_t monotonic_us) { return EITHER(); }
+void rt_clock_challenge(rt_clock *clock, int64_t number, int64_t monotonic_us) {}
+int64_t rt_clock_number(const rt_clock *clock) { return WITHIN(0, INT64_MAX); }
+void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t monotonic_us) { read_all(frame); }
 bool rt_attest(rt_boundary *of, int64_t session, const uint8_t before[RT_DIGEST_BYTES]) {
     read_all((rt_bytes){before, RT_DIGEST_BYTES});
     return EITHER();
 }
-uint32_t rt_attested(rt_boundary *of, bool final, uint8_t *statement) { return written(statement, RT_MAX_STATEMENT); }
+uint32_t rt_attested(rt_boundary *of, const rt_now *now, int64_t own_us, bool final, uint8_t *statement) { return written(statement, RT_MAX_STATEMENT); }
 rt_refusal rt_begin_log(rt_boundary *of, rt_bytes checkpoint, uint8_t made[RT_SIGNATURE_BYTES]) {
     read_all(checkpoint);
     make(made, RT_SIGNATURE_BYTES);

@@ -13,6 +13,7 @@ static rt_chain chain;
 int main(void) {
     rt_decision decision;
     rt_receipt receipt;
+    rt_now now;
     rt_bytes any = {octets, SIZE(MOST)};
     ANY(octets);
     switch (Frama_C_interval(0, 4)) {
@@ -35,6 +36,7 @@ int main(void) {
         rt_chain_decline(&chain, any);
         rt_chain_stop(&chain, any);
         rt_chain_leave(&chain, any);
-        return (int)rt_sign_statement(&chain, octets, octets, WITHIN(INT64_MIN, INT64_MAX), octets, EITHER(), out);
+        ANY(now);
+        return (int)rt_sign_statement(&chain, octets, octets, WITHIN(INT64_MIN, INT64_MAX), octets, WITHIN(0, 4), &now, EITHER(), out);
     }
 }

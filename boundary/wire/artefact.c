@@ -11,7 +11,7 @@ const rt_artefact RT_CANCELLATION = RT_ARTEFACT("cancellation", 1);
 const rt_artefact RT_RECEIPT = RT_ARTEFACT("receipt", 2);
 const rt_artefact RT_REQUEST = RT_ARTEFACT("request", 2);
 const rt_artefact RT_RESPONSE = RT_ARTEFACT("response", 2);
-const rt_artefact RT_STATEMENT = RT_ARTEFACT("statement", 1);
+const rt_artefact RT_STATEMENT = RT_ARTEFACT("statement", 2);
 
 rt_refusal rt_unwrap(const rt_artefact *artefact, rt_bytes data, rt_cursor *body) {
     if (!rt_cbor_valid(data)) return "malformed";

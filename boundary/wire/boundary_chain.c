@@ -63,11 +63,11 @@ void rt_chain_leave(rt_chain *chain, rt_bytes frame) {
 }
 
 uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], const uint8_t *flight, int64_t session,
-                           const uint8_t before[RT_DIGEST_BYTES], bool final, uint8_t *out) {
+                           const uint8_t before[RT_DIGEST_BYTES], int64_t source, const rt_now *now, bool final, uint8_t *out) {
     static uint8_t payload[RT_MAX_STATEMENT]; /* the marks make most of it */
     uint8_t protected[64], public[RT_KEY_BYTES], kid[RT_KID_BYTES], signature[RT_SIGNATURE_BYTES];
     uint32_t at = rt_wrap(payload, &RT_STATEMENT);
-    at += rt_cbor_head(payload + at, RT_MAJOR_ARRAY, 14);
+    at += rt_cbor_head(payload + at, RT_MAJOR_ARRAY, 18);
     at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){flight, RT_FLIGHT_BYTES});
     at += rt_cbor_int(payload + at, session);
     at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){before, RT_DIGEST_BYTES});
@@ -81,6 +81,10 @@ uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], co
     at += rt_cbor_int(payload + at, chain->stopped);
     at += rt_cbor_int(payload + at, chain->ahead);
     at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){chain->aside, RT_DIGEST_BYTES});
+    at += rt_cbor_int(payload + at, source);
+    at += rt_cbor_int(payload + at, now->monotonic_us);
+    at += rt_cbor_int(payload + at, now->utc_us);
+    at += rt_cbor_int(payload + at, now->utc_error_us);
     payload[at++] = final ? 0xF5 : 0xF4;
     chain->marked = 0;
     rt_ed25519_public(seed, public);

@@ -4,6 +4,7 @@
 #define RT_WIRE_BOUNDARY_CHAIN_H
 
 #include "../crypto/crypto.h"
+#include "../model/flat.h"
 
 #define RT_MARK_BYTES 8
 #define RT_MOST_MARKS 128
@@ -36,8 +37,9 @@ void rt_chain_leave(rt_chain *chain, rt_bytes frame);
 
 #define RT_MAX_STATEMENT 2048
 
-/* Sign how far it got in a session, into `out` of RT_MAX_STATEMENT octets; how many there are. The marks begin anew. */
+/* Sign how far it got in a session, and what time it is by a clock from that source, into `out` of RT_MAX_STATEMENT octets; how
+   many there are. The marks begin anew. */
 uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], const uint8_t *flight, int64_t session,
-                           const uint8_t before[RT_DIGEST_BYTES], bool final, uint8_t *out);
+                           const uint8_t before[RT_DIGEST_BYTES], int64_t source, const rt_now *now, bool final, uint8_t *out);
 
 #endif

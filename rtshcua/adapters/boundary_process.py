@@ -253,6 +253,7 @@ class BoundaryProcess(_Connected):
     the parameters that are set of the vehicle before the flight, and `owed` those that earlier runs set and did not put
     back, each as the body of a preparation (`wire.preparation`). `user` is the user and group that it runs as, None for
     ours. `paced`: the caller's time is not the machine's, as on a simulated vehicle that is flown faster.
+    `utc_error_us` is what an operator says that the machine's time of day is off by at most, where the kernel does not.
 
     Raises BoundaryError, LinkKeyError, and OSError for files that cannot be opened.
     """
@@ -261,6 +262,7 @@ class BoundaryProcess(_Connected):
         self, root: bytes, pinned: bytes, vehicle: str, state: Path, *, link_key: Path | None = None,
         own_seed: bytes | None = None, log_seed: bytes | None = None, settings: bytes | None = None,
         owed: bytes | None = None, user: tuple[int, int] | None = None, paced: bool = False,
+        utc_error_us: int | None = None,
     ) -> None:  # fmt: skip
         path = program()
         if path is None:
@@ -270,6 +272,7 @@ class BoundaryProcess(_Connected):
         try:
             words = ["--socket", str(files[0]), "--pin", pinned.hex(), "--vehicle", vehicle]
             words += ["--paced"] if paced else []
+            words += [] if utc_error_us is None else ["--utc-error", str(utc_error_us)]
             given = {
                 "--root": root,
                 "--boundary-key": own_seed,

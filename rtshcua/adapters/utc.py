@@ -2,7 +2,8 @@
 
 In this order: the kernel, if it is synchronised (NTP, PTP); the vehicle's SYSTEM_TIME, which it has from its satellite
 receiver; a bound that the operator states. Else it is not known, and whatever asks for the time of day is unknown:
-freshness, approvals, the hours of zones. What is assumed of a clock that nobody keeps right decides nothing.
+freshness, approvals, the hours of zones. What is assumed of a clock that nobody keeps right decides nothing. Where the
+boundary is a process of its own, it alone knows the time of day, and this follows it.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,8 @@ from typing import Final
 from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
+from rtshcua.onboard.enforcement.isolated import OwnTime
+from rtshcua.wire.clock import Source
 
 #: the effect that says in the log where the bound came from
 CLOCK: Final = "clock"
@@ -21,6 +24,7 @@ CLOCK: Final = "clock"
 VEHICLE_US: Final = {"px4": 6_000_000, "ardupilot": 1_000_000}
 #: SYSTEM_TIME says when it was made in whole ms
 _STAMP_US: Final = 1_000
+_SIMULATED: Final = "simulated"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +91,7 @@ class UtcWatch:
     ) -> None:
         self._clock = clock
         self._stated_us = stated_us
+        self._own: Callable[[bool], OwnTime | None] | None = None
         kernel = (kernel_us or kernel_error_us)()
         self.bound = UtcBound("unknown", UTC_UNKNOWN_US)
         if kernel is not None:
@@ -96,8 +101,34 @@ class UtcWatch:
     def simulated(cls, clock: LinkClock) -> "UtcWatch":
         """Of a vehicle that this machine simulates: it has this machine's time of day."""
         watch = cls(clock, kernel_us=lambda: None)
-        watch._take("simulated", UTC_ERROR_US)
+        watch._take(_SIMULATED, UTC_ERROR_US)
         return watch
+
+    def follow(self, own: Callable[[bool], OwnTime | None]) -> None:
+        """From now on the time of day is that of a boundary that decides by a clock of its own, and by no other; it is
+        asked whether no more is waited for. One that has no clock of its own changes nothing.
+        """
+        said = own(False)
+        if said is None or said.source is Source.SHARED:
+            return
+        self._own = own
+        if self.bound.source != _SIMULATED:
+            self._clock.bound_utc(UTC_UNKNOWN_US)
+            self.bound = UtcBound("unknown", UTC_UNKNOWN_US)
+            self._follow(said)
+        elif (said := own(True)) is not None and said.source is not Source.UNKNOWN:  # as the boundary was told
+            self._take(_SIMULATED, said.now.utc_error_us, said.now.utc_us - said.now.monotonic_us)
+
+    def question(self) -> int:
+        """The number that the boundary wants back from the vehicle, before it takes its time; 0 for none."""
+        said = None if self._own is None or not self.waits else self._own(False)
+        return 0 if said is None else said.number
+
+    def _follow(self, said: OwnTime | None) -> bool:
+        if said is None or said.source is Source.UNKNOWN:
+            return False
+        self._take(said.source.name.lower(), said.now.utc_error_us, said.now.utc_us - said.now.monotonic_us)
+        return True
 
     @property
     def waits(self) -> bool:
@@ -106,6 +137,8 @@ class UtcWatch:
 
     def look(self, told: SourceTime, flavour: str, now_us: int) -> bool:
         """Take the vehicle's own time, if it is needed and told. Whether it was taken."""
+        if self._own is not None:
+            return self.waits and self._follow(self._own(False))
         utc = told.utc(now_us) if self.waits else None
         if utc is None:
             return False
@@ -115,7 +148,10 @@ class UtcWatch:
 
     def settle(self) -> None:
         """The vehicle's time was waited for long enough: what the operator states holds, if it was stated."""
-        if self.waits and self._stated_us is not None:
+        if self._own is not None:
+            if self.waits and self._stated_us is not None:
+                self._follow(self._own(True))
+        elif self.waits and self._stated_us is not None:
             self._take("operator", self._stated_us)
 
     def _take(self, source: str, error_us: int, ahead_us: int | None = None) -> None:

@@ -12,7 +12,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands
-from rtshcua.onboard.enforcement.isolated import Caller, IsolatedExecutor, IsolatedGate
+from rtshcua.onboard.enforcement.isolated import Caller, IsolatedExecutor, IsolatedGate, OwnTime
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed
 from rtshcua.wire import cose
@@ -41,6 +41,7 @@ def started(
     vehicle: str, signed_root: bytes, state: Path, *,
     link_key: Path | None, own_key: SigningKey | None, log_key: SigningKey,
     user: tuple[int, int] | None, paced: bool, settings: Mapping[str, int], owed: Mapping[str, Owed],
+    utc_error_us: int | None = None,
 ) -> BoundaryProcess:  # fmt: skip
     """A boundary that is started for one run, until `close`. Raises `Refused`, and OSError."""
     pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
@@ -50,6 +51,7 @@ def started(
             own_seed=None if own_key is None else own_key.private.private_bytes_raw(),
             log_seed=log_key.private.private_bytes_raw(),
             settings=_listed({name: Owed(0, value) for name, value in settings.items()}), owed=_listed(owed),
+            utc_error_us=utc_error_us,
         )  # fmt: skip
     except BoundaryError as error:
         raise _refused(error) from None
@@ -89,6 +91,11 @@ class Apart:
         self.expect()
         assert isinstance(answer, bytes)
         return answer
+
+    def time(self, settle: bool) -> OwnTime | None:
+        """What its own clock says; None of one that is gone. `settle`: no more is waited for."""
+        answer = self._caller.time(settle=settle)
+        return None if isinstance(answer, Refusal) else answer
 
     def sign_log(self, checkpoint: bytes) -> bytes | Refusal:
         """The signature of the log's key under the checkpoint that begins the log of the flight, once."""

@@ -10,7 +10,7 @@ from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP, ListeningBoundary
-from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
+from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.owed import OwedParameters
@@ -38,7 +38,7 @@ from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.live.telling import Answering
 from rtshcua.cli.log_signer import LogSigner
-from rtshcua.cli.meeting import UTC_NOTE, await_utc, meet, unopened
+from rtshcua.cli.meeting import APART_UTC_NOTE, UTC_NOTE, await_utc, meet, unopened
 from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, obeys, still_flies
 from rtshcua.cli.past import Past
 from rtshcua.cli.qualified import record_of, unqualified
@@ -185,6 +185,7 @@ def _launch(order: Launch) -> ExitCode:
             begun = _begin(order, bundle, loaded, trust, log_key, past, debts.left, clock, interrupts, slack, stack)
             bundle, loaded, trust, (own_key, keyless), apart, absent, transport, agents = begun
             root, signed_root = trust.root, trust.signed
+            _follow(utc, apart)
             signing = _sign(order, loaded, clock, apart)
             stack.callback(signing.close)
             _hear(order, loaded, signing)
@@ -201,7 +202,7 @@ def _launch(order: Launch) -> ExitCode:
                 if order.incidents is not None:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
             agents = agents or _agents(order, loaded, stack)
-            vehicle.driver.asks_utc = utc.waits
+            vehicle.driver.asks_utc, vehicle.driver.asks_back = utc.waits, utc.question
             hurried = not order.dry_run and _broke_off(past) and _may_have_flown(order, loaded)
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
@@ -248,7 +249,7 @@ def _launch(order: Launch) -> ExitCode:
                 raise refusal
             if not resumed:
                 mark_opened(order.state, loaded, clock, flight)
-            unsure = [UTC_NOTE] if utc.waits else []
+            unsure = _utc_notes(utc, apart)
             unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
             alone = "" if absent is None else f"{_why(absent)}; it is brought down without a boundary of its own"
             alone += _UNVERIFIABLE if alone and order.boundary_socket is not None else ""
@@ -385,6 +386,7 @@ def _apart(
             loaded.vehicle, trust.signed, order.state, link_key=order.signing_key, own_key=own_key,
             log_key=log_key.key(),
             user=order.boundary_user, paced=order.speed != 1, settings=order.settings, owed=owed,
+            utc_error_us=UTC_ERROR_US if order.link is None else order.utc_error_us,
         )  # fmt: skip
     except LinkKeyError as error:
         raise _of_link_key(error) from None
@@ -764,6 +766,19 @@ def _utc(order: Launch, clock: LinkClock) -> UtcWatch:
     if order.link is not None and order.speed == 1:
         return UtcWatch(clock, order.utc_error_us)
     return UtcWatch.simulated(clock)
+
+
+def _follow(utc: UtcWatch, apart: Apart | None) -> None:
+    """What a boundary that runs apart takes for the time of day counts here too."""
+    if apart is not None:
+        utc.follow(apart.time)
+
+
+def _utc_notes(utc: UtcWatch, apart: Apart | None) -> list[str]:
+    """That the time of day is not known, and what helps."""
+    if not utc.waits:
+        return []
+    return [UTC_NOTE if apart is None or apart.process.link_name is not None else APART_UTC_NOTE]
 
 
 def _lapsed(bundle: bytes, signed_root: bytes, log_key: bytes, loaded: Loaded, clock: LinkClock) -> Refused | None:

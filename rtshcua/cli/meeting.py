@@ -47,6 +47,11 @@ UTC_NOTE: Final = (
     "nothing tells how far this machine's time of day is off: until the vehicle does, steps are deferred "
     "(`--utc-error 500ms` states it)"
 )
+#: the same where the boundary is a process of its own, and the link has no key
+APART_UTC_NOTE: Final = (
+    "this machine's clock is not synchronised, and the boundary takes the vehicle's time over a link with a key alone: "
+    "steps are deferred (`--signing-key`, or `--utc-error 500ms` states how far it is off)"
+)
 
 _POLL_S = 0.05
 _HELP: Final = "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try"

@@ -20,10 +20,11 @@ from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
 from rtshcua.evidence.recovery import RECOVERED
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.model.flat.limits import MAX_MONITORS, MAX_SLOTS
-from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now, State
 from rtshcua.model.outcome import WIRE_REASONS, Outcome
 from rtshcua.wire import boundary_chain, receipt, request, statement
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS, Tag
+from rtshcua.wire.clock import DRIFT_US, Source, bears_out
 from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.preparation import MOST, ParameterWrite
@@ -69,6 +70,28 @@ class _Pending(NamedTuple):
     digest: bytes
 
 
+class _Claimed(NamedTuple):
+    """What a record claims of the time of day: how far UTC is ahead of monotonic time, and the error of that."""
+
+    record: int
+    offset: int
+    at_us: int
+    ahead_us: int
+    error_us: int
+
+    def at(self, own: Now, since_us: int) -> Now:
+        """The same at a moment of the boundary's, some time after the one before: errors grow alike in both clocks."""
+        grown_us = max(0, own.monotonic_us - max(self.at_us, since_us)) * DRIFT_US // 1_000_000
+        return Now(own.monotonic_us, own.monotonic_us + self.ahead_us, self.error_us + grown_us)
+
+
+def _claimed(record: AnyRecord, offset: int) -> _Claimed | None:
+    """None where it says that nobody knows."""
+    if record.utc_error_us >= UTC_UNKNOWN_US:
+        return None
+    return _Claimed(record.seq, offset, record.at_us, record.utc_us - record.at_us, record.utc_error_us)
+
+
 class BoundaryEvidence:
     """Takes the records of one log after its genesis, in their order; what it keeps is bounded by an epoch."""
 
@@ -89,6 +112,8 @@ class BoundaryEvidence:
         #: the last statement
         self.last: Statement | None = None
         self._stated = False  # in this epoch
+        #: the first record since the last statement that claims to know the time of day
+        self._claim: _Claimed | None = _claimed(genesis, 0)
         self._recovered = False
         self._lost: tuple[int, int] | None = None  # the record that says so, and where it begins
         #: by the number of a record of a gap, that of the statement which says that nothing is missing before
@@ -101,12 +126,14 @@ class BoundaryEvidence:
         """
         if not self.asked:
             return None
+        self._claim = self._claim or _claimed(record, offset)
         if self._lost is not None:
             return _AFTER.at(record.seq, offset) if _is_made(record) else None
         if isinstance(record, Effect) and record.event == BOUNDARY_LOST:
             return self._lose(record, offset)
         if isinstance(record, Effect) and record.event == BOUNDARY:
-            found = self._stated_by(record)
+            before_us = None if self.last is None else self.last.at_us
+            found = self._stated_by(record) or self._timed(record, offset, before_us)
             if self._gap is not None:
                 self.gaps[self._gap], self._gap = record.seq, None
             return found.at(record.seq, offset) if isinstance(found, Flaw) else found
@@ -117,7 +144,8 @@ class BoundaryEvidence:
         flaw = None
         if isinstance(record, Seal | Close):
             flaw = self._sealed(record)
-        self._recovered = self._recovered or isinstance(record, Recover)
+        if isinstance(record, Recover):
+            self._recovered, self._claim = True, None  # monotonic time begins anew
         self._stated, self._gap = False, None
         return None if flaw is None else flaw.at(record.seq, offset)
 
@@ -214,6 +242,24 @@ class BoundaryEvidence:
             return Flaw("boundary/differs", text, self.digest.hex(), said.digest.hex())
         return None
 
+    def _timed(self, record: Effect, offset: int, before_us: int | None) -> Finding | None:
+        """Hold the time of day that the records claim, since the last statement, made at a monotonic time, against the
+        boundary's own clock.
+        """
+        assert self.last is not None
+        own, claims = self.last.now, (self._claim, _claimed(record, offset))
+        self._claim = None
+        since_us = own.monotonic_us if before_us is None else before_us
+        for claim in claims:
+            # where the boundary knows of none, it decides nothing by one that is named
+            if claim is not None and not bears_out(own, claim.at(own, since_us)):
+                text = "it claims another time of day than the boundary has by its own clock"
+                known = self.last.source != Source.UNKNOWN
+                expected = f"{own.utc_us} us, to {own.utc_error_us} us" if known else "none: its clock is not known"
+                found = f"{own.monotonic_us + claim.ahead_us} us, to {claim.error_us} us"
+                return Flaw("boundary/clock", text, found, expected).at(claim.record, claim.offset)
+        return None
+
     def _sealed(self, record: Seal | Close) -> Flaw | None:
         last = self.last
         if isinstance(record, Close) and self._recovered and record.ending == RECOVERED:
@@ -250,8 +296,9 @@ class BoundaryEvidence:
             f"{last.stopped} were refused, {last.repeated} answers repeated one and {last.declined} documents were "
             "refused"
         )
-        proven = (Claim("boundary", text),)
-        ahead = _ahead(last.ahead)
+        proven, unproven = _of_clock(Source(last.source))
+        proven = (Claim("boundary", text), *proven)
+        ahead = (*_ahead(last.ahead), *unproven)
         if last.final and self._lost is None:
             return proven, ahead
         if self._lost is not None:
@@ -261,6 +308,17 @@ class BoundaryEvidence:
             )
             return proven, (Claim("boundary", text), *ahead)
         return proven, (Claim("boundary", "what the boundary made after its last signature: it broke off"), *ahead)
+
+
+def _of_clock(source: Source) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
+    """What is proven of the time of day, and what is not."""
+    if source is Source.SHARED:
+        text = "the time of day by a clock of the boundary's own: it had that of the run"
+        return (), (Claim("clock", text),)
+    if source is Source.UNKNOWN:
+        return (Claim("clock", "the boundary's own clock knew no time of day, and the records claim none"),), ()
+    text = f"the time of day of the records is that of the boundary's own clock, by the {source.name.lower()}"
+    return (Claim("clock", text),), ()
 
 
 def _ahead(count: int) -> tuple[Claim, ...]:

@@ -43,8 +43,8 @@ _LATE_US, _LATE_RECORDS = EPOCH_US + EPOCH_US // _LATE, EPOCH_RECORDS + EPOCH_RE
 class Attest(Protocol):
     """What signs how far the boundary's own evidence got; None where there is nobody to sign."""
 
-    def __call__(self, *, final: bool = False) -> bytes | None:
-        """The signed statement; after a `final` one there is no more."""
+    def __call__(self, now: Now, *, final: bool = False) -> bytes | None:
+        """The signed statement at a moment; after a `final` one there is no more."""
         ...
 
 
@@ -242,7 +242,7 @@ class Recorder:
 
     def attested(self, now: Now, *, final: bool = False) -> tuple[bytes, ...]:
         """The line of what the boundary signs now; none where it signs nothing."""
-        return self._stated(now, self.attest(final=final))
+        return self._stated(now, self.attest(now, final=final))
 
     def _stated(self, now: Now, statement: bytes | None) -> tuple[bytes, ...]:
         if statement is None:
@@ -263,7 +263,7 @@ class Recorder:
         first.
         """
         gap = self._gap(now)
-        statement = self.attest(final=False)
+        statement = self.attest(now, final=False)
         if statement is None and not tells_loss and not self.told_loss and self.lost() is not None:
             return gap
         return (*gap, *self._stated(now, statement), self.seal(now))
@@ -349,7 +349,7 @@ class Recorder:
         return self._head.seal(record, self._origin, self._public, certify)
 
 
-def nobody(*, final: bool = False) -> None:
+def nobody(now: Now, *, final: bool = False) -> None:
     """Signs nothing."""
 
 

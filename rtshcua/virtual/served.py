@@ -11,13 +11,14 @@ from types import MappingProxyType
 from typing import Final
 
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.model.flat.situation import Now
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement import isolated as calls
 from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import BoundaryKey, Command
+from rtshcua.wire.clock import Source
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.permit import SIZE, open_permit
@@ -32,6 +33,7 @@ _NOT_LOADED: Final = Refusal("not-loaded", "no bundle is in force")
 _TIME, _PART, _LOADED, _SHOWN = Struct(">q"), Struct(">BI"), Struct(">qqqI"), Struct(">qqqII")
 _STANDING, _PERMITTED, _BEGIN, _TOKEN = Struct(">qBb"), Struct(">BhhQq"), Struct(">Q32s"), Struct(">Q")
 _FRAME: Final = Struct(">H")
+_STATED, _TOLD = Struct(">?qqq"), Struct(">BqqqQ")
 
 
 class Served:
@@ -73,6 +75,8 @@ class Served:
                 return bytes(1)
             case calls.SEAL:
                 return self.gate.seal(rest[_TIME.size :], *_TIME.unpack_from(rest))
+            case calls.TIME:  # its time is told to it
+                return _TOLD.pack(Source.SHARED, 0, 0, UTC_UNKNOWN_US, 0)
             case calls.FLIGHT:
                 return bytes(FLIGHT_BYTES)
             case calls.STANDS:
@@ -95,7 +99,8 @@ class Served:
                 loaded.attestation.begin(BoundaryKey(self._key, *_BEGIN.unpack(rest)))
                 return rest
             case calls.STATEMENT:
-                said = loaded.attestation.statement(final=rest == b"\1")
+                final, *now = _STATED.unpack(rest)
+                said = loaded.attestation.statement(Now(*now), final=final)
                 return Refusal("no-boundary-key", "nothing is signed") if said is None else said
             case calls.DIGEST:
                 return loaded.attestation.digest

@@ -41,6 +41,8 @@ class Status(IntEnum):
     MALFORMED = 1  # the octets are no request
     UNKNOWN_STEP = 2  # the bundle has no such step or link
     NOT_CURRENT = 3  # the bundle has it, but its turn has not come
+    CLOCK_APART = 4  # the time of day that it names is not the boundary's own
+    CLOCK_UNKNOWN = 5  # it names one, and the boundary knows of none
 
 
 _DECIDED: Final = Status.DECIDED  # an enumeration's attributes are slow to find

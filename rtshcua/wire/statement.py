@@ -8,8 +8,10 @@ from typing import Final
 
 import msgspec
 
+from rtshcua.model.flat.situation import Now
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS
+from rtshcua.wire.clock import Source
 from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
@@ -30,7 +32,9 @@ class Statement(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fie
     one before, 32 zero octets where there is none. `digest` is the one after `count` entries, and `marks` the first
     octets of the digests after each entry since the statement before, of the first `MOST_MARKS` of them. `left` is the
     digest of so many `frames` that carry out commands, `aside` that of what is only counted: `repeated` answers,
-    `declined` documents, `stopped` frames, and frames that were signed `ahead`. After a `final` one there is no more.
+    `declined` documents, `stopped` frames, and frames that were signed `ahead`. `source` (`wire.clock`) says where the
+    boundary has the time of day from, and the next three what it was at the statement: monotonic, UTC, and how far that
+    may be off, in us. After a `final` one there is no more.
     """
 
     flight: bytes
@@ -46,7 +50,16 @@ class Statement(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fie
     stopped: int
     ahead: int
     aside: bytes
+    source: int
+    at_us: int
+    utc_us: int
+    utc_error_us: int
     final: bool
+
+    @property
+    def now(self) -> Now:
+        """The moment of the statement, by the boundary's own clock."""
+        return Now(self.at_us, self.utc_us, self.utc_error_us)
 
 
 def counted(said: Statement) -> tuple[int, int, int, int, int]:
@@ -76,10 +89,10 @@ def open_statement(data: bytes, keys: Mapping[bytes, VerificationKey]) -> Statem
 def _read(payload: bytes) -> Statement:
     said = artefact.unpack(names.STATEMENT, payload, Statement, StatementError, "statement of a boundary")
     digests = {len(said.before), len(said.digest), len(said.left), len(said.aside)}
-    numbers = (said.session, said.count, *counted(said))
+    numbers = (said.session, said.count, *counted(said), said.at_us, said.utc_us, said.utc_error_us)
     fits = len(said.marks) % MARK_BYTES == 0 and len(said.marks) <= MARK_BYTES * MOST_MARKS
     if len(said.flight) != FLIGHT_BYTES or digests != {DIGEST_BYTES} or not fits:
         raise StatementError("malformed", "a flight, a digest or a mark of it is not as long as they are")
-    if min(numbers) < 0:
-        raise StatementError("malformed", "a number of it is below 0")
+    if min(numbers) < 0 or not 0 <= said.source <= max(Source):
+        raise StatementError("malformed", "a number of it is out of range")
     return said

@@ -83,7 +83,7 @@ def begin(
     refused = boundary.rt_test_boundary_begin(
         signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, link_key, OWN_KEY, LOG_KEY,
         listed({name: Owed(0, value) for name, value in settings.items()}), listed(owed),
-        (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us),
+        (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us), ctypes.c_int64(-1),
     )  # fmt: skip
     same("the trust root", None, refused)
     return Caller(library(boundary), signs=link_key is not None)
@@ -140,9 +140,9 @@ class BothAttestations:
         self._here.begin(key)
         self._there.begin(key)
 
-    def statement(self, *, final: bool = False) -> bytes | None:
-        one: bytes | None = self._here.statement(final=final)
-        same("a statement", one, self._there.statement(final=final))
+    def statement(self, now: Now, *, final: bool = False) -> bytes | None:
+        one: bytes | None = self._here.statement(now, final=final)
+        same("a statement", one, self._there.statement(now, final=final))
         return one
 
 

@@ -102,7 +102,7 @@ def walk(boundary: ctypes.CDLL, seed: int) -> int:
             number = ctypes.c_float.from_buffer_copy(ctypes.c_uint32(value)).value
             frame = m.MAVLink_param_set_message(1, 1, name.encode(), number, of.choice((9, 9, 6)))
             made.executor.frames.seal(ADAPTER.pack(frame), now_us)
-    made.attestation.statement(final=True)  # the evidence of both is the same
+    made.attestation.statement(START, final=True)  # the evidence of both is the same
     for permit in permits:
         assert isinstance(made.executor.prepare(permit, now_us), Refusal)
     return begun

@@ -352,7 +352,7 @@ class Together:
 
     def state(self) -> None:
         final = self.random.random() < 0.02
-        one, other = (each.attestation.statement(final=final) for each in (self.here, self.there))
+        one, other = (each.attestation.statement(START, final=final) for each in (self.here, self.there))
         same("a statement", one, other)
         if final and one is not None:
             self._keep_session()

@@ -10,7 +10,8 @@ from rtshcua.model.outcome import WIRE_REASONS
 
 _REASONS = [reason.value for reason in WIRE_REASONS]  # the page refers to their list
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
-_STATUSES = {"malformed": 1, "unknown_step": 2, "not_current": 3}
+_STATUSES = {"malformed": 1, "unknown_step": 2, "not_current": 3, "clock_apart": 4, "clock_unknown": 5}
+_UNKNOWN = 1 << 52
 _DOCUMENTS = {"approval": 1, "recall": 2, "replacement": 3, "cancellation": 4}
 _CONTENT = "application/vnd.rtshcua.statement+cbor"
 _MOST_MARKS = 128
@@ -103,12 +104,17 @@ class Boundary:
         self.last: list | None = None
         self.marks: dict[int, bytes] = {}
         self.stated = self.recovered = self.lost = False
+        self.claim = genesis if genesis["utc_error_us"] < _UNKNOWN else None  # the first since the statement before
 
     def line(self, record: dict) -> None:
         """One record more, behind the genesis. Raises `Disputed`."""
         kind = record["type"]
         if not self.keys:
             return
+        if self.claim is None and record["utc_error_us"] < _UNKNOWN:
+            self.claim = record
+        if kind == "recover":
+            self.claim = None
         if self.lost:
             self._alone(record)
         elif kind == "effect" and record["event"] == "boundary-lost":
@@ -154,19 +160,36 @@ class Boundary:
         if self.last[3] == number and self.last[4] != digest:
             raise Disputed("another digest")
 
+    def _time(self, record: dict, clock: list[int]) -> None:
+        """The time of day that is claimed, against that of a statement: `at_us`, `utc_us`, `utc_error_us`."""
+        at, utc, error = clock
+        since = at if self.last is None else self.last[14]
+        for claim in (self.claim, record):
+            if claim is None or claim["utc_error_us"] >= _UNKNOWN:
+                continue
+            off = abs(claim["utc_us"] - claim["at_us"] - (utc - at))
+            allowed = claim["utc_error_us"] + max(0, at - max(claim["at_us"], since)) * 500 // 1_000_000 + 2_000_000
+            if error >= _UNKNOWN or off + error > allowed:
+                raise Disputed("a time of day that is not the boundary's")
+        self.claim = None
+
     def _statement(self, record: dict) -> None:
         try:
             envelope = unbase64(record["detail"])
             payload = payload_of(envelope, "boundary", _CONTENT, self.keys) if len(envelope) <= 2048 else b""
             name, version, said = whole(payload)
             flight, session, before, count, digest, marks, *counted, final = said
+            counted, clock = counted[:7], counted[7:]
         except (Malformed, Untrusted, ValueError, TypeError) as error:
             raise Disputed("not a statement of the boundary") from error
-        numbers = [session, count, *(each for each in counted if type(each) is int)]
+        numbers = [session, count, *clock, *(each for each in counted if type(each) is int)]
         octets = [before, digest, *(each for each in counted if type(each) is bytes)]
         shape = [type(each) for each in counted] == [int, bytes, int, int, int, int, bytes] and type(marks) is bytes
-        if (name, version) != ("rtshcua/statement", 1) or not shape or type(final) is not bool:
-            raise Disputed("not a statement of version 1")
+        shape = shape and [type(each) for each in clock] == [int] * 4
+        if (name, version) != ("rtshcua/statement", 2) or not shape or type(final) is not bool:
+            raise Disputed("not a statement of version 2")
+        if type(clock[0]) is not int or not 0 <= clock[0] <= 4:
+            raise Disputed("no source of a time of day")
         if any(type(each) is not int or not 0 <= each < 1 << 63 for each in numbers):
             raise Disputed("a number out of range")
         if any(type(each) is not bytes or len(each) != 32 for each in octets):
@@ -182,12 +205,13 @@ class Boundary:
             earlier = self.last[3]
             same = [session, before] == self.last[1:3]
             grows = count >= earlier and all(
-                now >= then for now, then in zip(counted, self.last[6:-1], strict=True) if type(now) is int
+                now >= then for now, then in zip(counted, self.last[6:13], strict=True) if type(now) is int
             )
             if not same or not grows or self.last[-1] or len(self.digests) - 1 < earlier:
                 raise Disputed("it does not follow the statement before")
         if len(marks) != 8 * min(count - earlier, _MOST_MARKS) or len(self.digests) - 1 > count:
             raise Disputed("it does not mark its entries, or is behind the records")
+        self._time(record, clock[1:])
         self.last, self.stated = said, True
         self.marks = {earlier + 1 + n: marks[8 * n : 8 * n + 8] for n in range(len(marks) // 8)}
         for number in range(earlier + 1, len(self.digests)):

@@ -1,6 +1,6 @@
 """A vehicle without its socket: frames in, events and frames out, time given; for real and virtual time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
@@ -118,6 +118,8 @@ class Driver:
         self.other_kind: str | None = None
         #: the vehicle's own time of day is wanted: it is asked for until it is told
         self.asks_utc = False
+        #: and the number that a boundary wants it to send back before, 0 for none
+        self.asks_back: Callable[[], int] = int
         #: what else it is asked on the ground, and told of each of its messages
         self.asks: GroundQuestions | None = None
         self._asked_utc_us = 0
@@ -274,6 +276,8 @@ class Driver:
             send += self._ask_time(now_us)
         if self.asks_utc and now_us - self._asked_utc_us >= EACH_US:
             self._asked_utc_us = now_us
+            number = self.asks_back()
+            send += [messages.time_sync(number)] if number else []
             send.append(messages.request(self.system, "SYSTEM_TIME"))
         if now_us >= self.stream_requests.due_us:
             send += self.stream_requests.due(self.system, now_us)

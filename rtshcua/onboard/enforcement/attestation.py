@@ -5,9 +5,11 @@ In mode `software` the key is in this process, and so in reach of whoever takes 
 
 from hashlib import sha256
 
+from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire import boundary_chain
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
+from rtshcua.wire.clock import Source
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.statement import Statement, sign
 
@@ -41,9 +43,10 @@ class Attestation:
         self._chain.add(Tag.BEGIN, payload)
         return key.session
 
-    def statement(self, *, final: bool = False) -> bytes | None:
-        """A signed statement, None without a key or after the final one. After that nothing is dispatched, and no frame
-        leaves that moves the vehicle: else an end could be signed before the end.
+    def statement(self, now: Now, *, final: bool = False) -> bytes | None:
+        """A signed statement at a moment, None without a key or after the final one. After that nothing is dispatched,
+        and no frame leaves that moves the vehicle: else an end could be signed before the end. The boundary shares the
+        runtime's clock.
         """
         key, chain = self._key, self._chain
         if key is None or self._signs is None or chain.over:
@@ -51,6 +54,7 @@ class Attestation:
         chain.over = final
         said = Statement(
             self._flight, key.session, key.before, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
-            chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside, final,
+            chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside,
+            Source.SHARED, now.monotonic_us, now.utc_us, now.utc_error_us, final,
         )  # fmt: skip
         return sign(said, self._signs)

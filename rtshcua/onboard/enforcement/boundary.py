@@ -18,11 +18,12 @@ from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Rule
-from rtshcua.model.flat.situation import Context, Now
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Context, Now
 from rtshcua.model.outcome import REASON_NUMBERS, Outcome
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.wire import boundary_chain, response
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
+from rtshcua.wire.clock import bears_out
 from rtshcua.wire.permit import AGAIN, LINK_VALID_US, Permit, seal
 from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
@@ -35,6 +36,11 @@ _Numbers = dict[Clause | Rule | Airspace, int]
 _ALLOW: Final = Outcome.ALLOW  # an enumeration's attributes are slow to find
 _tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
 _REASONS: Final = {reason.value: number for reason, number in REASON_NUMBERS.items()}  # by slug: its own hash is slow
+
+
+def _disowned(own: Now) -> Status:
+    """Why a time of day is not decided by that the boundary's own clock does not bear out."""
+    return Status.CLOCK_UNKNOWN if own.utc_error_us >= UTC_UNKNOWN_US else Status.CLOCK_APART
 
 
 class PermitIssuer:
@@ -87,9 +93,9 @@ class SoftwareBoundary:
         self._now_us = 0  # of the last request: time does not go back
         self._ahead_us: int | None = None  # UTC less monotonic time, as it was first told
 
-    def enforce(self, request: bytes) -> bytes:
+    def enforce(self, request: bytes, own: Now | None = None) -> bytes:
         """Decide one request. Hostile bytes get a refusal; nothing is raised, and of them nothing but their digest is
-        remembered.
+        remembered. `own` is the present moment by the boundary's own clock; without one the caller's time counts.
         """
         asked = decode(request, self._slots, self._monitors)
         if isinstance(asked, Refusal):
@@ -98,6 +104,8 @@ class SoftwareBoundary:
         # a release to come would move the deadline
         if not self._now_us <= now_us >= asked.released_us or not self._keeps_time(asked.now):
             return self._refuse(Status.MALFORMED, request)
+        if own is not None and not bears_out(own, asked.now):
+            return self._refuse(_disowned(own), request)
         self._now_us = now_us
         ref = _tuple(Ref, (asked.kind, asked.step, asked.link))
         refused = self._session.refusal(ref)
@@ -134,13 +142,13 @@ class SoftwareBoundary:
         """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick."""
         self._in_force.consider(document, now)
 
-    def present(self, document: bytes, now: Now, released: int) -> bytes:
+    def present(self, document: bytes, now: Now, released: int, own: Now | None = None) -> bytes:
         """Take in a signed document, if it is to be trusted. Nothing is raised, and nothing else is changed.
 
-        `released` steps were released, as far as the runtime knows; more were if they were asked for here. An answer
-        about a step whose id is used up comes too late.
+        `own` is as for `enforce`. `released` steps were released, as far as the runtime knows; more were if they were
+        asked for here. An answer about a step whose id is used up comes too late.
         """
-        receipt = self._taken(document, now, released)
+        receipt = self._taken(document, now, released, own)
         if receipt.accepted:
             payload = boundary_chain.document(receipt.kind, receipt.step, now, sha256(document).digest())
             evidence = self._chain.add(Tag.DOCUMENT, payload)
@@ -148,11 +156,14 @@ class SoftwareBoundary:
             evidence = self._chain.decline(document)
         return encode_receipt(replace(receipt, evidence=evidence))
 
-    def _taken(self, document: bytes, now: Now, released: int) -> Receipt:
+    def _taken(self, document: bytes, now: Now, released: int, own: Now | None) -> Receipt:
         if now.monotonic_us < self._now_us:
             return Receipt(UNKNOWN, "time-went-back", "it came before the last request")
         if not self._keeps_time(now):
             return Receipt(UNKNOWN, "time-of-day-set", "its time of day is not that of requests before")
+        if own is not None and not bears_out(own, now):
+            slug = _disowned(own).name.lower().replace("_", "-")
+            return Receipt(UNKNOWN, slug, "the boundary's own clock does not bear its time of day out")
         self._now_us = now.monotonic_us
         receipt = self._session.take(document, now, released)
         self._commands.called_off = self._in_force.called_off

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from struct import Struct
 from struct import error as struct_error
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NamedTuple
 
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
@@ -23,6 +23,7 @@ from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
 from rtshcua.onboard.enforcement.executor import Ahead, Commands
 from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire.boundary_chain import START
+from rtshcua.wire.clock import Source
 from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
 from rtshcua.wire.preparation import MAC_BYTES, Preparation
 from rtshcua.wire.preparation import decode as decode_preparation
@@ -36,8 +37,8 @@ Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
-    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG,
-) = range(1, 22)  # fmt: skip
+    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG, TIME,
+) = range(1, 23)  # fmt: skip
 #: octets of a bundle or a document that go in one call
 MAX_PART: Final = 60_000
 
@@ -48,9 +49,20 @@ _SHOWN: Final = Struct(">qqqII")
 _STANDING: Final = Struct(">qBb")
 _PERMITTED: Final = Struct(">BhhQq")
 _SERIAL_BYTES: Final = 8
+_TOLD: Final = Struct(">BqqqQ")
 
 #: what an answer that makes no sense, or none at all, comes to
 LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or answers what makes no sense")
+
+
+class OwnTime(NamedTuple):
+    """What the boundary's own clock says: where it has the time of day from, and the moment; and the number that it
+    wants back from the vehicle in TIMESYNC, 0 for none.
+    """
+
+    source: Source
+    now: Now
+    number: int
 
 
 def _known(*modules: object) -> dict[str, Refusal]:
@@ -128,6 +140,17 @@ class Caller:
     def sign_log(self, checkpoint: bytes) -> bytes | Refusal:
         """The signature of the log's key under the checkpoint that begins the log of the flight, once."""
         return self(LOG, checkpoint)
+
+    def time(self, *, settle: bool = False) -> OwnTime | Refusal:
+        """What its own clock says. `settle`: no more is waited for, so what an operator stated holds."""
+        answer = self(TIME, bytes([settle]))
+        if isinstance(answer, Refusal):
+            return answer
+        try:
+            source, monotonic_us, utc_us, error_us, number = _TOLD.unpack(answer)
+            return OwnTime(Source(source), Now(monotonic_us, utc_us, error_us), number)
+        except (struct_error, ValueError):
+            return self.lose()
 
     def flight(self) -> bytes | Refusal:
         """The id of the flight that the next bundle begins."""
@@ -375,7 +398,7 @@ class IsolatedAttestation:
         self._begun = not isinstance(answer, Refusal)
         return None if isinstance(answer, Refusal) else int.from_bytes(answer[:8], "big")
 
-    def statement(self, *, final: bool = False) -> bytes | None:
-        """A signed statement, None without a key or after the final one."""
-        answer = self._caller(STATEMENT, bytes([final])) if self._begun else LOST
+    def statement(self, now: Now, *, final: bool = False) -> bytes | None:
+        """A signed statement, None without a key or after the final one. `now` counts where it has no own clock."""
+        answer = self._caller(STATEMENT, bytes([final]), _NOW.pack(*_times(now))) if self._begun else LOST
         return None if isinstance(answer, Refusal) else answer

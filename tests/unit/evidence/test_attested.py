@@ -17,6 +17,7 @@ from rtshcua.evidence.rooted import rooted
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import boundary_chain, statement
 from rtshcua.wire.boundary_chain import MOST_MARKS, START, BoundaryChain, Tag
+from rtshcua.wire.clock import Source
 from rtshcua.wire.preparation import ParameterWrite
 from rtshcua.wire.statement import Statement
 from rtshcua.wire.trust import TrustRoot
@@ -63,7 +64,8 @@ class Log:
         chain = self.chain
         said = Statement(
             bytes.fromhex(GENESIS.boot), 1, START, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
-            chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside, final=False,
+            chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside,
+            Source.SHARED, EFFECT.at_us, EFFECT.utc_us, EFFECT.utc_error_us, final=False,
         )  # fmt: skip
         return replace(said, **fields)
 

@@ -165,7 +165,7 @@ def test_what_the_boundary_signs_stands_before_each_seal_and_the_close(
     begin()
     (seal,) = recorder.sealing(now(1))
     assert (json.loads(seal)["type"], recorder.attested(now(1))) == ("seal", ())
-    recorder.attest = lambda *, final=False: b"last" if final else b"so far"
+    recorder.attest = lambda now, *, final=False: b"last" if final else b"so far"
     statement, seal = map(json.loads, recorder.sealing(now(2)))
     assert (statement["event"], statement["detail"], seal["type"]) == ("boundary", "c28gZmFy", "seal")
     statement, close = map(json.loads, recorder.closing(now(3), ending="completed", tlog=None))

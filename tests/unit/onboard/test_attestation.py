@@ -16,6 +16,7 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire import boundary_chain, preparation, response
 from rtshcua.wire.boundary_chain import Tag, following
+from rtshcua.wire.clock import Source
 from rtshcua.wire.preparation import Preparation
 from rtshcua.wire.receipt import decode
 from rtshcua.wire.statement import Statement, open_statement
@@ -28,7 +29,7 @@ NOW_US = START.monotonic_us
 
 
 def said(of: Loaded, *, final: bool = False) -> Statement:
-    signed = of.attestation.statement(final=final)
+    signed = of.attestation.statement(START, final=final)
     assert signed is not None
     return open_statement(signed, KEYS)
 
@@ -36,7 +37,7 @@ def said(of: Loaded, *, final: bool = False) -> Statement:
 def test_without_a_key_nothing_is_signed_and_everything_is_chained() -> None:
     of = loaded()
     of.attestation.begin(None)
-    assert of.attestation.statement() is None
+    assert of.attestation.statement(START) is None
     before = of.attestation.digest
     allowed(of)
     assert of.attestation.digest != before
@@ -45,7 +46,7 @@ def test_without_a_key_nothing_is_signed_and_everything_is_chained() -> None:
 def test_a_session_has_one_beginning_and_one_end() -> None:
     of = try_load(sealed())
     assert isinstance(of, Loaded)
-    assert of.attestation.statement() is None
+    assert of.attestation.statement(START) is None
     before = of.attestation.digest
     of.attestation.begin(KEY)
     with pytest.raises(RuntimeError, match="begun already"):
@@ -55,8 +56,9 @@ def test_a_session_has_one_beginning_and_one_end() -> None:
     first = said(of)
     assert (first.session, first.before, first.digest) == (7, b"k" * 32, following(before, Tag.BEGIN, payload))
     assert not first.final
+    assert (first.source, first.now) == (Source.SHARED, START)
     assert said(of, final=True).final
-    assert of.attestation.statement() is None
+    assert of.attestation.statement(START) is None
 
 
 def test_an_answer_carries_the_digest_with_itself_in_it() -> None:

@@ -111,7 +111,7 @@ def test_records_of_a_reflex_are_made_when_they_are_taken_and_not_before(journal
 def test_a_seal_at_which_the_boundary_is_found_lost_comes_behind_the_record_of_that(journal: Journal) -> None:
     """Else an epoch would end without its statement, and nothing would say why."""
     lost: list[str] = []
-    journal.recorder.attest = lambda **_: None
+    journal.recorder.attest = lambda now, **_: None
     journal.recorder.lost = lambda: lost[0] if lost else None
     lost.append("it is gone")
     assert [kind for kind, _ in told(journal, EPOCH_US)] == ["boundary-lost", "seal"]

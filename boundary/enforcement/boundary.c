@@ -37,6 +37,7 @@ static bool is_dated(rt_boundary *boundary, int64_t own_us) {
     return boundary->dated;
 }
 
+/* Where its caller's clock is the only one. */
 static bool keeps_time(rt_boundary *boundary, const rt_now *now) {
     if (now->utc_error_us > CLOCKS_PART_US)
         return true; /* by a clock that does not know the time, nothing is granted anyway */
@@ -129,7 +130,7 @@ uint32_t rt_enforce(rt_boundary *boundary, rt_bytes request, int64_t own_us, uin
         return undecided(boundary, RT_MALFORMED, request, out);
     int64_t now_us = asked->now.monotonic_us;
     /* a release to come would move the deadline */
-    if (now_us < boundary->now_us || now_us < asked->released_us || !keeps_time(boundary, &asked->now))
+    if (now_us < boundary->now_us || now_us < asked->released_us || (own_us < 0 && !keeps_time(boundary, &asked->now)))
         return undecided(boundary, RT_MALFORMED, request, out);
     uint8_t clock = disowned(boundary, &asked->now, own_us);
     if (clock != RT_DECIDED) return undecided(boundary, clock, request, out);
@@ -241,7 +242,7 @@ uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, 
     const rt_bytes document = {boundary->documents[boundary->document_count], boundary->document_size};
     if (now->monotonic_us < boundary->now_us) {
         taken.refused = "time-went-back";
-    } else if (!keeps_time(boundary, now)) {
+    } else if (own_us < 0 && !keeps_time(boundary, now)) {
         taken.refused = "time-of-day-set";
     } else if (clock != RT_DECIDED) {
         taken.refused = clock == RT_CLOCK_UNKNOWN ? "clock-unknown" : "clock-apart";

@@ -75,8 +75,10 @@ class Held:
         self.issued = issued or issued_us()
         self.root, signed = case.root(self.issued)
         pin = case.KEYS[next(iter(case.KEYS))].kid
+        more = {"utc_error_us": 1_000} | more
         self.process = BoundaryProcess(signed, pin, VEHICLE, state, user=user, **more)
         self.caller = Caller(self.process.call)
+        self.caller.time(settle=True)
         self.bundle = shipped("short", self.issued)
 
     def load(self) -> Loaded:
@@ -313,7 +315,7 @@ def test_the_longest_statement_comes_whole(tmp_path: Path) -> None:
     held.loaded.attestation.begin(BoundaryKey(case.BOUNDARY_KEY, 1, bytes(32)))
     for _ in range(2 * MOST_MARKS):
         held.caller(DISPATCH, struct.pack(">q", now().monotonic_us), bytes(56))
-    signed = held.loaded.attestation.statement()
+    signed = held.loaded.attestation.statement(now())
     held.process.close()
     assert signed is not None
     kid = case.BOUNDARY_KEY.kid

@@ -60,12 +60,16 @@ def same(what: str, one: Any, other: Any) -> None:
         raise Differs(f"{what}: {one!r} in Python, {other!r} in C")
 
 
-def library(boundary: ctypes.CDLL) -> Callable[[bytes], bytes]:
-    """The boundary in C, called in this process; the caller's time is the only one."""
+def _none() -> int:
+    return -1
+
+
+def library(boundary: ctypes.CDLL, own_us: Callable[[], int] = _none) -> Callable[[bytes], bytes]:
+    """The boundary in C, called in this process; the caller's time is the only one, or it has a monotonic clock."""
     out = ctypes.create_string_buffer(2_048)
 
     def call(octets: bytes) -> bytes:
-        size = boundary.rt_test_boundary_call(octets, len(octets), ctypes.c_int64(-1), out)
+        size = boundary.rt_test_boundary_call(octets, len(octets), ctypes.c_int64(own_us()), out)
         return out.raw[:size]
 
     return call
@@ -74,7 +78,7 @@ def library(boundary: ctypes.CDLL) -> Callable[[bytes], bytes]:
 def begin(
     boundary: ctypes.CDLL, signed_root: bytes, pin: bytes, vehicle: str, session_key: bytes, now: Now,
     settings: Mapping[str, int] = MappingProxyType({}), owed: Mapping[str, Owed] = MappingProxyType({}),
-    link_key: bytes | None = None,
+    link_key: bytes | None = None, stated_us: int = -1, own_us: Callable[[], int] = _none,
 ) -> Caller:  # fmt: skip
     """A boundary in C that begins, nothing opened on its vehicle before."""
     boundary.rt_test_boundary_begin.restype = ctypes.c_char_p
@@ -83,10 +87,10 @@ def begin(
     refused = boundary.rt_test_boundary_begin(
         signed_root, len(signed_root), pin, len(pin), name, len(name), session_key, link_key, OWN_KEY, LOG_KEY,
         listed({name: Owed(0, value) for name, value in settings.items()}), listed(owed),
-        (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us), ctypes.c_int64(-1),
+        (ctypes.c_int64 * 3)(now.monotonic_us, now.utc_us, now.utc_error_us), ctypes.c_int64(stated_us),
     )  # fmt: skip
     same("the trust root", None, refused)
-    return Caller(library(boundary), signs=link_key is not None)
+    return Caller(library(boundary, own_us), signs=link_key is not None)
 
 
 class _Write(ctypes.Structure):

@@ -119,10 +119,10 @@ def seal(of: Mission, under: Policy | None = None, keys: Mapping[Duty, SigningKe
     )
 
 
-def root(issued_at_us: int = flat.ISSUED, *, boundary: bool = False) -> tuple[TrustRoot, bytes]:
+def root(issued_at_us: int = flat.ISSUED, *, boundary: bool = False, life_us: int = YEAR_US) -> tuple[TrustRoot, bytes]:
     """The development root that names the keys, and its signed bytes; with `boundary` that of the boundary too."""
     made = TrustRoot(
-        version=1, development=True, issued_at_us=issued_at_us, expires_at_us=issued_at_us + YEAR_US,
+        version=1, development=True, issued_at_us=issued_at_us, expires_at_us=issued_at_us + life_us,
         keys=tuple(
             key.verification(
                 roles={Duty.MISSION: (ANY,), Duty.APPROVAL: ("supervisor",)}.get(duty, ()),

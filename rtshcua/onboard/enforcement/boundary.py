@@ -38,11 +38,6 @@ _tuple = tuple.__new__  # the constructor that a named tuple is given is a funct
 _REASONS: Final = {reason.value: number for reason, number in REASON_NUMBERS.items()}  # by slug: its own hash is slow
 
 
-def _disowned(own: Now) -> Status:
-    """Why a time of day is not decided by that the boundary's own clock does not bear out."""
-    return Status.CLOCK_UNKNOWN if own.utc_error_us >= UTC_UNKNOWN_US else Status.CLOCK_APART
-
-
 class PermitIssuer:
     """Seals permits under the session key, each with a serial of its own. Only a boundary has one."""
 
@@ -102,10 +97,11 @@ class SoftwareBoundary:
             return self._refuse(Status.MALFORMED, request)
         now_us = asked.now.monotonic_us
         # a release to come would move the deadline
-        if not self._now_us <= now_us >= asked.released_us or not self._keeps_time(asked.now):
+        if not self._now_us <= now_us >= asked.released_us:
             return self._refuse(Status.MALFORMED, request)
-        if own is not None and not bears_out(own, asked.now):
-            return self._refuse(_disowned(own), request)
+        disowned = self._disowned(asked.now, own)
+        if disowned is not None:
+            return self._refuse(disowned, request)
         self._now_us = now_us
         ref = _tuple(Ref, (asked.kind, asked.step, asked.link))
         refused = self._session.refusal(ref)
@@ -159,10 +155,11 @@ class SoftwareBoundary:
     def _taken(self, document: bytes, now: Now, released: int, own: Now | None) -> Receipt:
         if now.monotonic_us < self._now_us:
             return Receipt(UNKNOWN, "time-went-back", "it came before the last request")
-        if not self._keeps_time(now):
+        disowned = self._disowned(now, own)
+        if disowned is Status.MALFORMED:
             return Receipt(UNKNOWN, "time-of-day-set", "its time of day is not that of requests before")
-        if own is not None and not bears_out(own, now):
-            slug = _disowned(own).name.lower().replace("_", "-")
+        if disowned is not None:
+            slug = disowned.name.lower().replace("_", "-")
             return Receipt(UNKNOWN, slug, "the boundary's own clock does not bear its time of day out")
         self._now_us = now.monotonic_us
         receipt = self._session.take(document, now, released)
@@ -171,6 +168,14 @@ class SoftwareBoundary:
             self._commands.replace(self._in_force.bundle.mission)
             self._own = self._own_numbers()
         return receipt
+
+    def _disowned(self, named: Now, own: Now | None) -> Status | None:
+        """Why a time of day that is named is not decided by; None where it is."""
+        if own is None:
+            return None if self._keeps_time(named) else Status.MALFORMED
+        if bears_out(own, named):
+            return None
+        return Status.CLOCK_UNKNOWN if own.utc_error_us >= UTC_UNKNOWN_US else Status.CLOCK_APART
 
     def _keeps_time(self, now: Now) -> bool:
         """Whether UTC went on as monotonic time did. What has expired would be good again for whoever sets it back, and

@@ -99,8 +99,8 @@ def log() -> Log:
 def test_a_true_flight_has_nothing_against_it() -> None:
     evidence = BoundaryEvidence(ROOT, GENESIS)
     assert [evidence.check(record, 0) for record in RECORDS[1:]] == [None] * (len(RECORDS) - 1)
-    (proven,), unproven = evidence.claims()
-    assert (proven.slug, unproven) == ("boundary", ())
+    (proven,), (clock,) = evidence.claims()
+    assert (proven.slug, clock.slug) == ("boundary", "clock")
 
 
 def test_a_root_without_a_boundary_key_asks_for_nothing() -> None:
@@ -118,7 +118,7 @@ def test_entries_of_a_true_log(log: Log) -> None:
     ] * 6
     assert log.evidence.claims()[1][0].text.endswith("it broke off")
     assert [log.refuse(), log.state(final=True), log.take(CLOSE)] == [None] * 3
-    assert log.evidence.claims()[1] == ()
+    assert [claim.slug for claim in log.evidence.claims()[1]] == ["clock"]
 
 
 def test_the_first_statement_behind_a_gap_and_before_the_seal_vouches_for_it(log: Log) -> None:
@@ -263,7 +263,7 @@ def test_that_frames_were_signed_ahead_is_told_and_not_that_they_were_sent() -> 
     proven, unproven = log.evidence.claims()
     assert "0 frames passed it" in proven[0].text
     text = "whether any of the 3 frames were sent that the boundary signed ahead: it does not see that"
-    assert unproven == (Claim("boundary", text),)
+    assert unproven[0] == Claim("boundary", text)
 
 
 def test_another_beginning() -> None:

@@ -140,7 +140,7 @@ def test_what_the_boundary_made_before_it_was_lost_is_recorded_before_the_loss(j
 def test_a_late_seal_that_finds_the_boundary_lost_waits_for_what_was_told_before(journal: Journal) -> None:
     lost: list[str] = []
 
-    def attest(*, final: bool) -> None:
+    def attest(now: Now, *, final: bool) -> None:
         lost.append("it is gone")
 
     late = EPOCH_US + EPOCH_US // 5

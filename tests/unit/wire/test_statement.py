@@ -15,7 +15,8 @@ from virtual.rows import rows
 KEY = SigningKey.from_seed(b"b" * 32, duty=Duty.BOUNDARY)
 KEYS = {KEY.kid: KEY.verification()}
 SAID = Statement(
-    b"f" * 16, 1, bytes(32), 2, b"d" * 32, b"m" * 16, 3, b"l" * 32, 4, 5, 6, 7, b"a" * 32, Source.KERNEL, 8, 9, 10, final=False
+    b"f" * 16, 1, bytes(32), 2, b"d" * 32, b"m" * 16, 3, b"l" * 32, 4, 5, 6, 7, b"a" * 32,
+    Source.KERNEL, 8, 9, 10, final=False,
 )  # fmt: skip
 
 

@@ -15,6 +15,8 @@ from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.enforcement.isolated import OwnTime
+from rtshcua.wire.clock import Source
 
 NOW_US = 1_800_000_000_000_000
 
@@ -137,3 +139,67 @@ def test_where_utc_is_unknown_so_is_whatever_asks_for_it() -> None:
     unknown = Now(flat.NOW.monotonic_us, flat.NOW.utc_us, UTC_UNKNOWN_US)
     decision = decide(step, flat.state({}), policy, context, unknown)
     assert (decision.outcome, decision.reason) == (Outcome.DEFER, Reason.CLOCK_UNCERTAIN)
+
+
+# ---------------------------------------------------------------- a boundary with a clock of its own
+
+
+class Own:
+    """A boundary's clock, which knows nothing yet."""
+
+    def __init__(self, source: Source = Source.UNKNOWN, number: int = 0) -> None:
+        self.source, self.number = source, number
+        self.stated: Source | None = None
+        self.gone = False
+
+    def __call__(self, settle: bool) -> OwnTime | None:
+        if settle and self.source is Source.UNKNOWN and self.stated is not None:
+            self.source = self.stated
+        error_us = UTC_UNKNOWN_US if self.source is Source.UNKNOWN else 700
+        return None if self.gone else OwnTime(self.source, Now(1_000, 1_800_000_000_000_000, error_us), self.number)
+
+
+def test_the_boundarys_clock_counts_and_no_other() -> None:
+    clock, own = SystemClock(), Own()
+    watch = UtcWatch(clock, 500, kernel_us=lambda: 3)
+    watch.follow(own)
+    assert (watch.bound.source, watch.waits) == ("unknown", True)
+    assert clock.now().utc_error_us == UTC_UNKNOWN_US
+    assert not watch.look(SourceTime(), "px4", 0)
+    own.source = Source.VEHICLE
+    assert watch.look(SourceTime(), "px4", 0)
+    assert (watch.bound.source, watch.bound.error_us) == ("vehicle", 700)
+    now = clock.now()
+    assert now.utc_us - now.monotonic_us == 1_800_000_000_000_000 - 1_000
+    assert not watch.look(SourceTime(), "px4", 0)
+
+
+def test_what_the_operator_stated_holds_once_no_more_is_waited_for() -> None:
+    own = Own(number=77)
+    own.stated = Source.OPERATOR
+    watch = UtcWatch(SystemClock(), 500, kernel_us=lambda: None)
+    assert watch.question() == 0
+    watch.follow(own)
+    assert watch.question() == 77
+    watch.settle()
+    assert (watch.bound.source, watch.question()) == ("operator", 0)
+    unstated = UtcWatch(SystemClock(), None, kernel_us=lambda: None)
+    unstated.follow(Own())
+    unstated.settle()
+    assert unstated.waits
+
+
+def test_a_boundary_without_a_clock_or_that_is_gone_changes_nothing() -> None:
+    for own in (Own(Source.SHARED), Own()):
+        own.gone = own.source is Source.UNKNOWN
+        watch = UtcWatch(SystemClock(), None, kernel_us=lambda: 3)
+        watch.follow(own)
+        assert watch.bound.source == "kernel"
+
+
+def test_of_a_simulated_vehicle_the_boundary_has_this_machines_time() -> None:
+    own = Own()
+    own.stated = Source.OPERATOR
+    watch = UtcWatch.simulated(SystemClock())
+    watch.follow(own)
+    assert (watch.bound.source, watch.bound.error_us) == ("simulated", 700)

@@ -14,7 +14,7 @@ from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.rooted import rooted
-from rtshcua.model.flat.situation import Now
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.wire import boundary_chain, statement
 from rtshcua.wire.boundary_chain import MOST_MARKS, START, BoundaryChain, Tag
 from rtshcua.wire.clock import Source
@@ -348,3 +348,63 @@ def test_records_of_which_no_entry_can_be_made(record: Decision | Effect) -> Non
     log = Log()
     log.state()
     assert log.take(record) == ("boundary/record", 2)
+
+
+# ---------------------------------------------------------------- the time of day
+
+AT_US, UTC_US, S = EFFECT.at_us, EFFECT.utc_us, 1_000_000
+
+
+def told(log: Log, of: Source = Source.KERNEL, **own: int) -> tuple[str, int] | None:
+    """A statement, by another clock than that of the record."""
+    return log.state(**({"source": of, "utc_error_us": 1_000} | own))
+
+
+def test_a_record_may_be_two_seconds_and_both_errors_off() -> None:
+    error_us = EFFECT.utc_error_us
+    assert told(Log(), utc_us=UTC_US + 2 * S + error_us - 1_000) is None
+    for own in ({"utc_us": UTC_US + 2 * S + error_us}, {"utc_us": UTC_US - 2 * S - error_us}):
+        # the genesis claims it first
+        assert told(Log(), **own) == ("boundary/clock", 0)
+
+
+def test_a_runtime_that_stalls_before_a_statement_is_accused_of_nothing() -> None:
+    """By how far the two are apart, which a stall does not change; and what errors grew in it counts for both."""
+    log = Log()
+    assert told(log) is None
+    assert told(log, at_us=AT_US + 7_200 * S, utc_us=UTC_US + 7_200 * S, utc_error_us=1_000 + 3_600_000) is None
+    assert told(Log(), at_us=AT_US + 60 * S, utc_us=UTC_US + 60 * S) is None
+
+
+def test_the_first_record_that_claims_another_time_is_named(log: Log) -> None:
+    unknown = {"utc_error_us": UTC_UNKNOWN_US}
+    assert log.take(effect("noted", **unknown)) is None
+    assert log.take(effect("noted", utc_us=UTC_US + 5 * S)) is None
+    assert log.take(effect("noted", **unknown)) is None
+    assert told(log) == ("boundary/clock", 3)
+
+
+def test_none_may_be_claimed_where_the_boundary_knows_none() -> None:
+    said = Log().statement(source=Source.UNKNOWN, utc_error_us=UTC_UNKNOWN_US)
+    assert Log().take(stated(said)) == ("boundary/clock", 0)
+    quiet = Log(replace(GENESIS, utc_error_us=UTC_UNKNOWN_US))
+    assert quiet.take(replace(stated(said), utc_error_us=UTC_UNKNOWN_US)) is None
+    (_, clock), _ = quiet.evidence.claims()
+    assert "knew no time of day" in clock.text
+
+
+def test_a_clock_of_its_own_is_told_of(log: Log) -> None:
+    assert told(log) is None
+    (_, clock), unproven = log.evidence.claims()
+    assert clock == Claim("clock", "the time of day of the records is that of the boundary's own clock, by the kernel")
+    assert [claim.slug for claim in unproven] == ["boundary"]
+
+
+def test_after_a_recovery_claims_begin_anew(log: Log) -> None:
+    assert log.take(effect("noted", utc_us=UTC_US + 5 * S)) is None
+    assert log.state() is not None
+    other = Log()
+    assert other.state() is None
+    assert other.take(effect("noted", utc_us=UTC_US + 5 * S)) is None
+    assert other.take(RECOVER) is None
+    assert told(other) is None

@@ -47,7 +47,7 @@ class Signs:
         self.gone: str | None = None
         self._signs = signs
 
-    def attest(self, *, final: bool = False) -> bytes | None:
+    def attest(self, now: Now, *, final: bool = False) -> bytes | None:
         return b"statement" if self._signs and self.gone is None else None
 
     def lost(self) -> str | None:

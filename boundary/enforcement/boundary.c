@@ -208,7 +208,7 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
         uint8_t name[RT_DIGEST_BYTES];
         policy_name(boundary, name);
         const int64_t earliest_us = now->utc_us - now->utc_error_us; /* nothing is forgotten that may not have expired yet */
-        refused = rt_may_open(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version, earliest_us);
+        refused = rt_may_open(boundary->kept, bundle->mission_digest, session->in_force.issued_at_us, boundary->expires_us, name, bundle->policy.version, earliest_us);
         if (refused != NULL) return refused;
         rt_open_mission(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version, earliest_us);
         boundary->to_keep = true;

@@ -5,7 +5,7 @@
 
 #include "mavlink/signing.h"
 
-#define RT_MOST_OPENED 4095
+#define RT_MOST_OPENED 4094
 #define RT_MOST_POLICIES 256
 
 typedef struct {
@@ -25,7 +25,9 @@ typedef struct {
     int64_t floor_us;  /* what expires by then was opened, or might have been */
     uint64_t opened_count, version_count, stream_count;
     rt_opened opened[RT_MOST_OPENED];
-    uint8_t session_digest[RT_DIGEST_BYTES]; /* of its own evidence, and the number of that session; where layout 1 has one mission more */
+    uint8_t instance[RT_KEY_BYTES]; /* whose it is: the boundary's public key, zeros where any may have it. Layout 2 has one mission more */
+    int64_t since_us;               /* missions that were issued before are not opened: there may have been another file then; UTC */
+    uint8_t session_digest[RT_DIGEST_BYTES]; /* of its own evidence, and the number of that session. Layout 1 has one mission more */
     int64_t session;
     rt_version versions[RT_MOST_POLICIES];
     int64_t link_timestamp;
@@ -33,11 +35,27 @@ typedef struct {
     uint8_t check[RT_DIGEST_BYTES]; /* SHA-256 over all before */
 } rt_kept;
 
-#define RT_KEPT_LAYOUT 0x7274736863756102ULL
+/* What stands in the file before anything was kept: an empty one is damage, not a first start. */
+typedef struct {
+    uint64_t layout; /* RT_KEPT_FIRST */
+    int64_t since_us;
+    uint8_t instance[RT_KEY_BYTES];
+    uint8_t check[RT_DIGEST_BYTES]; /* SHA-256 over all before */
+} rt_kept_first;
+
+#define RT_KEPT_FIRST 0x7274736863756100ULL
+#define RT_KEPT_LAYOUT 0x7274736863756103ULL
+#define RT_KEPT_LAYOUT_2 0x7274736863756102ULL
 #define RT_KEPT_LAYOUT_1 0x7274736863756101ULL
 
-/* Whether a mission may be opened at a time (UTC); NULL, "replayed", "old-policy", or "full" where no more can be remembered. */
-rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t expires_us,
+/* Begin with a file that says that nothing was kept. False for one that does not say so. */
+bool rt_first_kept(const rt_kept_first *first, rt_kept *kept);
+/* Whether it is that of a boundary with this public key, NULL for none. */
+bool rt_kept_is_of(const rt_kept *kept, const uint8_t *public_key);
+
+/* Whether a mission may be opened at a time (UTC), that was issued at another; NULL, "replayed", "before-provisioned", "old-policy", or
+   "full" where no more can be remembered. */
+rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES], int64_t issued_us, int64_t expires_us,
                        const uint8_t policy[RT_DIGEST_BYTES], int64_t version, int64_t now_us);
 bool rt_was_opened(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]);
 /* Open it: what expired by `now_us` (UTC) is pruned, so that the floor rises. */
@@ -48,6 +66,6 @@ void rt_forget_mission(rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES]);
 
 void rt_seal_kept(rt_kept *kept);            /* before it is written */
 bool rt_is_whole_kept(const rt_kept *kept); /* after it was read: in this layout, or the one before, */
-void rt_upgrade_kept(rt_kept *kept);        /* which becomes this one */
+void rt_upgrade_kept(rt_kept *kept);        /* or two before, which becomes this one */
 
 #endif

@@ -182,9 +182,9 @@ static int open_folder(options *given) {
     if (given->root < 0 || given->log_key < 0 || pinned < 0) return MISSING;
     (void)read_all(pinned, pin, sizeof pin - 1);
     given->pin = pin;
-    given->kept = openat(folder, "kept", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
+    given->kept = openat(folder, "kept", O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (given->kept < 0 && errno == ENOENT) return DAMAGED; /* who provisioned the folder made it */
     if (given->kept < 0 || fstat(given->kept, &found) != 0 || !S_ISREG(found.st_mode)) return IO;
-    if (found.st_size == 0 && fsync(folder) != 0) return IO; /* its name too outlives a power failure */
     return flock(given->kept, LOCK_EX | LOCK_NB) == 0 ? FINE : errno == EWOULDBLOCK ? IN_USE : IO;
 }
 
@@ -272,9 +272,10 @@ static int start_keeper(int file) {
     return 1;
 }
 
-/* The newer slot that is whole. An empty file is as if nothing had been kept; one that says nothing is damage. */
+/* The newer slot that is whole; or a beginning, where the file says that nothing was kept, or was half written after that. */
 static rt_kept *read_kept(int file) {
-    ssize_t size = 0;
+    off_t size = 0;
+    rt_kept_first first;
     rt_kept *newer = NULL;
     for (int slot = 0; slot < 2; slot++) {
         ssize_t got = pread(file, &slots[slot], sizeof *slots, (off_t)(slot * (off_t)sizeof *slots));
@@ -282,12 +283,9 @@ static rt_kept *read_kept(int file) {
         if (got == (ssize_t)sizeof *slots && rt_is_whole_kept(&slots[slot]) && (newer == NULL || slots[slot].turn > newer->turn))
             newer = &slots[slot];
     }
-    if (newer == NULL && size == 0) {
-        memset(&slots[0], 0, sizeof *slots);
-        slots[0].floor_us = -1;
-        slots[0].layout = RT_KEPT_LAYOUT;
+    if (newer == NULL && size < (off_t)(2 * sizeof *slots) && pread(file, &first, sizeof first, 0) == (ssize_t)sizeof first &&
+        rt_first_kept(&first, &slots[0]))
         newer = &slots[0];
-    }
     if (newer != NULL) rt_upgrade_kept(newer);
     return newer;
 }
@@ -407,12 +405,12 @@ static int begin(options *given, rt_keys *keys, uint32_t *measures) {
     const rt_preparation *meant, *left;
     if (!read_writes(given->settings, &settings, &meant) || !read_writes(given->owed, &owed, &left))
         return USAGE;
+    uint8_t own[RT_KEY_BYTES];
+    if (given->boundary_key >= 0) rt_ed25519_public(keys->boundary, own);
+    if (!rt_kept_is_of(kept, given->boundary_key >= 0 ? own : NULL)) return DAMAGED;
     kept->restarts++;
-    const int first = kept->turn == 0;
-    if (!write_kept(given->kept, kept)) {
-        if (first) (void)!ftruncate(given->kept, 0); /* half of what was never written would count as damage */
+    if (!write_kept(given->kept, kept))
         return IO;
-    }
     if (!start_keeper(given->kept))
         return IO;
     if (given->folder != NULL && rt_is_anothers(given->socket))

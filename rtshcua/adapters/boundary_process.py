@@ -13,13 +13,15 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from enum import IntFlag
+from errno import ENOSPC
+from hashlib import sha256
 from pathlib import Path
 from struct import Struct
 from typing import Final
 from urllib.parse import quote
 
 from rtshcua.adapters.files.signing import no_link_key, open_link_key
-from rtshcua.adapters.store.writing import PRIVATE_FOLDER, lock, make_folder, sync_folder
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, lock, make_folder
 from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 from rtshcua.wire.keys import PUBLIC_BYTES
 
@@ -41,6 +43,8 @@ _ASKING_S: Final = 0.1
 _CALL, _ANSWER = MAX_PART + 64, 2_112
 #: after the measures, as `process.c` has it: the name of the link's key, two public halves, whether its clock counts
 _SAID: Final = Struct(f"8s{PUBLIC_BYTES}s{PUBLIC_BYTES}s?")
+_FIRST: Final = Struct(f"<Qq{PUBLIC_BYTES}s")
+_FIRST_LAYOUT: Final = 0x7274736863756100
 _GREETING: Final = 4 + _SAID.size
 
 #: what is told where there is no program, and nobody asked for one
@@ -88,7 +92,9 @@ _ENDED_HELP: Final = {
     _MISSING: "its user's folder, mode 0700, of the vehicle's identity: `root.trust`, `root.pin`, `log.seed`; no links",
     _IO: "`chown -R` its folder to its user, or make room",
 }
-_DAMAGED_HELP: Final = "docs/flying/isolation.md says what to do"
+_DAMAGED_HELP: Final = (
+    "docs/flying/isolation.md says what to do; a file that is empty, missing or of another boundary key is damage too"
+)
 
 
 class BoundaryError(Exception):
@@ -109,6 +115,15 @@ def program() -> Path | None:
 def kept_file(state: Path, vehicle: str) -> Path:
     """What a boundary keeps of a vehicle, in a state folder."""
     return state / "boundary" / f"vehicle-{quote(vehicle, safe='')}.kept"
+
+
+def first_kept(since_us: int = 0, public: bytes = bytes(PUBLIC_BYTES)) -> bytes:
+    """What stands in the file of a boundary before it keeps anything (`rt_kept_first` of boundary/enforcement/kept.h):
+    an empty file is damage. It opens no mission that was issued before `since_us` (UTC), and is that of a boundary with
+    this public key, or of any.
+    """
+    said = _FIRST.pack(_FIRST_LAYOUT, since_us, public)
+    return said + sha256(said).digest()
 
 
 def measures_here(user: tuple[int, int] | None) -> Measure:
@@ -328,6 +343,12 @@ class BoundaryProcess(_Connected):
     ) -> Iterator[tuple[str, int]]:
         place = kept_file(state, vehicle)
         make_folder(place.parent, mode=PRIVATE_FOLDER)
+        try:
+            create_whole(place, first_kept(), mode=PRIVATE_FILE)
+        except OSError as error:
+            if error.errno == ENOSPC:
+                raise _unbegun(_IO, f"`{place}`") from None
+            raise
         until_s = time.monotonic() + ENDING_S
         while True:
             try:
@@ -338,8 +359,6 @@ class BoundaryProcess(_Connected):
                     text = f"another run's boundary holds what is kept of `{vehicle}`"
                     raise BoundaryError("in-use", text, "wait until that run is over") from None
                 time.sleep(0.02)
-        if os.fstat(kept).st_size == 0:
-            sync_folder(place.parent)  # its name too outlives a power failure
         yield "--kept", kept
         for name, data in given.items():
             if data is not None:

@@ -14,6 +14,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from rtshcua.adapters.boundary_process import first_kept
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import OPERATOR, OWNER, PROPOSERS, KeyStore
@@ -193,12 +194,16 @@ def provision(
         Path | None, typer.Option(help="the key that the enforcement boundary signs with (the key store's)")
     ] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase of these keys")] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="in place of a folder that was provisioned before, which flies no more")
+    ] = False,
     as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Make the folder of a boundary that listens (`run --boundary-socket`): its keys, unlocked, and the trust root.
 
     The folder appears whole, readable by its owner alone, or not at all; one that is there is left alone. It goes to
-    the user of the boundary, and these keys to nobody else aboard.
+    the user of the boundary, and these keys to nobody else aboard. It knows of no bundle that an earlier one opened: it
+    flies none that was issued before it was made, and a second one needs `--again` and another boundary key.
     """
     place = folder / vehicle
     if _SERVED.fullmatch(vehicle) is None:
@@ -221,6 +226,9 @@ def provision(
             text = f"the trust root lets no log key {log.kid.hex()} speak for `{vehicle}` now"
             return fail(ExitCode.UNTRUSTED, text, "`--log-key` gives one that it names", slug=slug)
         own = attesting.boundary_key(root, vehicle, now_us, store, boundary_key, passphrase_file)
+        before = store.provisioned(vehicle)
+        if before is not None and (not again or (own is not None and own.kid == before)):
+            return _provisioned_before(vehicle, own, again=again)
         link = None if signing_key is None else read_link_key(signing_key)
     except Untrusted as error:
         return _refused(error)
@@ -232,10 +240,13 @@ def provision(
     seeds |= {} if own is None else {"boundary.seed": own.private.private_bytes_raw()}
     seeds |= {} if link is None else {"link.key": link}
     make_folder(folder, mode=PRIVATE_FOLDER)
+    store.provision(vehicle, b"" if own is None else own.kid)
     with appearing(place) as fresh:
         for name, octets in seeds.items():
             write_new(fresh / name, octets.hex().encode() + b"\n", mode=PRIVATE_FILE)
         write_new(fresh / "root.trust", store.root(), mode=PRIVATE_FILE)
+        kept = first_kept(now_us) if own is None else first_kept(now_us, own.public)
+        write_new(fresh / "kept", kept, mode=PRIVATE_FILE)
     names = {"log_key": log.kid.hex(), "boundary_key": None if own is None else own.kid.hex()}
     names["link_key"] = None if link is None else fingerprint(link)
     if as_json:
@@ -249,6 +260,17 @@ def provision(
         "give it to the boundary's user: `chown -R rtshcua-boundary:` it, and keep these keys nowhere else aboard",
     )
     return ExitCode.OK
+
+
+def _provisioned_before(vehicle: str, own: SigningKey | None, *, again: bool) -> ExitCode:
+    """Why no second folder is made."""
+    if not again or own is None:
+        text = f"a folder for `{vehicle}` was provisioned before: a second one does not know which bundles that opened"
+        help = "`--again` where that one is lost, and another boundary key: `rtshcua keys replace` makes it"
+        return fail(ExitCode.REFUSED, text, help, slug="provisioned-before")
+    text = f"the folder of `{vehicle}` before has the boundary key {own.kid.hex()} too: no log would tell them apart"
+    help = f"`rtshcua keys replace {own.kid.hex()[:8]}` makes another, and revokes it"
+    return fail(ExitCode.REFUSED, text, help, slug="same-instance")
 
 
 @app.command()

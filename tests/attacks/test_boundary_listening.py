@@ -55,6 +55,7 @@ class Provisioned:
         self.put("log.seed", LOG_SEED.hex().encode() + b"\n")
         self.put("boundary.seed", OWN_SEED.hex().encode() + b"\n")
         self.put("link.key", b"5a" * 32 + b"\n")
+        self.put("kept", boundary_process.first_kept())
         made.give()
 
     def put(self, name: str, octets: bytes) -> None:
@@ -303,6 +304,13 @@ def test_files_that_do_not_serve(provisioned: Provisioned) -> None:
     (own / "kept").symlink_to("/dev/null")
     assert provisioned.why_not() == "not-kept"
     (own / "kept").unlink()
+    assert provisioned.why_not() == "damaged", "whoever provisions the folder makes it"
+    put("kept", b"")
+    assert provisioned.why_not() == "damaged"
+    put("kept", boundary_process.first_kept(0, case.KEYS[Duty.LOG].public))
+    assert provisioned.why_not() == "damaged", "it is another boundary's"
+    put("kept", boundary_process.first_kept(0, case.BOUNDARY_KEY.public))
+    provisioned.made.give()
     ListeningBoundary(provisioned.socket).close()
     provisioned.made.await_gone(1)
     own.chmod(0o750)

@@ -29,6 +29,7 @@ from rtshcua.adapters.boundary_process import (
     BoundaryError,
     BoundaryProcess,
     Measure,
+    first_kept,
     kept_file,
 )
 from rtshcua.adapters.clock import monotonic_ns
@@ -233,6 +234,58 @@ def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) 
     again.process.close()
 
 
+@pytest.mark.parametrize("emptied", [b"", b"\0", first_kept()[:-1], bytes(len(first_kept()))])
+def test_a_file_that_was_emptied_is_damage_and_no_first_start(emptied: bytes, tmp_path: Path) -> None:
+    """Else what was opened before flies again. The first start finds what says that nothing was kept."""
+    held = Held(tmp_path)
+    held.load()
+    held.process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    path.write_bytes(emptied)
+    with pytest.raises(BoundaryError, match="damaged"):
+        Held(tmp_path)
+    assert path.read_bytes() == emptied, "and it stays for somebody to look at"
+
+
+def test_a_first_start_that_broke_off_while_it_wrote_is_one_still(tmp_path: Path) -> None:
+    Held(tmp_path).process.close()
+    path = kept_file(tmp_path, VEHICLE)
+    slot = path.stat().st_size // 2
+    torn = first_kept().ljust(slot, b"\0") + bytes(100)
+    path.write_bytes(torn)
+    held = Held(tmp_path)
+    assert isinstance(held.load(), Loaded)
+    held.process.close()
+    path.write_bytes(first_kept().ljust(2 * slot, b"\0"))
+    with pytest.raises(BoundaryError, match="damaged"):
+        Held(tmp_path)
+
+
+def test_no_mission_from_before_it_was_provisioned_is_opened(tmp_path: Path) -> None:
+    """Whatever an earlier folder opened, this one does not know of."""
+    (tmp_path / "boundary").mkdir()
+    path = kept_file(tmp_path, VEHICLE)
+    issued = issued_us()
+    for since_us, opens in ((issued + 1, False), (issued, True)):
+        path.write_bytes(first_kept(since_us))
+        held = Held(tmp_path, issued=issued)
+        answer = held.caller.load(held.bundle, now())
+        assert (answer.slug == "before-provisioned") if isinstance(answer, Refusal) else opens
+        held.process.close()
+
+
+def test_a_file_of_another_boundary_is_damage(tmp_path: Path) -> None:
+    (tmp_path / "boundary").mkdir()
+    own = case.BOUNDARY_KEY.private.private_bytes_raw()
+    kept_file(tmp_path, VEHICLE).write_bytes(first_kept(0, case.BOUNDARY_KEY.public))
+    for seed in (None, case.KEYS[Duty.LOG].private.private_bytes_raw()):
+        with pytest.raises(BoundaryError, match="damaged"):
+            Held(tmp_path, own_seed=seed)
+    Held(tmp_path, own_seed=own).process.close()
+    with pytest.raises(BoundaryError, match="damaged"):
+        Held(tmp_path)
+
+
 def test_what_it_kept_is_not_read_where_it_is_damaged(tmp_path: Path) -> None:
     Held(tmp_path).process.close()
     path = kept_file(tmp_path, VEHICLE)
@@ -391,7 +444,7 @@ def test_each_reason_not_to_begin_has_a_slug_and_an_exit_code(tmp_path: Path, mo
 
 
 def test_a_boundary_that_is_still_ending_is_waited_for(tmp_path: Path) -> None:
-    (tmp_path / "boundary").mkdir()
+    begun(tmp_path).close()
     held = lock(kept_file(tmp_path, VEHICLE))
     ends = threading.Timer(0.3, os.close, (held,))
     ends.start()
@@ -407,7 +460,6 @@ def test_a_disk_that_is_full_at_the_first_start_is_no_damage(tmp_path: Path) -> 
         pytest.skip("no file system may be mounted here")
     try:
         assert why_not(tmp_path) == (ExitCode.FULL, "boundary-not-kept")
-        assert kept_file(tmp_path, VEHICLE).stat().st_size == 0
         subprocess.run(["mount", "-o", "remount,size=2m", str(tmp_path)], check=True, capture_output=True)
         begun(tmp_path).close()
     finally:

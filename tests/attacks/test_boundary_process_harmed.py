@@ -413,18 +413,18 @@ def rewritten(path: Path, layout: int, opened: int) -> None:
     head = list(HEAD.unpack_from(body))
     head[0], head[1], head[4] = layout, 1_000, opened
     HEAD.pack_into(body, 0, *head)
-    for number in range(MOST_OPENED + 1):
+    for number in range(max(opened, 3)):
         OPENED.pack_into(body, HEAD.size + number * OPENED.size, number.to_bytes(32, "big"), number + 1)
     body[-32:] = sha256(body[:-32]).digest()
     path.write_bytes(bytes(body) + data[slot:])
 
 
-@pytest.mark.parametrize("opened", [0, 3, MOST_OPENED + 1])
-def test_a_file_of_the_layout_before_goes_on(opened: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("before", "opened"), [(1, 0), (1, 3), (1, MOST_OPENED + 1), (2, 3), (2, MOST_OPENED + 2)])
+def test_a_file_of_a_layout_before_goes_on(before: int, opened: int, tmp_path: Path) -> None:
     """It has no sessions; where it is full, the mission that has no room any more is not opened again either."""
     Held(tmp_path, own=True).process.close()
     path = kept_file(tmp_path, VEHICLE)
-    rewritten(path, LAYOUT - 1, opened)
+    rewritten(path, LAYOUT - before, opened)
     held = Held(tmp_path, own=True)
     held.loaded()
     assert held.session(7) == (7, b"\x07" * 32), "as the state folder says"
@@ -434,7 +434,7 @@ def test_a_file_of_the_layout_before_goes_on(opened: int, tmp_path: Path) -> Non
     newest = max(heads, key=lambda head: head[1])
     assert newest[0] == LAYOUT
     assert newest[3] == (opened or -1), "what has expired, or lost its place, counts as opened"
-    rewritten(path, LAYOUT - 2, opened)
+    rewritten(path, LAYOUT - 3, opened)
     path.write_bytes(path.read_bytes()[: len(data) // 2])
     with pytest.raises(BoundaryError, match="damaged"):
         Held(tmp_path)
@@ -451,7 +451,7 @@ def test_it_counts_its_sessions_itself(tmp_path: Path) -> None:
         assert before == (bytes([proposed]) * 32 if proposed == found else digests[-1])
         final = loaded.attestation.digest
         if found != 4:
-            held.caller(STATEMENT, b"\1")
+            held.caller(STATEMENT, b"\1", bytes(24))
             held.process.close()
         else:  # killed, and what it had at its beginning counts
             os.kill(held.process.pid, signal.SIGKILL)

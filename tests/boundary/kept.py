@@ -8,11 +8,11 @@ from typing import NamedTuple
 from rtshcua.mavlink.signing import MOST_STREAMS
 from rtshcua.mavlink.signing import State as LinkState
 
-LAYOUT, MOST_OPENED, MOST_POLICIES = 0x7274736863756102, 4_095, 256
+LAYOUT, MOST_OPENED, MOST_POLICIES = 0x7274736863756103, 4_094, 256
 #: layout, turn, restarts, floor, and how many missions, policies and streams there are
 HEAD, OPENED, VERSION, STREAM = Struct("<QQQqQQQ"), Struct("<32sq"), Struct("<32sq"), Struct("<BBB5xq")
 _SESSION, _TIMESTAMP, _CHECK = Struct("<32sq"), Struct("<q"), 32
-_SESSION_AT = HEAD.size + MOST_OPENED * OPENED.size
+_SESSION_AT = HEAD.size + (MOST_OPENED + 1) * OPENED.size  # behind whose it is, and since when
 _VERSIONS_AT = _SESSION_AT + _SESSION.size
 _LINK_AT = _VERSIONS_AT + MOST_POLICIES * VERSION.size
 _STREAMS_AT = _LINK_AT + _TIMESTAMP.size

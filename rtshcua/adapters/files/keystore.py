@@ -210,6 +210,27 @@ class KeyStore:
         write_file(self.root_path, signed, mode=PRIVATE_FILE)
         return newer
 
+    def provisioned(self, vehicle: str) -> bytes | None:
+        """The name of the boundary's key that a folder was provisioned with for a vehicle, empty for none and where
+        that is not known; None where no folder was. Raises OSError.
+        """
+        data = read_if_there(self._provisioned_path(vehicle), MAX_KEY_FILE)
+        if data is None:
+            return None
+        try:
+            return bytes.fromhex(data.decode())
+        except ValueError:  # it was, whatever became of the file
+            return b""
+
+    def provision(self, vehicle: str, boundary_key: bytes) -> None:
+        """Remember that a folder is provisioned for a vehicle, with the boundary's key of this name. Raises OSError."""
+        path = self._provisioned_path(vehicle)
+        make_folder(path.parent, mode=PRIVATE_FOLDER)
+        write_file(path, boundary_key.hex().encode() + b"\n", mode=PRIVATE_FILE)
+
+    def _provisioned_path(self, vehicle: str) -> Path:
+        return self.folder.parent / "provisioned" / f"vehicle-{vehicle}"
+
     def signing_key(self, duty: Duty, *, passphrase: bytes | None = None, whose: str = "") -> SigningKey:
         """The key of a duty: of mission keys that of the source `whose`, of approval keys that of the person and role.
 

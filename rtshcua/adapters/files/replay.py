@@ -8,8 +8,9 @@ One process at a time looks and writes. Markers of expired missions are pruned; 
 that was pruned is refused, so setting the clock back opens nothing again. Policy versions only rise. The marker of a
 mission of which nothing was sent is taken back when its run ends; after a crash it stays.
 
-A file that is there and does not say what we write is damage, and opens nothing; one that is not there is as if nothing
-had been kept. Nothing here tells that the whole folder was put back to what it was earlier, or removed.
+A file that is there and does not say what we write is damage, an empty one too, and opens nothing. The versions are
+written before the first marker: where they are missing beside one, or beside a floor, they were lost, and that is
+damage as well. Nothing here tells that the whole folder was put back to what it was earlier, emptied or removed.
 """
 
 import fcntl
@@ -35,6 +36,7 @@ from rtshcua.onboard.ports import Opening
 
 _FLOOR = "floor"
 _POLICIES = "floor-policies"
+_MARKER = re.compile(r"(?:[0-9a-f]{2})+")
 _EXPIRY = re.compile(rb"[0-9]{1,20}\n")
 _LARGEST = 16 << 20  # octets of a file here
 
@@ -134,6 +136,8 @@ def _floor(folder: Path) -> int:
 def _versions(folder: Path) -> dict[str, int]:
     data = read_if_there(folder / _POLICIES, _LARGEST)
     if data is None:
+        if any(map(_is_kept, folder.iterdir())):
+            raise _Damaged
         return {}
     try:
         said = json.loads(data)
@@ -142,6 +146,11 @@ def _versions(folder: Path) -> dict[str, int]:
     if not isinstance(said, dict) or not said or any(type(version) is not int for version in said.values()):
         raise _Damaged
     return said
+
+
+def _is_kept(path: Path) -> bool:
+    """Whether a file says that something was opened: a floor, or a marker, whatever a crash left of it."""
+    return path.name == _FLOOR or _MARKER.fullmatch(path.name) is not None
 
 
 @contextmanager

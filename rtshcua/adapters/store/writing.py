@@ -201,6 +201,29 @@ def write_new(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, root: Path | 
             raise
 
 
+def create_whole(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
+    """Creates a file that has its content from the first moment on, synced. One that is there stays as it is, whatever
+    it holds. Raises OSError.
+    """
+    fresh = f"{UNFINISHED}{os.urandom(8).hex()}.new"
+    with naming(path), opened_folder(path.parent) as folder:
+        if os.path.lexists(path):
+            return
+        try:
+            handle = os.open(fresh, _NEW, mode, dir_fd=folder)
+            try:
+                write_all(handle, data)
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+            with suppress(FileExistsError):  # somebody else was first
+                os.link(fresh, path.name, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=False)
+        finally:
+            with suppress(FileNotFoundError):
+                os.unlink(fresh, dir_fd=folder)
+        os.fsync(folder)
+
+
 def append(path: Path, data: bytes, root: Path | None = None) -> None:
     """Puts data behind that of a regular file, which is made where there is none, and on the disk; no link is followed
     to it, nor below `root`, and a file of several names, any of which may be elsewhere, is left alone. Raises OSError.

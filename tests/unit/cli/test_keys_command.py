@@ -3,10 +3,13 @@
 import json
 import os
 import re
+import struct
+import time
 from pathlib import Path
 
 import pytest
 
+from rtshcua.adapters import boundary_process
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store import reading
@@ -452,3 +455,52 @@ def test_the_list_names_files_and_the_roots_version_and_what_is_revoked_is_not_a
     assert app.main(["keys", "revoke", "--link", "0" * 16]) == ExitCode.OK
     assert app.main(["keys", "revoke", "--link", "0" * 16]) == ExitCode.USAGE
     assert "was revoked already" in capsys.readouterr().err
+
+
+# ---------------------------------------------------------------- a folder for a boundary that listens
+
+
+def provisioned(capsys: pytest.CaptureFixture[str], folder: Path, *words: str) -> tuple[int, str]:
+    """The exit code, and the slug where it is refused."""
+    capsys.readouterr()
+    code = app.main(["keys", "provision", str(folder), "--vehicle", "quad-07", "--json", *words])
+    told = capsys.readouterr()
+    return code, "" if code == ExitCode.OK else json.loads(told.out)["error"]["slug"]
+
+
+def first_of(folder: Path) -> tuple[int, bytes]:
+    """Since when missions are opened by a folder, and whose boundary's it is."""
+    data = (folder / "quad-07" / "kept").read_bytes()
+    since_us, public = struct.unpack_from("<q32s", data, 8)
+    assert data == boundary_process.first_kept(since_us, public)
+    return since_us, public
+
+
+def test_a_folder_is_provisioned_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A second one knows of no bundle that the first opened: it takes a word more, and a key that logs tell apart."""
+    app.main(["keys", "init"])
+    store, begun_us = KeyStore(data_folder()), time.time_ns() // 1_000
+    key = store.signing_key(Duty.BOUNDARY)
+    assert provisioned(capsys, tmp_path / "one") == (ExitCode.OK, "")
+    since_us, public = first_of(tmp_path / "one")
+    assert since_us >= begun_us
+    assert public == key.public
+    assert provisioned(capsys, tmp_path / "two") == (ExitCode.REFUSED, "provisioned-before")
+    assert provisioned(capsys, tmp_path / "two", "--again") == (ExitCode.REFUSED, "same-instance")
+    assert not (tmp_path / "two").exists()
+    assert app.main(["keys", "replace", key.kid.hex()[:8]]) == ExitCode.OK
+    assert provisioned(capsys, tmp_path / "two") == (ExitCode.REFUSED, "provisioned-before")
+    assert provisioned(capsys, tmp_path / "two", "--again") == (ExitCode.OK, "")
+    later_us, other = first_of(tmp_path / "two")
+    assert later_us > since_us
+    assert other != public, "the trust root names another boundary, and revokes the one before"
+
+
+@pytest.mark.parametrize("data", [b"", b"nonsense\n"])
+def test_what_is_remembered_of_a_folder_may_be_damaged(
+    data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    app.main(["keys", "init"])
+    assert provisioned(capsys, tmp_path / "one") == (ExitCode.OK, "")
+    (data_folder() / "provisioned" / "vehicle-quad-07").write_bytes(data)
+    assert provisioned(capsys, tmp_path / "two") == (ExitCode.REFUSED, "provisioned-before")

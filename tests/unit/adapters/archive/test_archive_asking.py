@@ -180,6 +180,17 @@ def test_the_beginning_of_a_log_does_not_contradict_it(take: Add, folder: Folder
     assert rows(folder, "conflicts") == []
 
 
+def test_a_bundle_that_flew_twice_is_told(take: Add, fleet: Path, folder: Folder) -> None:
+    """What kept used bundles was emptied, put back or made anew: each log is whole, and an archive has both."""
+    (first,) = take([fleet / "quad-07-0.jsonl"])
+    assert rows(folder, "twice") == []
+    (second,) = take([fleet / "quad-07-1.jsonl"])
+    assert {first.entry.status, second.entry.status} == {"verified"}
+    ((vehicle, _, digest, *logs),) = rows(folder, "twice")
+    assert (vehicle, digest) == ("quad-07", first.entry.bundle_digest)
+    assert sorted(logs[::2]) == sorted([first.entry.log, second.entry.log])
+
+
 def test_two_flights_after_the_same_one_are_a_fork(take: Add, fleet: Path, folder: Folder, tmp_path: Path) -> None:
     (first,) = take([fleet / "quad-07-0.jsonl"])
     generated_logs.write(tmp_path / "other.jsonl", "quad-07", 5, before=first.entry.last_leaf)

@@ -306,8 +306,10 @@ def test_files_that_do_not_serve(provisioned: Provisioned) -> None:
     (own / "kept").unlink()
     assert provisioned.why_not() == "damaged", "whoever provisions the folder makes it"
     put("kept", b"")
+    provisioned.made.give()
     assert provisioned.why_not() == "damaged"
     put("kept", boundary_process.first_kept(0, case.KEYS[Duty.LOG].public))
+    provisioned.made.give()
     assert provisioned.why_not() == "damaged", "it is another boundary's"
     put("kept", boundary_process.first_kept(0, case.BOUNDARY_KEY.public))
     provisioned.made.give()

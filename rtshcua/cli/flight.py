@@ -73,6 +73,10 @@ _SILENT = (
 _CRASHED = (
     "CRASHED: the vehicle came down as no landing does; nothing more is sent. Keep away from its rotors and battery"
 )
+_FAILED = (
+    "this program failed, and the vehicle may be flying: nothing more is sent, and nothing watches it. The same "
+    "`rtshcua run` again brings it down"
+)
 _ON_GROUND = "interrupted on the ground: nothing is sent, and the log is closed"
 _KNOWING = (
     "it is brought down; Ctrl-C once more within 3 s tells it to land where it is, stops watching, and closes the log"
@@ -143,6 +147,7 @@ class Flight:
             debts.trouble,
         )  # fmt: skip
         self._preparing, self._told = True, ""
+        self._left = ""  # that the operator stopped watching what may be flying
         if debts.trouble is not None:
             self._feed.post(Note(debts.trouble))
         self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
@@ -160,6 +165,8 @@ class Flight:
             if ending is not Ending.CRASHED:
                 self._put_back()
         except BaseException:
+            if self._runtime.aloft:
+                self._feed.post(Note(_FAILED))
             self._close(None)
             self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=False)
             raise
@@ -168,6 +175,8 @@ class Flight:
             self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
         if ending is Ending.CRASHED:
             self._feed.post(Note(_CRASHED))
+        elif self._may_fly:
+            self._feed.post(Note(self._may_fly))
         missing = self._close(ending)
         lacks = ExitCode.FULL
         found = ReadBack(None) if missing else read_back(self._run.path / LOG, self._root)
@@ -190,6 +199,10 @@ class Flight:
     def refuse(self) -> None:
         """Close the log of a flight that is not to be."""
         self._close(Ending.REFUSED)
+
+    @property
+    def _may_fly(self) -> str:
+        return self._left or self._runtime.may_fly
 
     @property
     def used_up(self) -> bool:
@@ -361,6 +374,7 @@ class Flight:
         with suppress(OSError):
             self._sink.append(line, SYNCED)
         self._feed.post(Note(f"left: {told}; nothing more is sent"))
+        self._left = f"the vehicle may be flying: {told}; the operator left, so nothing watches it any more"
         return Ending.INTERRUPTED
 
     def _close(self, ending: Ending | None) -> tuple[str, ...]:
@@ -395,6 +409,7 @@ class Flight:
             missing=missing,
             gaps_us=gaps_us,
             unconfirmed=tuple(self._teller.unconfirmed),
+            may_fly=self._may_fly,
             folder=str(self._run.path),
             log=log,
             next=f"rtshcua verify-log {'--audit ' if self._loaded.boundary.lost else ''}{shlex.quote(log)}",

@@ -48,6 +48,12 @@ class Ready(Event, frozen=True):
     others: str = ""
 
 
+class Unfit(Event, frozen=True):
+    """The vehicle will not be ready for this mission, however long it is waited for: `why`, in words."""
+
+    why: str
+
+
 class AirState(Event, frozen=True):
     """What the vehicle says of itself: armed, and in the air (EXTENDED_SYS_STATE, or the flavour's equivalent)."""
 
@@ -97,10 +103,11 @@ class TakenOver(Event, frozen=True):
     """Someone else flies the vehicle now: the pilot, a ground station, or the autopilot's own failsafe. They win.
 
     `how` says what showed it: the name of the mode, or another target, a landing or a disarming that nobody here
-    commanded.
+    commanded. `failsafe`: it said that its state is critical, so it is a failsafe of its own that flies it.
     """
 
     how: str
+    failsafe: bool = False
 
 
 class Crashed(Event, frozen=True):

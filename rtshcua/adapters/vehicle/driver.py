@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
+from msgspec.structs import replace
+
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages, observed, preflight
@@ -44,6 +46,8 @@ from rtshcua.onboard.left import Left
 from rtshcua.onboard.ports import Command, Event, Said
 
 HEARTBEAT_US = 1_000_000
+#: so long what no waiting changes must stand until it is told: somebody may be about to set a parameter right
+UNFIT_US = 5_000_000
 #: why a vehicle that signs answers nothing to whoever does not
 KEYLESS = "it signs what it sends, and answers nothing that is not signed: give the link's key with `--signing-key`"
 
@@ -141,6 +145,7 @@ class Driver:
         self._spoken: set[str] = set()
         self._beats_us = 0  # when our next heartbeat is due
         self._was_ready = False
+        self._unfit_us: int | None = 0  # since when nothing is known that no waiting changes; None: it was told
         self._released = False
         self._was_air: tuple[bool, bool] | None = None
 
@@ -255,6 +260,8 @@ class Driver:
         if not self._was_ready and self._is_ready(now_us):
             self._was_ready = True
             events.append(ports.Ready(now_us, self._flown_by_others()))
+        if not self._was_ready and self._unfit_us is not None:
+            self._judge_fitness(now_us, events)
         if self._gate_may_be_lost:
             self._renew_ahead(now_us, events, begins=False)
         if seen.notes or self.stream_requests.notes or self.preflight.notes or self._telemetry.batteries.notes:
@@ -265,6 +272,15 @@ class Driver:
         if self.settings.outstanding:
             frames += self._set_parameters(now_us)
         return events, frames
+
+    def _judge_fitness(self, now_us: int, events: list[Event]) -> None:
+        """Tell what keeps it from being ready that no waiting changes, once that stood for a while."""
+        why = None if self.prepares or self._flies else self.other_kind or self.preflight.unfit
+        if why is None:
+            self._unfit_us = now_us
+        elif self._unfit_us is not None and now_us - self._unfit_us >= UNFIT_US:
+            self._unfit_us = None
+            events.append(ports.Unfit(now_us, why))
 
     def _housekeeping(self, now_us: int) -> list[Message]:
         """The heartbeat and the questions that are due, whatever flies."""
@@ -495,7 +511,7 @@ class Driver:
                 self._left_mode = before
                 return
             self._others = flavour.mode_name(mode)
-            events.append(ports.TakenOver(now_us, self._others))
+            events.append(ports.TakenOver(now_us, self._others, self.seen.critical))
 
     def _look(self, now_us: int, events: list[Event]) -> None:
         """Whether the link is up, and how long it was so far. One that is heard and does not hear us may still be sent
@@ -535,10 +551,11 @@ class Driver:
             return
         self._moving = self._moving or bool(out)
         send += out
-        events += happened
         for event in happened:
             if isinstance(event, ports.TakenOver):
                 self._others = event.how
+                event = replace(event, failsafe=self.seen.critical)
+            events.append(event)
         self._doubt(now_us, send)
         if manoeuvre.waits:
             send += self._ask(now_us)

@@ -326,6 +326,11 @@ class ObservedVehicle:
         return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and not self.armed
 
     @property
+    def comes_to_rest(self) -> bool:
+        """On the ground with its motors off, also while only one report says that they are."""
+        return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and (self.disarms or not self.armed)
+
+    @property
     def rests(self) -> bool:
         """Down, and seen to lie there: what is disarmed in the air says at once that it is on the ground, and falls."""
         if not self.down:

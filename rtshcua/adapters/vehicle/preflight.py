@@ -131,6 +131,12 @@ class Preflight:
         return self._far_from_home() or returns or self._limits.wrong(self._values) or self._bounded()
 
     @property
+    def unfit(self) -> str | None:
+        """What of its parameters is otherwise than the policy or the mission has it, in words: waiting changes none."""
+        returns = None if self._found is None else self._returns_at(self._found)
+        return returns or self._limits.wrong(self._values) or self._bounded()
+
+    @property
     def unplaced(self) -> str | None:
         """That it is not known where it stands, in words."""
         return None if self._seen.located else "it does not say where it stands"

@@ -118,6 +118,8 @@ def _ending(summary: Summary) -> Iterable[str]:
     yield f"{summary.ending}: {summary.steps_done} of {summary.steps} steps done in {duration(summary.flight_us)}"
     yield f"  decided  {counts}"
     yield from (f"  unseen   {what}: {UNCONFIRMED}" for what in summary.unconfirmed)
+    if summary.may_fly:
+        yield f"  vehicle  {summary.may_fly}"
     yield f"  log      {summary.log} ({many(summary.records, 'record')}, {whole})"
     yield from (f"  missing  {what}" for what in summary.missing)
     yield f"  next     {summary.next}"

@@ -103,7 +103,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
 
     `whole`: all evidence is on the disk, and the log was read back and verifies; else `missing` says what does not.
     `gaps_us`: for how long the log has nothing, for the computer stood still. `unconfirmed`: the fallbacks that were
-    sent, and ended without a landing being seen.
+    sent, and ended without a landing being seen. `may_fly`: that the vehicle may be flying, and why nothing watches it.
     """
 
     mission: str
@@ -125,6 +125,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     missing: tuple[str, ...] = ()
     gaps_us: int = 0
     unconfirmed: tuple[str, ...] = ()
+    may_fly: str = ""
 
 
 Message = Plan | Snapshot | Happened | Note | Summary

@@ -20,6 +20,7 @@ from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Expect, Failed, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
+from rtshcua.onboard.runtime.aftermath import MAY_FLY, may_fly
 from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.journal import Detail, Journal
@@ -32,6 +33,8 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 
 #: what is recorded where another step is asked for, in place of one that is not admitted
 REPLAN: Final = "replan"
+#: why a command was not sent that was `late`
+LATE: Final = "nothing was sent: this computer was too busy, or its disk too slow, to send it in its permit's time"
 #: what ends a run matters more the further down it stands
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 _UP = LinkState.UP  # an enumeration's attributes are slow to find
@@ -50,8 +53,11 @@ class MissionController:
         self._journal = journal
         self._limits = limits
         self._resumed = resumed
+        self._unfit = ""  # why it will never be ready, however long it is waited for
         self.stage = _WAITING
         self.ending: Ending | None = None
+        #: that the vehicle may be flying when the run is over, and why it is not watched; empty where it does not
+        self.may_fly = ""
         self._cause: Ending | None = None  # why the mission was given up; None: it was not
         self._began_us: int | None = None
         self._recording = True  # records are kept, or the policy does not ask
@@ -152,6 +158,9 @@ class MissionController:
                 self._began_us = now.monotonic_us
             elif now.monotonic_us - began_us > self._limits.ready_us:
                 self._journal.effect(now, "never-ready")
+                return self._come_down(now)
+            elif self._unfit and not self.aloft:  # no waiting changes that
+                self._journal.effect(now, "never-ready", detail=self._unfit)
                 return self._come_down(now)
             return False
         self._journal.effect(now, "ready")
@@ -280,6 +289,10 @@ class MissionController:
         elif came_down and (self.stage is _FALLING or (self.stage is _RUNNING and not self.dispatcher.homeward)):
             self.down(now)
 
+    def unfit(self, why: str) -> None:
+        """The vehicle will not be ready for this mission, however long it is waited for."""
+        self._unfit = why
+
     def succeeded(self, now: Now, token: int) -> None:
         """The effect of a command was observed."""
         active = self.dispatcher.flying(token)
@@ -297,7 +310,8 @@ class MissionController:
         """A command was refused, its effect did not come, or it was not sent."""
         if self.dispatcher.flying(event.token) is None:
             return
-        detail = f"{event.reason}: {event.text}" if event.text else event.reason
+        text = LATE if event.reason == "late" and not event.text else event.text
+        detail = f"{event.reason}: {text}" if text else event.reason
         if self.link.down:
             detail += "; the link is silent: what the vehicle does is not known"
         self.dispatcher.end(now, "failed", detail)
@@ -428,10 +442,13 @@ class MissionController:
             self._fallback.land()
             self.stage = _FALLING
 
-    def stand_down(self, now: Now, ending: Ending) -> None:
-        """Send nothing more, whatever flies, and end."""
+    def stand_down(self, now: Now, ending: Ending, *, failsafe: bool = False) -> None:
+        """Send nothing more, whatever flies, and end. `failsafe`: the autopilot's own flies it."""
+        flies = self.aloft or self.dispatcher.done
         self.dispatcher.release(now)
-        self._journal.effect(now, "stood-down", detail=self.vehicle.last_seen)
+        if flies and ending is not Ending.CRASHED:
+            self.may_fly = may_fly(ending, self.vehicle.last_seen, failsafe=failsafe)
+        self._journal.effect(now, "stood-down", detail=self.may_fly or self.vehicle.last_seen)
         self._end(now, ending)
 
     def _come_down(self, now: Now, kind: int = CONTINGENCY_LINK, cause: Ending = Ending.ABORTED) -> bool:
@@ -459,6 +476,9 @@ class MissionController:
         self.stage = _DECIDING
 
     def _end(self, now: Now, ending: Ending) -> None:
+        if not self.may_fly and ending is not Ending.CRASHED and (self.aloft or self.dispatcher.done):
+            self.may_fly = may_fly(ending, self.vehicle.last_seen, rests=self.vehicle.at_rest)
+            self._journal.effect(now, MAY_FLY, detail=self.may_fly)
         self.admission.flush(now)
         self._journal.tell_counted(now, ended=True)
         self.stage = _ENDED

@@ -67,6 +67,7 @@ class Dispatcher:
         self._remaining = remaining
         self.active: Active | None = None
         self.dispatched = False  # something was sent in this flight,
+        self.done = False  # and was seen to be obeyed,
         self.used = False  # and in this run, as its log tells: it stays after a landing
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
 
@@ -112,6 +113,7 @@ class Dispatcher:
         """
         active = self.flying(event.token)
         if active is not None:
+            self.done = True
             self._journal.effect(now, OBEYED, active.ref, detail=" ".join(map(str, event.target or ())))
 
     def flying(self, token: int) -> Active | None:
@@ -136,7 +138,7 @@ class Dispatcher:
 
     def landed(self) -> None:
         """The flight is over: standing permits lapse."""
-        self.dispatched = False
+        self.dispatched = self.done = False
         self._executor.landed()
 
     def release(self, now: Now) -> None:

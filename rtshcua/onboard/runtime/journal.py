@@ -41,7 +41,8 @@ class Journal:
         self._entries: list[Action | Telling] = []
         self._first: Action | None = None  # of what is done, and not only told
         self._noted: dict[str, int] = {}  # when a text was last recorded as a note,
-        self._again: dict[str, int] = {}  # and how often it was noted since
+        self._again: dict[str, int] = {}  # how often it was noted since,
+        self._last: dict[str, int] = {}  # and when last
 
     @property
     def reflex(self) -> Command | None:
@@ -94,6 +95,7 @@ class Journal:
         before_us = self._noted.get(text)
         if text in self._again or (before_us is not None and now.monotonic_us - before_us < REPEATED_EVERY_US):
             self._again[text] = self._again.get(text, 0) + 1
+            self._last[text] = now.monotonic_us
             return
         if len(self._noted) < _MOST_TEXTS:
             self._noted[text] = now.monotonic_us
@@ -105,7 +107,12 @@ class Journal:
         for text in due:
             count = self._again.pop(text)
             self._noted[text] = now.monotonic_us
-            self.effect(now, "noted", detail=f"{text} ({count} more {'time' if count == 1 else 'times'})")
+            more = f"{count} more {'time' if count == 1 else 'times'}"
+            last_us = self._last.pop(text)
+            since = (*self._noted.items(), *self._last.items())
+            if any(other != text and last_us < at_us for other, at_us in since):  # it may be the opposite
+                more += f", the last {(now.monotonic_us - last_us) // 1_000_000} s ago"
+            self.effect(now, "noted", detail=f"{text} ({more})")
 
     def take(self, now: Now, *, ended: bool) -> list[Action]:
         """What was collected since the last call. An epoch that is over is sealed, unless something is sent; after the

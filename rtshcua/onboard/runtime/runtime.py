@@ -113,6 +113,13 @@ class Runtime:
         return self._controller.dispatcher.used or self.ending in (Ending.RECALLED, Ending.CANCELLED)
 
     @property
+    def may_fly(self) -> str:
+        """That the vehicle may be flying now that the run is over, where it was last seen, and why nothing watches it;
+        empty where it was seen to land, or nothing was sent.
+        """
+        return self._controller.may_fly
+
+    @property
     def linked(self) -> bool:
         """Whether the vehicle is heard."""
         return not self._controller.link.down
@@ -198,8 +205,10 @@ class EventHandler:
                 self._record(now, event)
 
     def _record(self, now: Now, event: Event) -> None:
-        """Record what changes nothing."""
+        """Record what changes nothing at once."""
         match event:
+            case ports.Unfit():
+                self._controller.unfit(event.why)
             case ports.ClockStepped():
                 self._journal.effect(now, "clock-stepped", detail=f"{event.by_us:+d} us")
             case ports.Said():
@@ -213,8 +222,10 @@ class EventHandler:
 
     def _ended(self, now: Now, event: TakenOver | Crashed) -> None:
         crashed = isinstance(event, Crashed)
-        self._journal.effect(now, "crashed" if crashed else "taken-over", detail=event.how)
-        self._controller.stand_down(now, Ending.CRASHED if crashed else Ending.STOOD_DOWN)
+        failsafe = isinstance(event, TakenOver) and event.failsafe
+        how = f"by its own failsafe: {event.how}" if failsafe else event.how
+        self._journal.effect(now, "crashed" if crashed else "taken-over", detail=how)
+        self._controller.stand_down(now, Ending.CRASHED if crashed else Ending.STOOD_DOWN, failsafe=failsafe)
 
     def _evidence_failed(self, now: Now, reason: str) -> None:
         """Recorded once a gap: the record may fail like the others, and be taken up when the sink can write again."""

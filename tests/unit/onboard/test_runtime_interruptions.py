@@ -159,7 +159,10 @@ def test_a_link_that_stays_away_ends_the_run(situation: Situation) -> None:
     (detail,) = [record["detail"] for record in run.records if record.get("event") == "stood-down"]
     seen = {waiting: "it never said whether it was in the air"}
     seen |= dict.fromkeys((deferred_on_the_ground, taking_off), "last seen on the ground")
-    assert detail == seen.get(situation, "last seen in the air")
+    last_seen = seen.get(situation, "last seen in the air")
+    flies = situation in AIR
+    assert detail.startswith(f"{last_seen}; the vehicle may be flying" if flies else last_seen)
+    assert ("may be flying" in detail) == flies == bool(run.runtime.may_fly)
 
 
 def test_a_failsafe_while_the_link_was_lost_is_the_autopilots() -> None:
@@ -399,7 +402,7 @@ def test_repeated_notes_are_counted_and_told_in_time_or_at_the_end() -> None:
     assert noted() == ["the cable is loose", "another"], "the first at once"
     for _ in range(REPEATED_EVERY_US // TICK):
         run.tick()
-    assert noted()[2:] == ["the cable is loose (2 more times)"], "those that were counted, once"
+    assert noted()[2:] == ["the cable is loose (2 more times, the last 29 s ago)"], "counted, and not told as new"
     run.tick(Noted(0, "another"))
     run.tick(Noted(0, "the cable is loose"))
     assert noted()[3:] == ["another"], "its time is over"

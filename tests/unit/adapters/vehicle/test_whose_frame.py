@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle.driver import Driver
@@ -13,7 +14,9 @@ from rtshcua.mavlink.enums import VEHICLES
 from rtshcua.model.faults import Mode, PilotMode, SecondVoice, Voice
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
-from rtshcua.onboard.ports import Crashed, Failed, LinkLost, Noted, Ready, Succeeded, TakenOver
+from rtshcua.onboard.ports import Crashed, Failed, LinkLost, Noted, Ready, Succeeded, TakenOver, Unfit
+from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual.flyer import Flyer
 from virtual.policy import POLICY
 from virtual.rows import rows
@@ -263,3 +266,22 @@ def test_a_takeover_is_still_seen_beside_a_voice_that_contradicts_the_vehicle(al
     one.wait(4)
     one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us, Mode.RETURN))
     assert isinstance(one.until((Succeeded, Failed, TakenOver), 6), TakenOver)
+
+
+# ---------------------------------------------------------------- what no waiting changes
+
+
+def test_a_parameter_that_no_waiting_changes_is_told_once_and_soon(flavour: str) -> None:
+    one = Flyer(flavour, return_mm=22_000)
+    policy = replace(POLICY, vehicle=replace(POLICY.vehicle, return_altitude=80_000))
+    one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=Kind(flavour), return_mm=22_000))
+    told = one.until(Unfit, 30)
+    one.wait(30)
+    assert "it returns at 22 m" in told.why
+    assert sum(isinstance(each, Unfit) for each in one.events) == 1
+
+
+def test_a_vehicle_that_only_needs_time_is_not_given_up(flavour: str) -> None:
+    one = Flyer(flavour)
+    one.until(Ready)
+    assert not any(isinstance(each, Unfit) for each in one.events)

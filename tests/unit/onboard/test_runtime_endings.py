@@ -1,0 +1,166 @@
+"""Whatever ends a run after a command was sent says that the vehicle may be flying, unless it was seen to land."""
+
+from collections.abc import Callable
+
+import pytest
+
+from reference.flat_case import WIND, M, S
+from reference.world import FakeVehicle, Run, loaded
+from rtshcua.onboard.ports import (
+    AirState,
+    Answering,
+    Crashed,
+    Ending,
+    Failed,
+    Interrupted,
+    LinkLost,
+    Noted,
+    Obeyed,
+    TakenOver,
+    Unfit,
+)
+from rtshcua.onboard.runtime.aftermath import MAY_FLY
+
+Way = Callable[[Run], object]
+
+
+def start(**more: object) -> Run:
+    return Run(loaded(), **more)  # type: ignore[arg-type]
+
+
+def flying(**more: object) -> Run:
+    return start(**more).until_flies("goto")
+
+
+def over(run: Run, seconds: int = 2_000) -> Run:
+    for _ in range(seconds):
+        if run.ending is not None:
+            return run
+        run.clock.advance(S)
+        run.tick()
+    raise AssertionError(f"it goes on: {run.events}")
+
+
+def taken(run: Run) -> None:
+    run.tick(TakenOver(0, "Position"))
+
+
+def failsafe(run: Run) -> None:
+    run.tick(TakenOver(0, "RTL", failsafe=True))
+
+
+def silent(run: Run) -> None:
+    run.step(LinkLost(run.clock.now().monotonic_us, "silent"))
+    run.step(Interrupted(0))
+    for _ in range(60):
+        run.clock.advance(S)
+        run.step()
+
+
+def mute(run: Run) -> None:
+    run.vehicle.deaf = {"hover", "return_home", "emergency_land"}
+    run.tick(Answering(0, answers=False))
+    run.tick(Interrupted(0))
+
+
+def stranded(run: Run) -> None:
+    run.vehicle.fails = {"hover", "return_home", "emergency_land"}
+    run.vehicle.values[WIND] = 30 * M
+
+
+#: what ends a run in the air without a landing: how it ends, and the words that say why nothing watches it
+ENDS: dict[str, tuple[Way, Ending, str]] = {
+    "a pilot": (taken, Ending.STOOD_DOWN, "somebody else flies it"),
+    "a failsafe": (failsafe, Ending.STOOD_DOWN, "its own failsafe flies it"),
+    "silence": (silent, Ending.LINK_LOST, "not heard"),
+    "no answers": (mute, Ending.LINK_LOST, "does not answer"),
+    "no link left": (stranded, Ending.ABORTED, "no landing was seen"),
+}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_what_ends_a_run_in_the_air_says_that_the_vehicle_may_be_flying(name: str) -> None:
+    way, ending, words = ENDS[name]
+    run = flying()
+    way(run)
+    over(run)
+    assert run.ending is ending
+    told = [each["detail"] for each in run.records if each.get("event") in ("stood-down", MAY_FLY)]
+    assert [("the vehicle may be flying" in each, words in each) for each in told] == [(True, True)]
+    assert told == [run.runtime.may_fly]
+
+
+@pytest.mark.parametrize("ending", [Interrupted(0), None])
+def test_what_was_seen_to_land_is_not_said_to_fly(ending: Interrupted | None) -> None:
+    run = flying()
+    if ending is not None:
+        run.tick(ending)
+    over(run)
+    assert run.runtime.may_fly == ""
+    assert MAY_FLY not in run.events
+
+
+def test_a_command_that_was_obeyed_and_then_failed_on_the_ground_is_told() -> None:
+    """The vehicle says that it rests, and may have been told to climb all the same."""
+    run = start(vehicle=FakeVehicle(deaf={"takeoff"})).until_flies("takeoff")
+    token = next(each["token"] for each in run.records if each.get("event") == "dispatched")
+    run.tick(Obeyed(0, token))
+    run.tick(AirState(0, armed=False, airborne=False))
+    run.tick(Failed(0, token, "disarmed"))
+    over(run)
+    assert run.ending is Ending.REFUSED
+    assert "approach it as one that may start" in run.runtime.may_fly
+    assert MAY_FLY in run.events
+
+
+def test_a_refusal_with_nothing_sent_says_nothing_of_flying() -> None:
+    run = start(ready=False)
+    run.tick(Interrupted(0))
+    assert over(run).runtime.may_fly == ""
+
+
+def test_a_crash_has_words_of_its_own() -> None:
+    run = flying()
+    run.tick(Crashed(0, "it leans 80 degrees"))
+    assert (over(run).ending, run.runtime.may_fly) == (Ending.CRASHED, "")
+
+
+def test_a_pilot_and_a_failsafe_take_over_with_different_words() -> None:
+    details = []
+    for way in (taken, failsafe):
+        run = flying()
+        way(run)
+        details += [each["detail"] for each in run.records if each.get("event") == "taken-over"]
+    assert details == ["Position", "by its own failsafe: RTL"]
+
+
+def test_what_no_waiting_changes_ends_the_wait_at_once() -> None:
+    run = start(ready=False)
+    began_us = run.clock.now().monotonic_us
+    run.tick(Unfit(0, "it returns at 15 m (`RTL_ALT`), and the policy says 30 m"))
+    over(run, 3)
+    assert run.ending is Ending.REFUSED
+    assert run.clock.now().monotonic_us - began_us < 5 * S
+    (record,) = [each for each in run.records if each.get("event") == "never-ready"]
+    assert "RTL_ALT" in record["detail"]
+
+
+def test_a_command_that_was_late_says_that_the_computer_was_busy() -> None:
+    run = start(vehicle=FakeVehicle(deaf={"takeoff"})).until_flies("takeoff")
+    token = next(each["token"] for each in run.records if each.get("event") == "dispatched")
+    run.tick(Failed(0, token, "late"))
+    (record,) = [each for each in run.records if each.get("event") == "failed"]
+    assert "too busy" in record["detail"]
+
+
+def test_a_count_of_a_note_is_not_told_as_new_in_the_middle_of_its_opposite() -> None:
+    run = flying(vehicle=FakeVehicle(deaf={"goto"}))
+    bad, good = "it says that its state is critical", "its state is not critical any more"
+    for text in (bad, good, bad, good):
+        run.tick(Noted(0, text))
+    for _ in range(35):
+        run.clock.advance(S)
+        run.tick()
+    noted = [each["detail"] for each in run.records if each.get("event") == "noted"]
+    assert noted[:2] == [bad, good]
+    assert all("1 more time, the last 3" in each or each == f"{good} (1 more time)" for each in noted[2:]), noted

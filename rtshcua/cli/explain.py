@@ -1,7 +1,8 @@
-"""`rtshcua explain`: the page of a diagnostic code."""
+"""`rtshcua explain`: the page of a diagnostic code, and what a finding of `verify-log` means."""
 
 import json
 import sys
+from textwrap import wrap
 from typing import Annotated
 
 import typer
@@ -13,19 +14,26 @@ from rtshcua.diagnostics.codes import REGISTRY, Code
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
 
+_WIDTH = 78
+
 app = typer.Typer(add_completion=False)
 
 
 @app.command()
 def explain(
-    code: Annotated[str | None, typer.Argument(help="a code, E0310, or its name, dimension-mismatch")] = None,
+    code: Annotated[str | None, typer.Argument(help="a code (E0310), its name, or a finding of verify-log")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
 ) -> ExitCode:
-    """Print what a diagnostic code means, why it matters, a bad and a good example; without a code, list all."""
+    """Print what a diagnostic code means, why it matters, a bad and a good example; without a code, list all.
+
+    Of a finding of `verify-log` (`seal/missing`): what was found, what it means, the exit code, and what to do.
+    """
     if code is None:
         _list(as_json)
         return ExitCode.OK
     found = _find(code)
+    if found is None and "/" in code:
+        return _of_log(code, as_json=as_json)
     if found is None:
         near = nearest(code, [*REGISTRY, *(each.slug for each in REGISTRY.values())])
         help = f"did you mean `{near}`?" if near is not None else "`rtshcua explain` lists all codes"
@@ -37,6 +45,28 @@ def explain(
         _draw(page.text)
     else:
         out_rendered(page.text, end="")
+    return ExitCode.OK
+
+
+def _of_log(word: str, *, as_json: bool) -> ExitCode:
+    """What a finding about a log means."""
+    from rtshcua.cli import log_slugs
+
+    found = log_slugs.find(word)
+    if found is None:
+        near = nearest(word, list(log_slugs.every()))
+        help = "" if near is None else f"did you mean `{near}`?"
+        return fail(ExitCode.USAGE, f"`verify-log` finds nothing that is called `{word}`", help)
+    if as_json:
+        said = found._asdict() | {"exit_code": int(found.exit_code)}
+        out_json(json.dumps(said, indent=2, ensure_ascii=False))
+        return ExitCode.OK
+    out(f"{found.slug}: {found.found}")
+    for line in wrap(found.meaning, _WIDTH):
+        out(line)
+    out(f"exit code {int(found.exit_code)}: {found.exit_code.meaning}")
+    if found.help:
+        out(f"help: {found.help}")
     return ExitCode.OK
 
 

@@ -43,8 +43,22 @@ _SHORT = {
     "tail": MEANINGS["tail"],
     "trust": "The log is whole, and a key that it rests on was revoked since: it may have been signed after that.",
 }
+#: the same, of a slug that says something else than its kind
+_OF_SLUG = {
+    "archive/changed": "The file was damaged or changed in the archive, after it was taken in.",
+    "archive/missing": "The file was moved or removed; nothing says that the log itself was bad.",
+    "close/junk-after": (
+        "The signed log ends before it, and its records are as they were signed: a file system that pads, a copy, or "
+        "somebody added the rest."
+    ),
+    "seal/missing": "Whoever wrote the log did not sign in time, or a seal was taken out: no gap explains it.",
+    "seal/gap": "The record of a gap contradicts the records beside it: whoever wrote the log, wrote it wrongly.",
+}
 #: what to do about a failure, by its slug
-_HELPS = {
+HELPS = {
+    "archive/changed": "add the sound log again: `rtshcua archive add`",
+    "archive/missing": "add the log again: `rtshcua archive add`",
+    "close/junk-after": "`head -c BYTE LOG > COPY`, with the byte at which it begins, gives the log alone: verify that",
     "trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key",
     "trust/root-revoked-key": "`--root` or `--revocations` takes the very trust root that was flown under",
     "trust/revoked-log-key": "what witnesses cosigned before counts: `--anchors`",
@@ -105,7 +119,7 @@ def as_object(audit: Audit, path: Path, pinned: Pin, code: ExitCode) -> dict[str
 def _finding(finding: Finding | None) -> dict[str, object] | None:
     if finding is None:
         return None
-    return {**finding._asdict(), "line": finding.record + 1, "help": _HELPS.get(finding.slug)}
+    return {**finding._asdict(), "line": finding.record + 1, "help": HELPS.get(finding.slug)}
 
 
 def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
@@ -138,7 +152,6 @@ def _flight(report: Report, path: Path) -> list[tuple[str, str]]:
 
 
 def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
-    kind = finding.slug.partition("/")[0]
     yield from (("", f"  {line}") for line in wrap(visible(finding.text), WIDTH))
     if finding.offset >= 0:
         yield "", f"  begins    at byte {finding.offset} of the log"
@@ -146,10 +159,9 @@ def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
         yield "", f"  expected  {shorten(visible(finding.expected), _SHOWN)}"
     if finding.found:
         yield "", f"  found     {shorten(visible(finding.found), _SHOWN)}"
-    meaning = (MEANINGS if failed else _SHORT)[kind]
-    yield from (("", f"  {line}") for line in wrap(meaning, WIDTH))
-    if finding.slug in _HELPS:
-        yield "", f"  help      {_HELPS[finding.slug]}"
+    yield from (("", f"  {line}") for line in wrap(meaning_of(finding.slug, failed=failed), WIDTH))
+    if finding.slug in HELPS:
+        yield "", f"  help      {HELPS[finding.slug]}"
 
 
 def _gapped(report: Report) -> str:
@@ -160,6 +172,11 @@ def _gapped(report: Report) -> str:
     if len(report.gaps) == 1:
         return f"gap of {seconds(longest)}, vouched for by {by}"
     return f"{len(report.gaps)} gaps, of {seconds(longest)} at most, vouched for by {by}"
+
+
+def meaning_of(slug: str, *, failed: bool) -> str:
+    """What a finding means to whoever must act on it."""
+    return _OF_SLUG.get(slug) or (MEANINGS if failed else _SHORT)[slug.partition("/")[0]]
 
 
 def _anchored(report: Report) -> str:

@@ -46,6 +46,21 @@ def may_be_torn(line: bytes, prev: str) -> bool:
     return line.startswith(start) or start.startswith(line) or not line.strip(b"\0")
 
 
+def behind_close(line: bytes) -> Flaw:
+    """What is wrong where a line, or part of one, stands behind the signed close: the log itself ends before it."""
+    if not line.strip(b"\0"):
+        what = f"{len(line)} zero octets, as a file system leaves them after a power cut"
+    elif not line.strip():
+        what = "empty lines or blanks"
+    elif line.startswith(_BEGINNING) or _BEGINNING.startswith(line):
+        what = "a record" if line.endswith(b"\n") else "a part of a record"
+    else:
+        what = "something that is no record"
+    text = f"the log is over: behind its signed close stands {what}, for which no key of this log signed"
+    return Flaw("close/junk-after", text, shown(line), "nothing")
+
+
+_BEGINNING = b'{"_prev":"'
 _TYPE = b',"type":"'  # no text can hold it, for a quote inside a text stands behind a backslash
 _VERSION = re.compile(rb',"version":(\d{1,15})[,}]')
 _DECODERS: dict[bytes, msgspec.json.Decoder[AnyRecord]] = {

@@ -19,7 +19,7 @@ from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.gaps import Term
 from rtshcua.evidence.heads import Head
-from rtshcua.evidence.reading import read, shown, too_long
+from rtshcua.evidence.reading import behind_close, read, shown, too_long
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal, is_signed
 from rtshcua.evidence.seals import Seals
 from rtshcua.model.flat.situation import Now
@@ -90,7 +90,7 @@ class Examination:
     def take(self, line: bytes) -> bool:
         """Whether the next line (newline included, if it has one) is kept."""
         if self.reason is None:
-            record = _read(line)
+            record = behind_close(line) if self._closed else _read(line)
             flaw = record if isinstance(record, Flaw) else self._check(record, line)
             if flaw is None:
                 self.kept += len(line)
@@ -111,8 +111,6 @@ class Examination:
 
     def _check(self, record: AnyRecord, line: bytes) -> Flaw | None:
         head = self.head
-        if self._closed:
-            return Flaw("close/junk-after", "there is something after the signed close", shown(line))
         if isinstance(record, Genesis) != (head.seq == 0):
             slug = "genesis/repeated" if head.seq else "genesis/missing"
             return Flaw(slug, "a log has one genesis, and begins with it", record.type)

@@ -19,7 +19,7 @@ from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.gaps import Term, told
 from rtshcua.evidence.heads import START, Head
 from rtshcua.evidence.merkle import leaf_hash
-from rtshcua.evidence.reading import SHOWN, may_be_torn, read, shown, too_long
+from rtshcua.evidence.reading import SHOWN, behind_close, may_be_torn, read, shown, too_long
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
 from rtshcua.evidence.report import Report, claims, unsealed
 from rtshcua.evidence.seals import Seals
@@ -84,7 +84,7 @@ class Verifier:
     def _read(self, line: bytes) -> AnyRecord | Flaw | None:
         # 1 the line
         if self.close is not None:
-            return Flaw("close/junk-after", "there is something after the signed close", shown(line))
+            return behind_close(line)
         flaw = too_long(line)
         if flaw is not None:
             return flaw

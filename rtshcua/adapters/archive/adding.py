@@ -62,8 +62,11 @@ def add(folder: Folder, sources: Iterable[Source], check: Check) -> Iterator[Don
                 yield from batch.settle()
                 raise
             held = entries.get(digest)
-            if digest in batch.logs or (held is not None and not new and _no_less(held, check)):
-                yield Done(source.path, held or batch.logs[digest][1], known=True)
+            if digest in batch.logs:
+                batch.copies.append((source.path, digest))
+                continue
+            if held is not None and not new and _no_less(held, check):
+                yield Done(source.path, held, known=True)
                 continue
             yield from batch.put(source.path, _asked(held, digest, size, str(source.path), check))
         yield from batch.settle()
@@ -125,10 +128,13 @@ def _asked(held: Entry | None, digest: str, size: int, name: str, check: Check) 
 
 
 class _Batch:
-    """Logs that are verified and indexed together. `entries`, the rows by log, follow what came of them."""
+    """Logs that are verified and indexed together. `entries`, the rows by log, follow what came of them; of `copies` of
+    them the same came.
+    """
 
     def __init__(self, folder: Folder, entries: dict[str, Entry], check: Check) -> None:
         self.logs: dict[str, tuple[Path, Entry]] = {}
+        self.copies: list[tuple[Path, str]] = []
         self._folder = folder
         self._entries = entries
         self._check = check
@@ -159,4 +165,7 @@ class _Batch:
         write_catalogue(folder, entries.values())
         for digest, (path, _) in self.logs.items():
             yield Done(path, entries[digest], known=False)
+        for path, digest in self.copies:
+            yield Done(path, entries[digest], known=True)
         self.logs.clear()
+        self.copies.clear()

@@ -64,6 +64,27 @@ def test_what_is_known_of_a_log(take: Add, fleet: Path, folder: Folder) -> None:
     assert entries(folder) == [entry, second.entry]
 
 
+def test_copies_of_one_log_that_come_together_are_one_log_and_all_are_told_of(
+    take: Add, fleet: Path, folder: Folder, tmp_path: Path
+) -> None:
+    """A sound one is never called failed: what came of the first came of each."""
+    sound, broken = fleet / "quad-08-0.jsonl", tmp_path / "broken.jsonl"
+    broken.write_bytes(sound.read_bytes()[:-1] + b"#\n")
+    paths = []
+    for log in (sound, broken):
+        for number in range(2):
+            paths.append(tmp_path / f"copy-{number}-of-{log.name}")
+            paths[-1].write_bytes(log.read_bytes())
+    done = take([sound, broken, *paths])
+    told = {each.path.name: (each.entry.status, each.known) for each in done}
+    assert told == {
+        sound.name: ("verified", False), broken.name: ("failed", False),
+        **{path.name: ("verified" if sound.name in path.name else "failed", True) for path in paths},
+    }  # fmt: skip
+    assert all((each.entry.finding is None) is (each.entry.status == "verified") for each in done)
+    assert len(entries(folder)) == 2
+
+
 def test_a_log_is_kept_octet_for_octet_under_its_digest(take: Add, fleet: Path, folder: Folder) -> None:
     (done,) = take([fleet / "quad-08-0.jsonl"])
     kept = folder.log(done.entry.log)

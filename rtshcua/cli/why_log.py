@@ -1,6 +1,7 @@
 """`rtshcua why` on a log: one decision on a step or a link, from the inputs that it records, and what ended the flight.
 
-Without a number it is the last decision on a step that was not `allow`, else the last on a step.
+Without a number it begins with the cause, where the flight ended early, and goes on with the last decision on a step
+that was not `allow`, else the last on a step.
 """
 
 from base64 import b64decode
@@ -14,6 +15,7 @@ from rtshcua.cli.outcome import CUT_AT_FIRST
 from rtshcua.cli.showing.link import show_link
 from rtshcua.cli.showing.log import Names
 from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.people import People
 from rtshcua.cli.showing.why import Case, show_why
 from rtshcua.cli.shown import utc
 from rtshcua.cli.subject import Subject, after, unpacked
@@ -32,6 +34,10 @@ _TURNS = frozenset({
     "crashed", "stranded", "not-landed", "resumed", "already-airborne", "left", "refused", "undecided", "stood-down",
     "boundary-lost",
 })  # fmt: skip
+#: of these, what only says how it went on after the cause
+_FOLLOWS = frozenset({"stood-down", "not-landed", "stranded", "left", "resumed", "already-airborne"})
+#: what is over when something else is recorded
+_OVER = {"link-back": ("link-lost", "long-silence"), "gap-over": ("gap",)}
 _MOST = 20  # what is told of how it ended, in records
 
 
@@ -54,6 +60,9 @@ class _Log:
         self.aloft = False  # something was sent before the chosen record that may have lifted it off
         self.ended: list[_Told] = []
         self.answers: list[tuple[int, _Told]] = []  # approvals, by their step
+        self.cause: _Told | None = None  # why it ended early, if it did
+        self._caused_by = ""  # the event of that
+        self._falls = False  # a link flies: what comes now is no cause any more
         self._path, self._number = path, number
         self._names = Names(None)
         self._in_force: Subject | None = None
@@ -63,6 +72,11 @@ class _Log:
     def begun(self) -> bool:
         """Whether its first record could be read."""
         return self._in_force is not None
+
+    @property
+    def people(self) -> People:
+        """Who may have signed what it holds."""
+        return self._names.people
 
     def read(self) -> ExitCode | None:
         """Read all of it; an exit code where it makes no sense, which was told."""
@@ -85,6 +99,7 @@ class _Log:
             return None
         self._names.follow(record)
         self._choose(record)
+        self._find_cause(record)
         if isinstance(record, Seal):
             return None
         if isinstance(record, Effect):
@@ -104,6 +119,25 @@ class _Log:
                 return newer
             self._in_force = newer
         return None
+
+    def _find_cause(self, record: Decision | Effect | Close | Recover | Seal) -> None:
+        """The last thing that turned the mission away from its steps, before a link flew: a step that is admitted
+        later says that it went on all the same.
+        """
+        if isinstance(record, Decision):
+            if record.kind != STEP:
+                self._falls = True
+            elif record.outcome == "allow":
+                self.cause, self._caused_by, self._falls = None, "", False
+            elif record.outcome != "defer" and not self._falls:
+                self.cause, self._caused_by = self._tell(record), "decision"
+        elif isinstance(record, Effect) and not self._falls:
+            if record.event in _TURNS - _FOLLOWS:
+                self.cause, self._caused_by = self._tell(record), record.event
+            elif self._caused_by in _OVER.get(record.event, ()):
+                self.cause, self._caused_by = None, ""
+        elif isinstance(record, Close) and record.ending == "completed":
+            self.cause = None
 
     def _tell(self, record: Decision | Effect | Close | Recover | Seal) -> _Told:
         return _Told(record.seq, record.at_us, self._names.tell(record))
@@ -136,8 +170,15 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
     if chosen is None or subject is None:
         what = "no decision on a step" if number is None else f"no record {number} that can be explained"
         return fail(ExitCode.INPUT, f"`{path}` has {what}", "`rtshcua show` lists the records with their numbers")
+    cause = log.cause if number is None else None
+    if cause is not None and cause.seq != chosen.seq:
+        _list(page, "The cause: why it ended early", [cause], log.start_us)
+        page.head("Before that, the last decision on a step")
     page.text(f"record {chosen.seq} of {path}, {utc(chosen.utc_us)} (not verified)", indent=0)
-    shown = _decision(page, chosen, subject, log.aloft) if isinstance(chosen, Decision) else _effect(page, chosen, log)
+    if isinstance(chosen, Decision):
+        shown = _decision(page, chosen, subject, log.aloft, log.people)
+    else:
+        shown = _effect(page, chosen, log)
     if isinstance(shown, ExitCode):
         return shown
     answers = [told for step, told in log.answers if isinstance(chosen, Decision) and step == chosen.step]
@@ -145,19 +186,22 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
     _list(page, "How it ended: what turned it homeward, and what was then decided", log.ended[-_MOST:], log.start_us)
     return shown | {
         "record": chosen.seq,
+        "cause": None if cause is None else cause._asdict(),
         "answers": [told._asdict() for told in answers],
         "ended": [told._asdict() for told in log.ended],
     }
 
 
-def _decision(page: Page, chosen: Decision, subject: Subject, aloft: bool) -> dict[str, object] | ExitCode:
+def _decision(
+    page: Page, chosen: Decision, subject: Subject, aloft: bool, people: People
+) -> dict[str, object] | ExitCode:
     state = state_of(chosen)
     if len(state.values) != subject.policy.policy.slots or len(state.ages) != len(state.values):
         return fail(ExitCode.INPUT, f"record {chosen.seq} has a state of another policy")
     there = 0 <= chosen.step < len(subject.invocations)
     if chosen.kind == STEP and there:
         invocation = subject.invocations[chosen.step]
-        case = Case(invocation, state, context_of(chosen), now_of(chosen), subject.phases, aloft)
+        case = Case(invocation, state, context_of(chosen), now_of(chosen), subject.phases, aloft, people)
         return show_why(page, trace(invocation, state, subject.policy, case.context, case.now), case)
     if chosen.kind != STEP and (there or of_contingency(chosen)):
         of = None if of_contingency(chosen) else subject.invocations[chosen.step]

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.cli.showing.named import named
 from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.people import NOBODY, People
 from rtshcua.cli.shown import utc
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
 from rtshcua.model.flat.mission import Invocation
@@ -50,7 +51,11 @@ class Said(NamedTuple):
     @property
     def text(self) -> str:
         """One line: the answer, who gives it, and until when it is good."""
-        return f"{_body(self.body)}; key {self.kid.hex()}"
+        return self.told(NOBODY)
+
+    def told(self, people: People) -> str:
+        """The same, by whom among these people."""
+        return f"{_body(self.body)}; by {people.signer(self.kid)}"
 
 
 def said(document: bytes) -> Said:
@@ -60,10 +65,10 @@ def said(document: bytes) -> Said:
     return Said(kind, envelope.kid, parse(kind, envelope.payload, _SHAPES[kind]))
 
 
-def recorded(detail: str) -> str:
-    """What a document in a log says, in one line; what is wrong with it where it makes no sense."""
+def recorded(detail: str, people: People = NOBODY) -> str:
+    """What a document in a log says, in one line, and who signed it; what is wrong where it makes no sense."""
     try:
-        return said(b64decode(detail, validate=True)).text
+        return said(b64decode(detail, validate=True)).told(people)
     except (ValueError, Untrusted):
         return "what it holds is no document"
 

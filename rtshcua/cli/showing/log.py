@@ -11,6 +11,7 @@ from rtshcua.cli.showing import words
 from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.cli.showing.document import recorded
 from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.people import NOBODY, People
 from rtshcua.cli.shown import many, true_to, utc
 from rtshcua.evidence.chain import BOUNDARY
 from rtshcua.evidence.finding import Flaw
@@ -53,10 +54,10 @@ def show_log(page: Page, lines: Iterable[bytes]) -> dict[str, object]:
     return {"kind": "log", "verified": False, "records": entries, "stopped": stopped}
 
 
-def detail_of(event: str, detail: str) -> str:
-    """An effect's detail for a person: a document by what it says, a number by what it counts."""
+def detail_of(event: str, detail: str, people: People = NOBODY) -> str:
+    """An effect's detail for a person: a document by what it says and who signed it, a number by what it counts."""
     if event in DOCUMENTS:
-        return recorded(detail)
+        return recorded(detail, people)
     if event == ANCHORED:
         return _witnessed(detail)
     if event == OBEYED and (target := _TARGET.fullmatch(detail)) is not None:
@@ -129,15 +130,17 @@ def _bundle(genesis: Genesis) -> Claimed | None:
 
 
 class Names:
-    """The words of a bundle for steps and links; numbers where it has none."""
+    """The words of a bundle for steps and links, numbers where it has none; and the people of a trust root."""
 
-    def __init__(self, bundle: Claimed | None) -> None:
+    def __init__(self, bundle: Claimed | None, people: People = NOBODY) -> None:
         self._bundle = bundle
+        #: who may have signed documents
+        self.people = people
 
     @classmethod
     def of(cls, genesis: Genesis) -> "Names":
         """The words of the bundle that a log began with."""
-        return cls(_bundle(genesis))
+        return cls(_bundle(genesis), People.of(genesis))
 
     def follow(self, record: AnyRecord) -> None:
         """After a replacement the steps have other words."""
@@ -154,7 +157,7 @@ class Names:
             return f"{record.outcome:<9} {subject}: {record.reason}{clause}{target}"
         if isinstance(record, Effect):
             subject = self._subject(record.kind, record.step, record.link)
-            detail = detail_of(record.event, record.detail)
+            detail = detail_of(record.event, record.detail, self.people)
             return "  ".join(word for word in (f"· {record.event:<15}", subject, detail) if word).rstrip()
         if isinstance(record, Close):
             return f"closed after {many(record.seq, 'record')}: {record.ending}"

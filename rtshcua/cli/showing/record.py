@@ -9,6 +9,7 @@ from rtshcua.cli.showing import words
 from rtshcua.cli.showing.bundle import claimed
 from rtshcua.cli.showing.log import Names, detail_of
 from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.people import NOBODY, People
 from rtshcua.cli.shown import true_to, utc
 from rtshcua.cli.simulation import SIMULATED
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Sealing, Signed
@@ -42,12 +43,14 @@ class Told:
         self.simulated = ""  # what the log says of a vehicle that was
         self._number = number
         self._names = Names(None)
+        self.people = NOBODY
         self._allowed: dict[Ref, Decision] = {}
 
     def take(self, record: AnyRecord) -> None:
         """Takes the next record."""
         if isinstance(record, Genesis):
             self.genesis, self._names = record, Names.of(record)
+            self.people = self._names.people
         self._names.follow(record)
         if record.seq == self._number:
             self.record, self.what = record, self._names.tell(record)
@@ -131,7 +134,14 @@ def _decision(page: Page, record: Decision, told: Told, genesis: Genesis) -> Non
     left = f"at most {given.remaining_us / 1_000:g} ms until it is sent"
     page.row("timing", f"released {max(record.at_us - given.released_us, 0) / 1_000:g} ms before, {left}")
     if given.approvals:
-        page.row("approvals", ", ".join("granted" if granted else "refused" for _, _, granted, _, _ in given.approvals))
+        page.row(
+            "approvals", ", ".join(_given(granted, person, told.people) for _, _, granted, _, person in given.approvals)
+        )
+
+
+def _given(granted: int, person: int, people: People) -> str:
+    by = people.by_number.get(person)
+    return f"{'granted' if granted else 'refused'}{f' by {by}' if by else ''}"
 
 
 def _state(record: Decision, genesis: Genesis) -> list[str]:
@@ -168,7 +178,7 @@ def _age(age_us: int) -> str:
 def _effect(page: Page, record: Effect, told: Told) -> None:
     page.row("event", record.event)
     if record.detail:
-        page.row("says", detail_of(record.event, record.detail))
+        page.row("says", detail_of(record.event, record.detail, told.people))
     if record.event == "dispatched":
         page.row("permitted", "by a standing permit" if told.permit is None else f"by record {told.permit.seq}")
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.page import Page
+from rtshcua.cli.showing.people import NOBODY, People
 from rtshcua.cli.shown import utc
 from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.prepare import PreparedInvocation
@@ -35,6 +36,7 @@ class Case(NamedTuple):
     now: Now
     phases: tuple[str, ...]
     aloft: bool | None = None  # whether something had been sent that may have lifted it off; None: not known
+    people: People = NOBODY
 
 
 def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
@@ -129,7 +131,7 @@ def _fact(number: str, case: Case) -> str:
         case "3":
             return f"role {policy.roles[flat.role]} through {words.source(flat.source)}"
         case "3b":
-            return "; ".join(dict.fromkeys(_answer(policy, each, now) for each in context.approvals))
+            return "; ".join(dict.fromkeys(_answer(policy, each, now, case.people) for each in context.approvals))
         case "4":
             during = ", ".join(name for at, name in enumerate(case.phases) if flat.phases >> at & 1)
             current = case.phases[context.phase] if 0 <= context.phase < len(case.phases) else "none yet"
@@ -149,12 +151,13 @@ def _milliseconds(us: int) -> str:
     return words.duration(-(-us // 1_000) * 1_000) if us else "0 ms"
 
 
-def _answer(policy: Policy, given: Approval, now: Now) -> str:
+def _answer(policy: Policy, given: Approval, now: Now, people: People) -> str:
     """Who answered, what, and when."""
     role = policy.roles[given.role] if 0 <= given.role < len(policy.roles) else f"role {given.role}"
     ago_us = max(now.monotonic_us - given.monotonic_us, 0)
     said = "granted" if given.granted else "refused"
-    return f"{said} as {role}, {utc(now.utc_us - ago_us)}, {ago_us / 1_000_000:.1f} s before"
+    by = people.by_number.get(given.person)
+    return f"{said} as {role}{f' by {by}' if by else ''}, {utc(now.utc_us - ago_us)}, {ago_us / 1_000_000:.1f} s before"
 
 
 def truth_of(check: Check) -> str:

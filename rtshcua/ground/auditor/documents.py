@@ -9,7 +9,9 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import Effect
 from rtshcua.model.flat.situation import Now
+from rtshcua.wire import cose
 from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, REPLACEMENT
+from rtshcua.wire.trust import TrustRoot
 
 #: the documents of a flight, by the event that records one
 KINDS: Final = {
@@ -18,10 +20,14 @@ KINDS: Final = {
 
 
 class Documents:
-    """Follows the documents that a log says were accepted. `counts` has how many there were of each kind."""
+    """Follows the documents that a log says were accepted. `counts` has how many there were of each kind, and `people`
+    who of the trust root's persons signed some of each, in the order in which they did.
+    """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, root: TrustRoot) -> None:
         self._session = session
+        self._persons = {key.kid: key.person for key in root.keys if key.person}
+        self.people: dict[str, list[str]] = {kind: [] for kind in KINDS}
         self.counts = dict.fromkeys(KINDS, 0)
 
     def check(self, record: Effect) -> Flaw | None:
@@ -39,4 +45,7 @@ class Documents:
         if receipt.kind != kind or receipt.step != record.step:
             return Flaw("document/other", f"the document is not the {record.event} that its record says it is")
         self.counts[record.event] += 1
+        person, people = self._persons.get(cose.unverified(document).kid), self.people[record.event]
+        if person is not None and person not in people:
+            people.append(person)
         return None

@@ -25,7 +25,7 @@ class Meaning:
         self.derived = 0
         session = Session(basis.in_force, enforced=mode != UNENFORCED)
         self._deriver = Deriver(basis, session)
-        self._documents = Documents(session)
+        self._documents = Documents(session, basis.root)
         self._cover = Cover()
         self.preparations = ListedParameters()
         self._turns = Turns(basis)
@@ -39,6 +39,11 @@ class Meaning:
     def documents(self) -> dict[str, int]:
         """How many documents of each kind were verified."""
         return self._documents.counts
+
+    @property
+    def people(self) -> dict[str, list[str]]:
+        """Who signed documents of each kind, by the names that the trust root has for them."""
+        return self._documents.people
 
     def check(self, record: AnyRecord) -> Flaw | None:
         """What is wrong with the next record, or None."""

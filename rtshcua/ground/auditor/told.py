@@ -29,7 +29,9 @@ def of_trust(genesis: Genesis, basis: Basis) -> Claims:
 def of_meaning(basis: Basis, meaning: Meaning) -> Claims:
     """What deriving again proved."""
     proven = [Claim("decisions", f"{_many(meaning.derived, 'decision')} derived again, each with the same answer")]
-    documents = [_many(count, kind) for kind, count in meaning.documents.items() if count]
+    documents = [
+        f"{_many(count, kind)}{_by(meaning.people[kind])}" for kind, count in meaning.documents.items() if count
+    ]
     if documents:
         text = f"{', '.join(documents)}, each signed by a key that the root trusts for it, and good when it came"
         proven.append(Claim("documents", text))
@@ -46,6 +48,10 @@ def of_meaning(basis: Basis, meaning: Meaning) -> Claims:
         text = f"{_many(meaning.dispatches, 'dispatch', 'dispatches')}, each after a record that permits it"
         proven.append(Claim("dispatches", text))
     return tuple(proven), tuple(unproven)
+
+
+def _by(people: list[str]) -> str:
+    return f" by {' and '.join(people)}" if people else ""
 
 
 def _many(count: int, one: str, more: str | None = None) -> str:

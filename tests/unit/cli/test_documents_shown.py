@@ -9,6 +9,7 @@ import pytest
 
 from reference.documents import approval, cancellation, hand, low, recall, replacement
 from reference.flat_case import BATTERY, WIND, S
+from reference.forgery import edit
 from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT_KEY, TICK, FakeVehicle, Run
 from rtshcua.cli.app import main
 from rtshcua.cli.live.lines import ending
@@ -76,7 +77,42 @@ def test_a_replacement_that_is_none(log: Path, capsys: pytest.CaptureFixture[str
 def test_the_audit_says_what_was_signed(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify-log", str(log), "--root", ROOT_KEY.public.hex(), "--json", "--audit"]) == ExitCode.OK
     proven = {claim["slug"]: claim["text"] for claim in json.loads(capsys.readouterr().out)["proven"]}
-    assert proven["documents"].startswith("1 approval, 1 recall, 1 replacement, ")
+    assert proven["documents"].startswith("1 approval by ada, 1 recall by ada, 1 replacement, ")
+
+
+def test_the_person_who_signed_is_named_from_the_trust_root(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A key's name says nothing to whoever reads the log: the root in it has the person's."""
+    assert main(["show", str(log)]) == ExitCode.OK
+    told = [line for line in capsys.readouterr().out.splitlines() if f"by ada, key {APPROVAL_KEY.kid.hex()}" in line]
+    assert [line.split("·")[1].split()[0] for line in told] == ["approval", "recall"]
+    records = [json.loads(line) for line in log.read_bytes().splitlines()]
+    approved = next(each["seq"] for each in records if each.get("event") == "approval")
+    assert main(["verify-log", str(log), "--root", ROOT_KEY.public.hex(), "--explain", str(approved)]) == ExitCode.OK
+    assert "by ada, key" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_trust_root_that_makes_no_sense_names_nobody(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, *rest = log.read_bytes().splitlines(keepends=True)
+    for root in ("", "!!", "aGVsbG8="):
+        log.write_bytes(edit(first, root=root) + b"".join(rest))
+        assert main(["show", str(log)]) == ExitCode.OK
+        out = capsys.readouterr().out
+        assert f"by key {APPROVAL_KEY.kid.hex()}" in out
+        assert "ada" not in out
+
+
+def test_why_begins_with_what_ended_the_flight(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An admitted step says nothing of that: the recall does."""
+    assert main(["why", str(log)]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert out.startswith("The cause: why it ended early\n")
+    assert "recall" in out.splitlines()[1]
+    assert main(["why", str(log), "--json"]) == ExitCode.OK
+    said = json.loads(capsys.readouterr().out)
+    assert said["outcome"] == "allow"
+    assert "recall" in said["cause"]["what"]
+    assert main(["why", str(log), "--record", str(said["record"]), "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["cause"] is None, "that record was asked for"
 
 
 @pytest.mark.parametrize(
@@ -173,7 +209,7 @@ def broken_off(tmp_path: Path) -> Path:
 def test_why_tells_what_ended_a_flight_and_who_answered(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(broken_off)]) == ExitCode.OK
     out = capsys.readouterr().out
-    assert "granted as supervisor, 2" in out, "in the step that asks for it, with the time"
+    assert "granted as supervisor by ada, 2" in out, "in the step that asks for it, with the time"
     assert "What was answered about this step" in out
     assert "How it ended" in out
     assert "· interrupted" in out
@@ -244,3 +280,10 @@ def test_the_target_of_a_degrade_rule_is_named_as_such() -> None:
     names = Names(None)
     told = [names.tell(record) for record in map(read, run.lines) if not isinstance(record, Flaw)]
     assert any("target of the degrade rule, at step 2" in line for line in told)
+
+
+def test_one_record_of_a_decision_names_who_answered(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    records = [json.loads(line) for line in broken_off.read_bytes().splitlines()]
+    decided = next(each["seq"] for each in records if each["type"] == "decision" and each["context"]["approvals"])
+    main(["verify-log", str(broken_off), "--root", ROOT_KEY.public.hex(), "--explain", str(decided)])
+    assert "granted by ada" in " ".join(capsys.readouterr().out.split())

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 import rtshcua
+from reference.forgery import flight
+from reference.verifiers import ROOT_KEY
 from rtshcua.cli import log_slugs
 from rtshcua.cli.app import main
 from rtshcua.cli.verdict import MEANINGS
@@ -112,3 +114,21 @@ def test_explain_prints_what_a_slug_means(word: str, code: int, capsys: pytest.C
 def test_a_slug_that_is_none_is_told_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "seal/mising"]) == 2
     assert "did you mean `seal/missing`?" in capsys.readouterr().err
+
+
+def test_a_whole_log_with_zeros_behind_it_is_named_as_what_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As a file system pads it after a power cut: nothing says that it was forged, and it tells how to go on."""
+    whole = b"".join(flight())
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(whole + bytes(4096))
+    assert main(["verify-log", str(path), "--root", ROOT_KEY.hex()]) == ExitCode.EVIDENCE
+    out = " ".join(capsys.readouterr().out.split())
+    assert "close/junk-after" in out
+    assert "4096 zero octets, as a file system leaves them after a power cut" in out
+    assert "its records are as they were signed" in out
+    assert "forged" not in out
+    assert f"begins at byte {len(whole)} of the log" in out
+    path.write_bytes(path.read_bytes()[: len(whole)])
+    assert main(["verify-log", str(path), "--root", ROOT_KEY.hex()]) == ExitCode.OK

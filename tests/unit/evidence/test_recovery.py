@@ -129,9 +129,11 @@ def test_an_epoch_that_was_never_sealed_is_no_crash() -> None:
 
 def test_what_stands_behind_the_close_is_no_crash(lines: list[bytes]) -> None:
     log = lines + recovered(examined(lines))
-    for more in (b"x", b"\n", lines[-1]):
+    for more in (b"x", b"\n", lines[-1], bytes(512)):
         found = examined([*log, more])
         assert found.state is State.TAMPERED
+        assert found.reason is not None
+        assert found.reason.slug == "close/junk-after"
         assert found.kept == sum(map(len, log))
 
 

@@ -127,6 +127,15 @@ def test_whoever_reads_along_can_end_it(log: list[bytes]) -> None:
 def test_nothing_may_follow_the_close(log: list[bytes]) -> None:
     assert failure([*log, b"\n"]) == ("close/junk-after", 9)
     assert failure([*log, b"x"]) == ("close/junk-after", 9)
+    for junk, what in (
+        (bytes(4096), "4096 zero octets, as a file system leaves them"), (b"\n", "empty lines or blanks"),
+        (b"  \n", "empty lines or blanks"), (log[-1], "stands a record,"), (log[-1][:50], "a part of a record"),
+        (log[-1][:3], "a part of a record"), (b"junk\n", "something that is no record"),
+    ):  # fmt: skip
+        found = verify([*log, junk]).failure
+        assert found is not None
+        assert (found.slug, found.offset) == ("close/junk-after", sum(map(len, log)))
+        assert what in found.text
     assert failure([*log, log[-1]]) == ("close/junk-after", 9)
 
 

@@ -1,0 +1,62 @@
+"""A run whose boundary is a process of its own takes the time of day from that, and from nobody else."""
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.utc import kernel_error_us
+
+pytestmark = [
+    pytest.mark.skipif(program() is None, reason="the boundary's program was not built"),
+    pytest.mark.skipif(kernel_error_us() is not None, reason="this machine's clock is synchronised"),
+]
+
+
+def clock_of(run: Any) -> str:
+    """What the log says last of where the time of day is from."""
+    told: list[str] = [
+        record["detail"] for record in run.log() if record["type"] == "effect" and record["event"] == "clock"
+    ]
+    return told[-1]
+
+
+def audited(ground: Any, folder: Path) -> dict[str, Any]:
+    done = ground.start("verify-log", "--audit", str(folder), "--json").end()
+    (said,) = done.events
+    return dict(said)
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_over_a_link_with_a_key_it_is_the_vehicles(ground: Any, port: int, flavour: str) -> None:
+    """The boundary verifies the vehicle's SYSTEM_TIME itself, in answer to a number that it drew."""
+    key = ground.folder / "link.key"
+    key.write_text("5a" * 32 + "\n")
+    key.chmod(0o600)
+    linked = ("--signing-key", str(key))
+    bundle = ground.bundle()
+    ground.vehicle(port, 1, "--flavour", flavour, *linked)
+    where = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--unsigned-radio", "--mode", "process")
+    run = ground.run(bundle, *where, *linked, speed=1)
+    run.until("dispatched", step=0)
+    run.signal(signal.SIGINT)
+    run.end()
+    said = audited(ground, run.folder)
+    assert not said.get("finding"), said
+    assert clock_of(run).startswith("vehicle: "), clock_of(run)
+    (clock,) = [claim for claim in said["proven"] if claim["slug"] == "clock"]
+    assert "by the vehicle" in clock["text"]
+
+
+def test_over_a_link_without_one_nothing_flies_until_somebody_states_a_bound(ground: Any, port: int) -> None:
+    bundle = ground.bundle()
+    ground.vehicle(port, 1)
+    where = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--mode", "process")
+    run = ground.run(bundle, *where, speed=1)
+    run.until("decision", reason="freshness/clock-uncertain")
+    run.signal(signal.SIGINT)
+    run.end()
+    assert clock_of(run).startswith("unknown")
+    assert audited(ground, run.folder).get("finding") is None

@@ -43,7 +43,7 @@ EXPORT void rt_test_clock_look(const int64_t *machine);
 EXPORT void rt_test_clock_settle(int64_t now_us);
 EXPORT bool rt_test_clock_asks(int64_t now_us);
 EXPORT void rt_test_clock_challenge(int64_t number, int64_t now_us);
-EXPORT void rt_test_clock_hear(const uint8_t *frame, uint32_t size, uint8_t link, int64_t now_us);
+EXPORT void rt_test_clock_hear(const uint8_t *frame, uint32_t size, uint8_t link, int64_t vehicle_us, int64_t now_us);
 EXPORT void rt_test_clock_now(int64_t now_us, int64_t *said);
 EXPORT bool rt_test_bears_out(const int64_t *own, const int64_t *named);
 
@@ -67,8 +67,8 @@ bool rt_test_clock_asks(int64_t now_us) { return rt_clock_asks(&test_clock, now_
 
 void rt_test_clock_challenge(int64_t number, int64_t now_us) { rt_clock_challenge(&test_clock, number, now_us); }
 
-void rt_test_clock_hear(const uint8_t *frame, uint32_t size, uint8_t link, int64_t now_us) {
-    rt_clock_hear(&test_clock, (rt_bytes){frame, size}, link, now_us);
+void rt_test_clock_hear(const uint8_t *frame, uint32_t size, uint8_t link, int64_t vehicle_us, int64_t now_us) {
+    rt_clock_hear(&test_clock, (rt_bytes){frame, size}, link, vehicle_us, now_us);
 }
 
 /* Where it is from, the moment, and the number that is asked for. */

@@ -57,7 +57,8 @@ static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, i
             memcpy(bare, frame.at, frame.size);
             rt_set_flags(bare, 0);
             frame = (rt_bytes){bare, frame.size - RT_SIGNATURE};
-            if (own_us >= 0) rt_clock_hear(&boundary->clock, frame, link, own_us);
+            const bool known = gate->autopilot == RT_MAV_AUTOPILOT_ARDUPILOTMEGA && gate->system == frame.at[5];
+            if (own_us >= 0) rt_clock_hear(&boundary->clock, frame, link, known ? RT_ARDUPILOT_US : RT_VEHICLE_US, own_us);
         }
     }
     if (heard == RT_ACCEPTED)

@@ -5,7 +5,6 @@
 
 #define DRIFT_US 500
 #define SECOND_US 1000000
-#define VEHICLE_US 6001000LL
 #define CHALLENGE_US 5000000LL
 #define UNIX_US 1000000000000000LL /* 2001 */
 #define SYSTEM_TIME 2              /* time_unix_usec (u64), time_boot_ms (u32); that of TIMESYNC has tc1 and ts1 (i64) */
@@ -72,7 +71,7 @@ static bool of_autopilot(rt_bytes frame, uint32_t *message, uint8_t body[TIMES])
     return true;
 }
 
-void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t monotonic_us) {
+void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t vehicle_us, int64_t monotonic_us) {
     uint32_t message;
     uint8_t body[TIMES];
     if (clock->source != RT_UTC_UNKNOWN || clock->number == 0 || monotonic_us - clock->drawn_us > CHALLENGE_US) return;
@@ -89,7 +88,7 @@ void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t monoto
         const uint64_t utc_us = le64(body);
         if (utc_us < UNIX_US || utc_us > RT_MAX_VALUE) return;
         const int64_t open_us = rt_max(0, monotonic_us - clock->drawn_us);
-        take(clock, RT_UTC_VEHICLE, (int64_t)utc_us - monotonic_us + open_us / 2, VEHICLE_US + open_us - open_us / 2, monotonic_us);
+        take(clock, RT_UTC_VEHICLE, (int64_t)utc_us - monotonic_us + open_us / 2, vehicle_us + open_us - open_us / 2, monotonic_us);
     }
 }
 

@@ -36,8 +36,13 @@ bool rt_clock_asks(const rt_clock *clock, int64_t monotonic_us);
 void rt_clock_challenge(rt_clock *clock, int64_t number, int64_t monotonic_us);
 int64_t rt_clock_number(const rt_clock *clock);
 
-/* A frame of which the link's signature was verified came in by a link of this id; its signature is off. */
-void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t monotonic_us);
+/* how far the clocks of autopilots may be off, and a stamp that is in whole ms: of ArduPilot, and of any */
+#define RT_ARDUPILOT_US 1001000LL
+#define RT_VEHICLE_US 6001000LL
+
+/* A frame of which the link's signature was verified came in by a link of this id; its signature is off. The vehicle's own UTC may be
+   off by so much. */
+void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t vehicle_us, int64_t monotonic_us);
 
 /* Whether a time of day that is named may be decided by. */
 bool rt_bears_out(const rt_now *own, const rt_now *named);

@@ -34,7 +34,7 @@ void rt_clock_settle(rt_clock *clock, int64_t monotonic_us) {}
 bool rt_clock_asks(const rt_clock *clock, int64_t monotonic_us) { return EITHER(); }
 void rt_clock_challenge(rt_clock *clock, int64_t number, int64_t monotonic_us) {}
 int64_t rt_clock_number(const rt_clock *clock) { return WITHIN(0, INT64_MAX); }
-void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t monotonic_us) { read_all(frame); }
+void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t vehicle_us, int64_t monotonic_us) { read_all(frame); }
 bool rt_attest(rt_boundary *of, int64_t session, const uint8_t before[RT_DIGEST_BYTES]) {
     read_all((rt_bytes){before, RT_DIGEST_BYTES});
     return EITHER();

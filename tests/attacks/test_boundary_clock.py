@@ -245,6 +245,17 @@ def test_the_vehicles_time_is_taken_from_frames_that_the_boundary_verified(keyed
     assert keyed.own().now.utc_us < utc_us + S_US * 60, "once it was taken, nothing moves any more"
 
 
+@pytest.mark.parametrize(("autopilot", "least_us"), [(None, 6_000_000), (12, 6_000_000), (3, 1_000_000)])
+def test_its_error_is_what_the_autopilot_lets_its_clock_be_off(
+    keyed: Keyed, autopilot: int | None, least_us: int
+) -> None:
+    """As its HEARTBEAT says, which was verified too; the worse of both where none was heard."""
+    if autopilot is not None:
+        keyed.hear(keyed.said(m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 4, 3)))
+    keyed.hear(keyed.answers(), keyed.tells(machine().utc_us))
+    assert least_us < keyed.own().now.utc_error_us < least_us + 5 * S_US
+
+
 def test_frames_that_were_held_back_tell_no_time(keyed: Keyed) -> None:
     """The hour that is past was signed before the boundary drew its number, or the answer to another."""
     past = keyed.tells(machine().utc_us - 5 * HOUR_US)

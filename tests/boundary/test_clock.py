@@ -17,7 +17,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
-from rtshcua.onboard.enforcement.clock import CHALLENGE_US, OwnClock
+from rtshcua.onboard.enforcement.clock import ARDUPILOT_US, CHALLENGE_US, VEHICLE_US, OwnClock
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.wire.clock import APART_US, Source, bears_out
 from rtshcua.wire.receipt import Receipt
@@ -87,8 +87,9 @@ def test_both_hold_to_the_same_time_of_day(boundary: ctypes.CDLL) -> None:
                     boundary.rt_test_clock_settle(at)
                 case _:
                     frame, link = some_frame(random, here.number), random.choice((0, 0, 0, 1))
-                    here.hear(frame, link, now_us)
-                    boundary.rt_test_clock_hear(frame, len(frame), link, at)
+                    vehicle_us = random.choice((ARDUPILOT_US, VEHICLE_US))
+                    here.hear(frame, link, vehicle_us, now_us)
+                    boundary.rt_test_clock_hear(frame, len(frame), link, ctypes.c_int64(vehicle_us), at)
             boundary.rt_test_clock_now(at, told)
             assert (here.source, *vars_of(here.now(now_us)), here.number) == tuple(told)
         taken[here.source] += 1

@@ -20,8 +20,9 @@ from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.wire.clock import DRIFT_US, Source
 
-#: how far the vehicle's own UTC may be off, in us: the worse of both autopilots (`adapters.utc.VEHICLE_US`), and a
-#: stamp that is in whole ms
+#: how far the vehicle's own UTC may be off, in us (`adapters.utc.VEHICLE_US`), and a stamp that is in whole ms: of
+#: ArduPilot, and the worse of both autopilots
+ARDUPILOT_US: Final = 1_001_000
 VEHICLE_US: Final = 6_001_000
 #: how long a challenge may be answered, in us: the time between is part of the error
 CHALLENGE_US: Final = 5_000_000
@@ -87,8 +88,9 @@ class OwnClock:
         """The number that the vehicle is to send back; 0 where none is."""
         return 0 if self._challenge is None or self.source is not Source.UNKNOWN else self._challenge.number
 
-    def hear(self, frame: bytes, link: int, monotonic_us: int) -> None:
-        """A frame of which the link's signature was verified came in by a link of this id; its signature is off.
+    def hear(self, frame: bytes, link: int, vehicle_us: int, monotonic_us: int) -> None:
+        """A frame of which the link's signature was verified came in by a link of this id; its signature is off. The
+        vehicle's own UTC may be off by `vehicle_us`.
 
         Frames of one stream are accepted in the order in which they were signed, and in no other.
         """
@@ -106,7 +108,7 @@ class OwnClock:
             if UNIX_US <= utc_us <= MAX_VALUE:
                 open_us = max(0, monotonic_us - asked.drawn_us)
                 ahead_us = utc_us - monotonic_us + open_us // 2
-                self._take(Source.VEHICLE, ahead_us, VEHICLE_US + open_us - open_us // 2, monotonic_us)
+                self._take(Source.VEHICLE, ahead_us, vehicle_us + open_us - open_us // 2, monotonic_us)
 
     def _take(self, source: Source, ahead_us: int, error_us: int, since_us: int) -> None:
         self.source, self._ahead_us, self._error_us, self._since_us = source, ahead_us, error_us, since_us

@@ -55,9 +55,8 @@ mutate: setup ## change one thing at a time in what decides, and list what no te
 wrong: setup ## fly campaigns against wrong runtimes, and count the flights that find them (docs/flying/wrong-runtimes.md)
 	@$(BIN)/python .make/wrong $(TARGETS) --flights $(or $(FLIGHTS),120) --seeds $(or $(SEEDS),1) --jobs $(JOBS)
 
-bench: setup ## run every benchmark; each prints a ratio against a peer or a limit
-	@status=0; for file in bench/*.py; do $(BIN)/python "$$file" || { echo "$$file: limit not met" >&2; status=1; }; done; \
-	exit $$status
+bench: setup ## run every benchmark, or TARGETS; each against a peer or a limit, with a table of held and missed at the end
+	@$(BIN)/python .make/bench $(TARGETS)
 
 size: setup ## count modules, code lines, shared names and functions that are too long, by package
 	@$(BIN)/python .make/size

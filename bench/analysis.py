@@ -49,7 +49,7 @@ def source(count: int, crews: int = 50) -> str:
                 f"permit inspect_area by role {crew} when area inside {bridge} and altitude <= {high} m",
                 f"permit takeoff, goto by role {crew} when altitude <= {high} m and battery > {30 + turn % 40} %",
                 f"permit goto by role {crew} when target inside meadow and local time in 0{6 + turn % 3}:00 .. 18:00",
-                f"forbid goto by role {crew} when target inside grow(school, {20 + turn} m) or wind.speed > {high} m/s",
+                f"forbid goto by role {crew} when target inside grow(school, {20 + turn} m) or speed > {high} m/s",
                 f"permit inspect_area by role {crew} when position inside city and altitude < {low + 20} m",
                 f"permit goto by role {crew} when height <= altitude + {low} m and target outside school",
                 f"confirm inspect_area when altitude < {6 + number % 9} m by role {crew} within 30 s",

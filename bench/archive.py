@@ -34,6 +34,7 @@ from rtshcua.adapters.archive.examine import Processes, Task
 from rtshcua.adapters.archive.folder import Folder, Source
 
 FLIGHTS = 20
+VEHICLES, EACH = 10, 5_000  # records of a log
 ADD_LIMIT, VERIFY_LIMIT = 30, 16  # times the SHA-256 of the files, in time of processors
 ASK_LIMIT = 1 / 4  # of what reading the lines costs, without an index
 MISSING, CHANGED = (3, 5), (7, 11)  # vehicle and flight
@@ -158,7 +159,7 @@ def ask(folder: Folder, unindexed: Cost) -> bool:
 def main() -> int:
     """Measures, prints a line a figure, and says whether the limits held."""
     whole = "--whole" in sys.argv
-    vehicles, each = (50, 10_000) if whole else (10, 5_000)
+    vehicles, each = (50, 10_000) if whole else (VEHICLES, EACH)
     records = vehicles * FLIGHTS * each
     failed = False
     with tempfile.TemporaryDirectory() as name:

@@ -18,6 +18,7 @@ from rtshcua.mavlink.framing import message_id
 from rtshcua.onboard.enforcement.frames import OURS
 
 VEHICLES = 10
+SPEED = 1
 LATE_US = 1_200_000  # between two heartbeats; they are due every second
 ROOT = Path(__file__).resolve().parents[1]
 RTSHCUA = [sys.executable, "-m", "rtshcua.cli.app"]
@@ -33,7 +34,7 @@ def fly(folder: Path) -> tuple[list[Path], list[int]]:
     runs = []
     for number in range(VEHICLES):
         words = ["run", str(bundle), "--plain", "--fresh-state", "--runs", str(folder / str(number))]
-        words += ["--flavour", ("px4", "ardupilot")[number % 2], "--seed", str(number + 1)]
+        words += ["--flavour", ("px4", "ardupilot")[number % 2], "--seed", str(number + 1), "--speed", str(SPEED)]
         runs.append(subprocess.Popen([*RTSHCUA, *words], env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
     codes = [run.wait() for run in runs]
     return [next((folder / str(number)).iterdir()) for number in range(VEHICLES)], codes

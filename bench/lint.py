@@ -17,6 +17,7 @@ from typing import NamedTuple
 BARE_MS = 10
 COLD_S, WARM_S = 0.8, 0.6
 ROUNDS = 5
+FEW, MANY = 20, 200  # files
 
 SITE = """// The site of project {n}, and what its policies share.
 import "lib:policies/site.rts"
@@ -45,7 +46,7 @@ skill listen_{n}(time: duration in 1 s .. 60 s = 10 s) {{
   lasts    at most 1 min
   grace    1 s
   require  gps.fix >= fix_3d and battery > {charge} %
-  assume   wind.speed < 12 m/s
+  assume   wind.speed < 12 m/s where fitted
   maintain height <= 65 m
   fallback return_home, emergency_land
   energy   at most 6 %
@@ -142,7 +143,7 @@ def main() -> int:
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
         own = {"PYTHONPYCACHEPREFIX": str(place / "bytecode"), "RTSHCUA_DATA_DIR": str(place / "own"), "NO_COLOR": "1"}
         environment |= own
-        for name, files in (("few", 20), ("many", 200)):
+        for name, files in (("few", FEW), ("many", MANY)):
             (place / name).mkdir()
             project(place / name, files)
         asked = {

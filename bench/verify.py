@@ -49,7 +49,7 @@ STEP_US = 700  # between two records
 
 
 def lines(records: int) -> Iterator[bytes]:
-    """A log of so many records. A step is asked for again and again, while nobody knows how the wind is."""
+    """A log of so many records. A step is asked for again and again, while nobody knows how good the fix is."""
     start = flat.ISSUED + 60_000_000
     seeds = count(1)
     recorder = Recorder(
@@ -70,7 +70,7 @@ def lines(records: int) -> Iterator[bytes]:
     invocation = prepare_mission(bundle.mission, policy)[0]
     assert isinstance(invocation, PreparedInvocation)
     flat_invocation = invocation.invocation
-    state = State((9_900, 23, None, 10_000, 3, 52, 22, 40_000), (500_000, 0, 0, 480_000, 0, 0, 0, 0))
+    state = State((9_900, 23, None, 10_000, None, 52, 22, 40_000), (500_000, 0, 0, 480_000, 0, 0, 0, 0))
     asked = Context(flat_invocation.binding, "quad-07", 7, 0, now(0).monotonic_us - 1_000, 0, 12_000, ())
     answer = decide(invocation, state, policy, asked, now(0))
     assert answer.outcome is Outcome.DEFER

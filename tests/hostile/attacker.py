@@ -17,7 +17,10 @@ NUMBERS = {of.msgname: number for number, of in mavlink.mavlink_map.items()}
 
 
 class Attacker:
-    """Makes datagrams. `impersonate`: also under the vehicle's own ids, unsigned or wrongly signed."""
+    """Makes datagrams. `impersonate`: also under the vehicle's own ids, unsigned or wrongly signed.
+
+    Without, no RADIO_STATUS: on a link without a key a modem's is believed, whatever ids it has.
+    """
 
     def __init__(self, overheard: Sequence[bytes], seed: int, *, impersonate: bool) -> None:
         self._overheard = list(overheard)
@@ -27,7 +30,9 @@ class Attacker:
         self._ways = [self._garbage, self._markers, self._cut, self._spoofed, self._spoofed, self._several]
         if impersonate:
             self._ways += [self._replay, self._turned, self._unsigned, self._badly_signed, self._as_if_signed]
-        self._numbers = list(NUMBERS.values())
+        believed = () if impersonate else ("RADIO_STATUS",)
+        self._wanted = [name for name in WANTED if name not in believed]
+        self._numbers = [number for name, number in NUMBERS.items() if name not in believed]
 
     def datagram(self) -> bytes:
         """The next."""
@@ -75,7 +80,7 @@ class Attacker:
     def _frame(self, system: int, component: int) -> bytes:
         """A frame with a right checksum, of any message, most often of one that matters."""
         chance = self._chance
-        number = NUMBERS[chance.choice(WANTED)] if chance.random() < 0.7 else chance.choice(self._numbers)
+        number = NUMBERS[chance.choice(self._wanted)] if chance.random() < 0.7 else chance.choice(self._numbers)
         of = mavlink.mavlink_map[number]
         payload = bytearray(chance.randbytes(chance.randrange(1, of.unpacker.size + 1)))
         if number == 0 and len(payload) > 5:

@@ -3,6 +3,7 @@
 import asyncio
 import http.client
 import json
+import queue
 import re
 import select
 import signal
@@ -10,6 +11,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -558,3 +560,83 @@ def test_the_scripted_host_flies_by_the_plug_in_that_was_made(ground: Any, base:
     assert host.returncode == 0, host
     assert host.stdout.endswith("it ended as completed\n")
     assert run.end().code == 0, run.stderr
+
+
+class _Bare:
+    """The server over its streams, line by line, for a host that does what no client of the SDK does."""
+
+    def __init__(self, ground: Any, base: str, place: Path) -> None:
+        words = [ground.program, "mcp", base, "--to", str(place), "--with", str(POLICY)]
+        self.process = subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            env=dict(ground.environment), cwd=str(ground.folder),
+        )  # fmt: skip
+        self._heard: queue.Queue[bytes] = queue.Queue()
+        self._hearing = threading.Thread(target=self._hear, daemon=True)
+        self._hearing.start()
+        hello = {"protocolVersion": "2025-11-25", "capabilities": {}, "clientInfo": {"name": "t", "version": "1"}}
+        self.say({"id": 0, "method": "initialize", "params": hello})
+        self.until(0)
+        self.say({"method": "notifications/initialized"})
+
+    def say(self, *messages: dict[str, Any]) -> None:
+        self.write(b"".join(json.dumps({"jsonrpc": "2.0"} | each).encode() + b"\n" for each in messages))
+
+    def write(self, octets: bytes) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(octets)
+        self.process.stdin.flush()
+
+    def _hear(self) -> None:
+        """All that it says: a server whose host does not read stands still."""
+        assert self.process.stdout is not None
+        with self.process.stdout as lines:
+            for line in lines:
+                self._heard.put(line)
+        self._heard.put(b"")
+
+    def until(self, number: int) -> dict[str, Any]:
+        """The answer to a request; others before it are passed over."""
+        while line := self._heard.get(timeout=100):
+            said: dict[str, Any] = json.loads(line)
+            if said.get("id") == number:
+                return said
+        raise AssertionError(f"it ended before it answered, with {self.process.wait(20)}")
+
+    def end(self) -> int:
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        self._hearing.join()
+        return self.process.wait(30)
+
+
+def _called(number: int, name: str = "check_mission", **arguments: Any) -> dict[str, Any]:
+    return {"id": number, "method": "tools/call", "params": {"name": name, "arguments": arguments}}
+
+
+def test_a_host_that_cancels_a_burst_of_calls_is_served_on(ground: Any, base: str, place: Path) -> None:
+    server = _Bare(ground, base, place)
+    server.say(_called(1, mission=PROPOSAL))
+    server.until(1)
+    for first in range(2, 82, 40):
+        calls = [_called(number, mission=PROPOSAL) for number in range(first, first + 40)]
+        ends = [{"method": "notifications/cancelled", "params": {"requestId": each["id"]}} for each in calls]
+        server.say(*calls[:20], *ends[:10], *calls[20:], *ends[10:])
+    server.say(_called(500, "describe_vehicle"))
+    assert server.until(500)["result"]["structuredContent"]["stage"] == "unreachable"
+    assert server.end() == 0
+
+
+def test_a_line_that_is_too_long_or_of_too_many_values_is_passed_over(ground: Any, base: str, place: Path) -> None:
+    server = _Bare(ground, base, place)
+    server.say(_called(2, "describe_vehicle"))
+    server.until(2)
+    part = b"[" * (1 << 20)
+    for _ in range(64):
+        server.write(part)
+    server.write(b"\n" + b"[" + b"[]," * 700_000 + b"[]]\n")
+    server.say(_called(3, mission=[[]] * 100_000))
+    assert server.until(3)["error"]["message"] == "Invalid request parameters"
+    server.say(_called(1, "describe_vehicle"))
+    assert server.until(1)["result"]["structuredContent"]["stage"] == "unreachable"
+    assert server.end() == 0

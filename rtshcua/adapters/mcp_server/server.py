@@ -5,12 +5,13 @@ module that has the SDK.
 import json
 import logging
 import os
+import re
 import socket
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import suppress
 from functools import partial
-from typing import Any, Final
+from typing import Any, BinaryIO, Final, cast
 
 import anyio
 import uvicorn
@@ -22,12 +23,14 @@ from mcp.server.lowlevel.helper_types import ReadResourceContents
 from mcp.server.session import ServerSession
 from mcp.server.stdio import stdio_server
 from mcp.server.streamable_http_manager import StreamableHTTPSessionManager
+from mcp.shared.session import RequestResponder
 from pydantic import AnyUrl
 
 from rtshcua import __version__
 from rtshcua.adapters.mcp_server.access import refusal
 from rtshcua.adapters.mcp_server.arguments import Unfit, fitted
 from rtshcua.adapters.mcp_server.connections import CONNECTION, MOST, Connection
+from rtshcua.ground.language.size import without_texts
 
 INSTRUCTIONS: Final = (
     "Propose missions to a drone that waits. Read describe_policy first; check_mission costs nothing; a rejection "
@@ -56,6 +59,14 @@ _MOST_SESSIONS: Final = 8
 _IDLE_S: Final = 1_800.0
 #: how many resources may be followed at once, by all hosts together; one more takes the place of the oldest
 _MOST_FOLLOWED: Final = 32
+#: bytes and values (`without_texts`) of one line over stdio: a mission of any size that is read, however it is written
+MOST_LINE: Final = 16 << 20
+MOST_VALUES: Final = 1 << 16
+_NO_MESSAGE: Final = "too long\n"
+#: in place of a request whose number stands within its first bytes: the SDK answers that it is none
+_NO_REQUEST: Final = '{"jsonrpc":"2.0","id":%s,"method":"too-long"}\n'
+_ASKED: Final = re.compile(rb'"id" *: *([0-9]{1,15})[ ,}]')
+_BEGINNING: Final = 256
 
 
 def _tool(
@@ -142,11 +153,12 @@ def serve(make: Callable[[], Any]) -> None:
 
 async def _speak(opening: Opening) -> None:
     # streams of its own: the SDK closes what it is given, and the command still has to end
-    stdin, stdout = (
-        anyio.wrap_file(os.fdopen(os.dup(number), mode, encoding="utf-8", errors="replace"))
-        for number, mode in ((0, "r"), (1, "w"))
-    )
-    async with stdio_server(stdin, stdout) as (incoming, outgoing), anyio.create_task_group() as others:
+    stdin = Lines(os.fdopen(os.dup(0), "rb"))
+    stdout = anyio.wrap_file(os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace"))
+    async with (
+        stdio_server(cast("anyio.AsyncFile[str]", stdin), stdout) as (incoming, outgoing),
+        anyio.create_task_group() as others,
+    ):
         others.start_soon(_warm, opening)
         server = made(opening, others)
         await server.run(incoming, outgoing, server.create_initialization_options())
@@ -187,6 +199,29 @@ async def _speak_http(opening: Opening, listener: socket.socket, token: bytes) -
         others.cancel_scope.cancel()
 
 
+class Lines:
+    """The lines of a host, as the SDK takes them. One that is too long, or of too many values, is not kept: what stands
+    for it is no message; the SDK answers that, by its number where the line begins with one.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    async def __aiter__(self) -> AsyncIterator[str]:
+        while line := await run_sync(self._next):
+            yield line
+
+    def _next(self) -> str:
+        line = rest = self._file.readline(MOST_LINE)
+        while len(rest) == MOST_LINE and not rest.endswith(b"\n"):
+            line = line[:_BEGINNING]
+            rest = self._file.readline(MOST_LINE)
+        if rest is line and without_texts(line, MOST_VALUES) is not None:
+            return line.decode("utf-8", "replace")
+        asked = _ASKED.search(line, 0, _BEGINNING)
+        return _NO_MESSAGE if asked is None else _NO_REQUEST % asked[1].decode()
+
+
 async def _warm(opening: Opening) -> None:
     """Make the tools before one is called; the answer to the host's greeting goes first."""
     await anyio.sleep(_GREETED_S)
@@ -194,7 +229,17 @@ async def _warm(opening: Opening) -> None:
 
 
 class _Subscribing(Server[Any, Any]):
-    """The SDK's server, which offers no subscription whatever handlers it has."""
+    """The SDK's server, which offers no subscription whatever handlers it has, and which a request ends that its host
+    cancels while it is answered.
+    """
+
+    async def _handle_message(self, message: Any, *context: Any) -> None:
+        try:
+            await super()._handle_message(message, *context)
+        except (AssertionError, anyio.get_cancelled_exc_class()):
+            # it was answered as cancelled; where the server ends, this was the last that its task did
+            if not (isinstance(message, RequestResponder) and message.cancelled):
+                raise
 
     def get_capabilities(self, *about: Any) -> types.ServerCapabilities:
         capabilities = super().get_capabilities(*about)

@@ -13,10 +13,13 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.language.size import without_texts
 
 MAX_BYTES: Final = 1 << 20
 MAX_DEPTH: Final = 16
 MAX_DIGITS: Final = 18
+#: objects, lists, texts and numbers: those of some 4,000 steps
+MAX_VALUES: Final = 1 << 15
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _NUMBER = re.compile(r"(-?(?:0|[1-9][0-9]*))(\.[0-9]+)?([eE][-+]?[0-9]+)?")
@@ -55,6 +58,9 @@ def read_json(file: str, data: bytes) -> tuple[Source, Tree | None, tuple[Diagno
         at = source.text.find("\ufffd")
         message = f"byte {error.start} (0x{data[error.start]:02x}) is not UTF-8"
         return source, None, (Diagnostic(codes.NOT_JSON, message, Span(file, at, at + 1)),)
+    if without_texts(data, MAX_VALUES) is None:
+        message = f"the specification has more than {MAX_VALUES} values"
+        return source, None, (Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0)),)
     reader = _Reader(source)
     try:
         value = reader.document()

@@ -7,6 +7,7 @@ value that fits; where that says nothing, a fix of the finding does, or its help
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from typing import Any, Final, NamedTuple
 
 from rtshcua.diagnostics.codes import Severity
@@ -23,6 +24,8 @@ from rtshcua.model.quantity import Dimension
 ABSENT: Final[Mapping[str, Any]] = {"absent": True}
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _MOST = 40
+#: places that do not fit, of each kind, that errors are held against: more would take long, and few are told
+_MOST_MISFITS = 1_000
 _NAMES = {dict: "object", list: "array", str: "string", bool: "boolean", int: "integer"}
 _ARTICLED = {
     "object": "an object", "array": "a list", "string": "a text", "boolean": "true or false",
@@ -81,7 +84,8 @@ def _ranges(skills: Iterable[Permitted]) -> dict[tuple[str, str], Range]:
 
 def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: Frame) -> list[dict[str, Any]]:
     """One rejection for each error of the compiler on the specification `value`, whose text is `source`."""
-    misfits = [*_Fit(frame).misfits(frame.schema, value, "", ("", "")), *_Whole(frame, value).misfits()]
+    fit = islice(_Fit(frame).misfits(frame.schema, value, "", ("", "")), _MOST_MISFITS)
+    misfits = [*fit, *islice(_Whole(frame, value).misfits(), _MOST_MISFITS)]
     told: dict[str, dict[str, Any]] = {}
     for each in found:
         if each.severity is Severity.ERROR:

@@ -1,6 +1,7 @@
 """E0902: where a specification does not follow its schema, told in words that say what to write instead."""
 
 from collections.abc import Iterator, Mapping
+from itertools import islice
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -37,8 +38,22 @@ _FOUND: Mapping[type, str] = {
 }
 
 
-def shape_errors(error: ValidationError, tree: Tree) -> Iterator[Diagnostic]:
-    """One finding for each place where the specification is not what its schema asks."""
+def shape_errors(error: ValidationError, tree: Tree, most: int) -> tuple[Diagnostic, ...]:
+    """One finding for each place where the specification is not what its schema asks; of many, the first `most`, and
+    how many more there are.
+    """
+    found = tuple(islice(_shape_errors(error, tree), most))
+    more = error.error_count() - len(found)
+    return (*found, uncounted(more, tree.spans[()].file)) if more else found
+
+
+def uncounted(more: int, file: str) -> Diagnostic:
+    """That there is more to find than is told, and how much."""
+    message = f"and {more} more findings, which are not told"
+    return Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0), "mend those that are told, and try again")
+
+
+def _shape_errors(error: ValidationError, tree: Tree) -> Iterator[Diagnostic]:
     for each in error.errors(include_url=False):
         path = tuple(part for part in each["loc"] if part != "[key]")
         if each["type"] == "missing":

@@ -19,12 +19,15 @@ from rtshcua.ground.agent.json_tree import Tree, read_json
 from rtshcua.ground.agent.mission import mission_of
 from rtshcua.ground.agent.pointers import Places, pointer
 from rtshcua.ground.agent.schema import SpecificationShape
-from rtshcua.ground.agent.shape import shape_errors
+from rtshcua.ground.agent.shape import shape_errors, uncounted
 from rtshcua.ground.compiler.pins import PROPOSED, Pins, claims
 from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
 from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.program import Import, Unit
+
+#: findings on one specification: what is wrong a hundred times over is not mended by reading it all
+MAX_FINDINGS = 100
 
 _CONTROL = re.compile(r"[\t\n\f\r]")  # white space in sources, and in no text of a specification
 
@@ -61,7 +64,7 @@ def parse_specification(file: str, data: bytes) -> Specification:
     try:
         shape = SpecificationShape.model_validate(tree.value)
     except ValidationError as error:
-        return _specification(source, tree, None, tuple(shape_errors(error, tree)))
+        return _specification(source, tree, None, shape_errors(error, tree, MAX_FINDINGS))
     mission, found = mission_of(shape, tree, source)
     imports = tuple(Import(span=tree.spans["imports", number], path=path) for number, path in enumerate(shape.imports))
     unit = _unit(Span(file, 0, len(source.text)), imports, () if mission is None else (mission,))
@@ -143,6 +146,8 @@ def _specification(
     source: Source, tree: Tree | None, unit: Unit | None, found: tuple[Diagnostic, ...]
 ) -> Specification:
     whole = Span(source.file, 0, len(source.text))
+    if len(found) > MAX_FINDINGS + 1:
+        found = (*found[:MAX_FINDINGS], uncounted(len(found) - MAX_FINDINGS, source.file))
     specification = Specification(source, tree, unit or _unit(whole, (), ()), ())
     return replace(specification, diagnostics=specification.pointed(found))
 

@@ -1,5 +1,22 @@
 """How large a file may be; apart, so that whoever asks only for that imports no model."""
 
+import re
+
+#: a text, closed or not: what is not closed is looked at once
+_TEXT = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)
+
 MAX_SIZE = 8 << 20  # bytes or characters of one file
 MAX_TOKENS = 500_000  # words, numbers, texts and marks of one file: above 100,000 lines as people write them
 MAX_FILES = 4_096  # of one program
+
+
+def without_texts(data: bytes, most: int) -> bytes | None:
+    """JSON without its texts and keys; None where it has more than `most` values (objects, lists, texts, numbers).
+
+    That is found out before any of them is built: reading millions takes seconds and hundreds of megabytes.
+    """
+    if data.count(b'"') > 4 * most:  # a value may have a key, and a text has two quotes; few have more of them inside
+        return None
+    bare = _TEXT.sub(b"", data)
+    values = sum(map(bare.count, (b",", b"[", b"{")))  # each but the first of an object or a list is behind a comma
+    return None if values > most else bare

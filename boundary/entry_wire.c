@@ -53,7 +53,7 @@ EXPORT uint32_t rt_test_frame(uint32_t which, uint8_t *frame, const char **conte
 static rt_policy test_policy;
 static rt_mission test_mission;
 
-bool rt_test_cbor(const uint8_t *data, uint32_t size) { return rt_cbor_valid((rt_bytes){data, size}); }
+bool rt_test_cbor(const uint8_t *data, uint32_t size) { return rt_cbor_valid((rt_bytes){data, size}, RT_ANY_ITEMS); }
 
 rt_refusal rt_test_policy(const uint8_t *data, uint32_t size, const rt_policy **read) {
     *read = &test_policy;

@@ -21,7 +21,7 @@ static void fly(rt_bytes data) {
     rt_bytes signed_root, sealed, document;
     rt_bytes replaced[64];
     uint32_t count, replaced_count = 0;
-    if (!rt_cbor_valid(data) || !rt_take_array(&cursor, &count) || count < 2 || !rt_take_octets(&cursor, &signed_root) ||
+    if (!rt_cbor_valid(data, RT_ANY_ITEMS) || !rt_take_array(&cursor, &count) || count < 2 || !rt_take_octets(&cursor, &signed_root) ||
         rt_open_root(signed_root, (rt_bytes){NULL, 0}, 0, &root) != NULL || !rt_take_octets(&cursor, &sealed) ||
         rt_open_bundle(sealed, &root, (rt_bytes)RT_TEXT("quad-07"), 0, &bundle) != NULL)
         return;
@@ -60,7 +60,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (size == 0) return 0;
     rt_bytes rest = {data + 1, (uint32_t)(size - 1)};
     switch (data[0]) {
-    case 0: rt_cbor_valid(rest); break;
+    case 0: rt_cbor_valid(rest, RT_ANY_ITEMS); break;
     case 1: rt_read_policy(rest, &bundle.policy); break;
     case 2: rt_read_mission(rest, &bundle.mission); break;
     case 3: rt_open_root(rest, (rt_bytes){NULL, 0}, 0, &root); break;

@@ -14,7 +14,7 @@ int main(void) {
     uint32_t count;
     bool truth;
     switch (Frama_C_interval(0, 9)) {
-    case 0: return rt_cbor_valid((rt_bytes){input, size});
+    case 0: return rt_cbor_valid((rt_bytes){input, size}, Frama_C_unsigned_int_interval(0, UINT32_MAX));
     case 1: return rt_take_int(&cursor, &number);
     case 2: return rt_take_octets(&cursor, &string);
     case 3: return rt_take_text(&cursor, &string);

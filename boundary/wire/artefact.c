@@ -1,26 +1,27 @@
 #include "artefact.h"
 
-const rt_artefact RT_ROOT = RT_ARTEFACT("root", 2);
-const rt_artefact RT_POLICY = RT_ARTEFACT("policy", 7);
-const rt_artefact RT_MISSION = RT_ARTEFACT("mission", 1);
-const rt_artefact RT_BUNDLE = RT_ARTEFACT("bundle", 1);
-const rt_artefact RT_APPROVAL = RT_ARTEFACT("approval", 2);
-const rt_artefact RT_RECALL = RT_ARTEFACT("recall", 2);
-const rt_artefact RT_REPLACEMENT = RT_ARTEFACT("replacement", 2);
-const rt_artefact RT_CANCELLATION = RT_ARTEFACT("cancellation", 1);
-const rt_artefact RT_RECEIPT = RT_ARTEFACT("receipt", 2);
-const rt_artefact RT_REQUEST = RT_ARTEFACT("request", 2);
-const rt_artefact RT_RESPONSE = RT_ARTEFACT("response", 2);
-const rt_artefact RT_STATEMENT = RT_ARTEFACT("statement", 2);
+const rt_artefact RT_ROOT = RT_ARTEFACT("root", 2, RT_MANY_ITEMS);
+const rt_artefact RT_POLICY = RT_ARTEFACT("policy", 7, RT_ANY_ITEMS);
+const rt_artefact RT_MISSION = RT_ARTEFACT("mission", 1, RT_ANY_ITEMS);
+const rt_artefact RT_BUNDLE = RT_ARTEFACT("bundle", 1, RT_FEW_ITEMS);
+const rt_artefact RT_APPROVAL = RT_ARTEFACT("approval", 2, RT_FEW_ITEMS);
+const rt_artefact RT_RECALL = RT_ARTEFACT("recall", 2, RT_FEW_ITEMS);
+const rt_artefact RT_REPLACEMENT = RT_ARTEFACT("replacement", 2, RT_ANY_ITEMS);
+const rt_artefact RT_CANCELLATION = RT_ARTEFACT("cancellation", 1, RT_FEW_ITEMS);
+const rt_artefact RT_RECEIPT = RT_ARTEFACT("receipt", 2, RT_FEW_ITEMS);
+const rt_artefact RT_REQUEST = RT_ARTEFACT("request", 2, RT_ANY_ITEMS);
+const rt_artefact RT_RESPONSE = RT_ARTEFACT("response", 2, RT_ANY_ITEMS);
+const rt_artefact RT_STATEMENT = RT_ARTEFACT("statement", 2, RT_FEW_ITEMS);
 
 rt_refusal rt_unwrap(const rt_artefact *artefact, rt_bytes data, rt_cursor *body) {
-    if (!rt_cbor_valid(data)) return "malformed";
     rt_bytes name;
     int64_t version;
     *body = (rt_cursor){data.at, data.at + data.size};
+    /* before anything below is looked at */
     if (!rt_take_struct(body, 3) || !rt_take_text(body, &name) || !rt_take_int(body, &version)) return "malformed";
     if (!rt_same(name, artefact->name)) return "unknown-format";
-    return version == artefact->version ? NULL : "unknown-version";
+    if (version != artefact->version) return "unknown-version";
+    return rt_cbor_valid(data, artefact->items) ? NULL : "malformed";
 }
 
 uint32_t rt_wrap(uint8_t out[RT_FRAME_BYTES], const rt_artefact *artefact) {

@@ -55,7 +55,7 @@ static bool content(rt_cursor *cursor, uint8_t major, uint64_t argument) {
     return major == 2 || is_utf8(start, cursor->at);
 }
 
-bool rt_cbor_valid(rt_bytes data) {
+bool rt_cbor_valid(rt_bytes data, uint32_t items) {
     if (data.size == 0 || data.size > RT_CBOR_LIMIT) return false;
     rt_cursor cursor = {data.at, data.at + data.size};
     level levels[RT_CBOR_DEPTH + 1];
@@ -72,6 +72,7 @@ bool rt_cbor_valid(rt_bytes data) {
         uint8_t major;
         uint64_t argument;
         in->left--;
+        if (items-- == 0) return false;
         if (!head(&cursor, &major, &argument) || major == 6) return false;
         if (key && major != 0 && major != 1 && major != 3) return false;
         if (major < 2) {

@@ -13,8 +13,8 @@ typedef struct {
     const uint8_t *end;
 } rt_cursor;
 
-/* Whether the bytes are one item, in the one encoding that it has (`cbor.decode`). */
-bool rt_cbor_valid(rt_bytes data);
+/* Whether the bytes are one item, in the one encoding that it has, of at most so many items in all (`cbor.decode`). */
+bool rt_cbor_valid(rt_bytes data, uint32_t items);
 
 /* Take the next item off, if it is of that kind; else nothing is said of where the cursor stands then. */
 bool rt_take_int(rt_cursor *cursor, int64_t *value);

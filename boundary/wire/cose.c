@@ -5,12 +5,14 @@
 #define TAG_18 0xD2 /* COSE_Sign1 */
 #define ED25519 (-19) /* RFC 9864, section 2.2 */
 enum { ALGORITHM = 1, CONTENT_TYPE = 3, KID = 4 }; /* header labels (RFC 9052, section 3.1) */
+/* octets of a protected header at most, of which ours have less than 80; and the items of an envelope, and of a header */
+enum { MAX_PROTECTED = 200, ENVELOPE_ITEMS = 5, HEADER_ITEMS = 7 };
 
 static bool headers(rt_bytes protected, rt_envelope *claimed) {
     rt_cursor cursor = {protected.at, protected.at + protected.size};
     uint32_t count;
     int64_t label, algorithm;
-    return rt_cbor_valid(protected) && rt_take_map(&cursor, &count) && count == 3 && rt_take_int(&cursor, &label) && label == ALGORITHM &&
+    return protected.size <= MAX_PROTECTED && rt_cbor_valid(protected, HEADER_ITEMS) && rt_take_map(&cursor, &count) && count == 3 && rt_take_int(&cursor, &label) && label == ALGORITHM &&
            rt_take_int(&cursor, &algorithm) && algorithm == ED25519 && rt_take_int(&cursor, &label) && label == CONTENT_TYPE &&
            rt_take_text(&cursor, &claimed->content_type) && rt_take_int(&cursor, &label) && label == KID &&
            rt_take_octets(&cursor, &claimed->kid) && claimed->kid.size == RT_KID_BYTES;
@@ -21,7 +23,7 @@ rt_refusal rt_take_apart(rt_bytes envelope, uint32_t limit, rt_envelope *claimed
     rt_bytes item = {envelope.at + 1, envelope.size - 1};
     rt_cursor cursor = {item.at, item.at + item.size};
     uint32_t unprotected;
-    bool whole = item.size <= limit && rt_cbor_valid(item) && rt_take_struct(&cursor, 4) && rt_take_octets(&cursor, &claimed->protected) &&
+    bool whole = item.size <= limit && rt_cbor_valid(item, ENVELOPE_ITEMS) && rt_take_struct(&cursor, 4) && rt_take_octets(&cursor, &claimed->protected) &&
                  rt_take_map(&cursor, &unprotected) && unprotected == 0 && rt_take_octets(&cursor, &claimed->payload) &&
                  rt_take_octets(&cursor, &claimed->signature) && claimed->signature.size == RT_SIGNATURE_BYTES &&
                  headers(claimed->protected, claimed);

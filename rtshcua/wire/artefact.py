@@ -3,7 +3,7 @@
 An array, not a map: the bytes then really begin with name and version, whatever the body's keys sort like.
 """
 
-from typing import TypeVar
+from typing import Final, TypeVar, cast
 
 import msgspec
 
@@ -13,6 +13,8 @@ from rtshcua.wire.names import Artefact
 from rtshcua.wire.untrusted import Untrusted
 
 _S = TypeVar("_S", bound=msgspec.Struct)
+_NEGATIVE, _TEXT, _ARRAY = 1, 3, 4  # major types (RFC 8949, section 3.1)
+_INT64_MAX: Final = (1 << 63) - 1
 
 
 class ArtefactError(Untrusted):
@@ -24,22 +26,44 @@ def wrap(artefact: Artefact, body: object) -> bytes:
     return cbor.encode((artefact.name, artefact.version, body))
 
 
-def unwrap(artefact: Artefact, data: bytes) -> Value:
-    """The body of `data`, which must be this very artefact in this very version. Raises `ArtefactError`."""
+def unwrap(artefact: Artefact, data: bytes, *, items: int = 0) -> Value:
+    """The body of `data`, which must be this very artefact in this very version. Raises `ArtefactError`.
+
+    `items` bounds what the artefact's format does not: for what nobody verified. Name and version are looked at before
+    anything below them is decoded.
+    """
+    claimed = _claimed(data)
+    if claimed is not None:
+        name, version = claimed
+        if name != artefact.name.encode():
+            said = name[:80].decode("utf-8", "replace")
+            raise ArtefactError("unknown-format", f"this is `{said}`, not `{artefact.name}`")
+        if version != artefact.version:
+            text = f"`{artefact.name}` version {version} is unknown here; only version {artefact.version} is read"
+            older = f"; {names.COMPATIBILITY} says what reads earlier ones" if version < artefact.version else ""
+            raise ArtefactError("unknown-version", text + older)
     try:
-        value = cbor.decode(data)
+        value = cbor.decode(data, items=artefact.items or items or cbor.LIMIT)
     except CborError as error:
         raise ArtefactError("malformed", f"this is no `{artefact.name}`: not canonical CBOR: {error}") from None
-    match value:
-        case (str(name), int(version), body) if type(version) is int:
-            if name != artefact.name:
-                raise ArtefactError("unknown-format", f"this is `{name[:80]}`, not `{artefact.name}`")
-            if version != artefact.version:
-                text = f"`{name}` version {version} is unknown here; only version {artefact.version} is read"
-                older = f"; {names.COMPATIBILITY} says what reads earlier ones" if version < artefact.version else ""
-                raise ArtefactError("unknown-version", text + older)
-            return body
-    raise ArtefactError("malformed", f"this is no `{artefact.name}`: not an array of format name, version and body")
+    if claimed is None:
+        raise ArtefactError("malformed", f"this is no `{artefact.name}`: not an array of format name, version and body")
+    return cast("tuple[Value, ...]", value)[2]
+
+
+def _claimed(data: bytes) -> tuple[bytes, int] | None:
+    """The name and the version that bytes begin with; None where they do not begin as an artefact."""
+    try:
+        array, count, at = cbor.head(data, 0)
+        text, size, start = cbor.head(data, at)
+        if (array, count, text) != (_ARRAY, 3, _TEXT) or size > len(data) - start:
+            return None
+        integer, argument, _ = cbor.head(data, start + size)
+    except CborError:
+        return None
+    if integer > _NEGATIVE or argument > _INT64_MAX:
+        return None
+    return data[start : start + size], ~argument if integer == _NEGATIVE else argument
 
 
 def pack(artefact: Artefact, body: msgspec.Struct) -> bytes:
@@ -47,12 +71,14 @@ def pack(artefact: Artefact, body: msgspec.Struct) -> bytes:
     return wrap(artefact, msgspec.to_builtins(body, builtin_types=(bytes,)))
 
 
-def unpack(artefact: Artefact, data: bytes, shape: type[_S], error: type[Untrusted], what: str) -> _S:
-    """The body of `data`, a struct, provided that `pack` gives `data` of it. Raises `error`, slug `malformed`, with
-    `what` it is not, and `ArtefactError`.
+def unpack(
+    artefact: Artefact, data: bytes, shape: type[_S], error: type[Untrusted], what: str, *, items: int = 0
+) -> _S:
+    """The body of `data`, a struct, provided that `pack` gives `data` of it. `items` is as for `unwrap`. Raises
+    `error`, slug `malformed`, with `what` it is not, and `ArtefactError`.
     """
     try:
-        body = msgspec.convert(unwrap(artefact, data), shape, builtin_types=(bytes,))
+        body = msgspec.convert(unwrap(artefact, data, items=items), shape, builtin_types=(bytes,))
     except msgspec.ValidationError as invalid:
         raise error("malformed", f"not a {what}: {invalid}") from None
     if pack(artefact, body) != data:

@@ -22,6 +22,8 @@ from rtshcua.wire.untrusted import Untrusted
 
 #: a bundle larger than this is refused unread, in bytes
 MAX_BUNDLE: Final = 16 << 20
+#: and of a policy or a mission that nobody verified at most so many CBOR items are decoded
+MAX_UNVERIFIED: Final = 1 << 17
 
 _F = TypeVar("_F", bound=Flat)
 
@@ -110,7 +112,7 @@ def claimed_vehicle(data: bytes) -> str:
     Raises `BundleError`, `EnvelopeError` and `ArtefactError`.
     """
     first, _ = envelopes(data)
-    return parse(names.POLICY, cose.unverified(first, limit=MAX_BUNDLE).payload, Policy).vehicle.identity
+    return parse_unverified(names.POLICY, cose.unverified(first, limit=MAX_BUNDLE).payload, Policy).vehicle.identity
 
 
 def check_bundle(bundle: Bundle, vehicle: str, now_us: int, *, after: bytes = b"") -> None:
@@ -135,6 +137,11 @@ def envelopes(data: bytes) -> tuple[bytes, bytes]:
 def parse(kind: Artefact, payload: bytes, shape: type[_F]) -> _F:
     """The flat form in a payload that was verified. Raises `BundleError` and `ArtefactError`."""
     return artefact.unpack(kind, payload, shape, BundleError, f"`{kind.name}`")
+
+
+def parse_unverified(kind: Artefact, payload: bytes, shape: type[_F]) -> _F:
+    """The flat form in a payload of whoever: as `parse`, and it is refused where taking it apart would take long."""
+    return artefact.unpack(kind, payload, shape, BundleError, f"`{kind.name}`", items=MAX_UNVERIFIED)
 
 
 def open_envelope(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact, limit: int = MAX_BUNDLE) -> Opened:

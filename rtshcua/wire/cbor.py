@@ -5,7 +5,8 @@ no floats, tags, indefinite lengths or other simple values. Map keys are in the 
 canonical mode of cbor2 sorts by length first, the older rule of RFC 7049, and its encoder is slower than this one).
 
 The decoder accepts only the bytes that the encoder would have made. It is written to be read, and to say where and why
-bytes are refused; a second implementation must agree with it in every refusal: reason and place.
+bytes are refused; a second implementation must agree with it in every refusal: reason and place. It can be told how
+many items there may be: each array and map announces its own, so too many are refused before they are decoded.
 """
 
 from collections.abc import Mapping, Sequence
@@ -146,11 +147,24 @@ _SMALL: Final = {bytes([n]): n for n in range(24)} | {bytes([0x20 | n]): ~n for 
 _SIMPLE: Final[dict[int, bool | None]] = {0xF4: False, 0xF5: True, 0xF6: None}
 
 
-def decode(data: bytes, *, limit: int = LIMIT) -> Value:
-    """The value of `data`, provided that `encode(value) == data`; else raises `CborError`. Arrays become tuples."""
+class _Room:
+    """How many items may still be announced, of `most`."""
+
+    __slots__ = ("left", "most")
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.left = most - 1  # the outermost one is announced by nothing
+
+
+def decode(data: bytes, *, limit: int = LIMIT, items: int = LIMIT) -> Value:
+    """The value of `data`, provided that `encode(value) == data`; else raises `CborError`. Arrays become tuples.
+
+    At most `limit` bytes, and at most `items` items: whatever stands in an array or a map, keys too, and itself.
+    """
     if len(data) > limit:
         raise CborError(f"longer than the limit of {limit} bytes", limit)
-    value, end = _item(data, 0, 0)
+    value, end = _item(data, 0, 0, _Room(items))
     if end != len(data):
         raise CborError("bytes left over after the item", end)
     return value
@@ -176,7 +190,7 @@ def head(data: bytes, at: int) -> tuple[int, int, int]:
     return major, argument, end
 
 
-def _item(data: bytes, at: int, depth: int) -> tuple[Value, int]:
+def _item(data: bytes, at: int, depth: int, room: _Room) -> tuple[Value, int]:
     if data[at : at + 1] >= b"\xe0":
         return _simple(data, at), at + 1
     major, argument, end = head(data, at)
@@ -190,9 +204,9 @@ def _item(data: bytes, at: int, depth: int) -> tuple[Value, int]:
         case 3:
             return _text(data, at, end, argument), end + argument
         case 4:
-            return _array(data, at, end, argument, depth + 1)
+            return _array(data, at, end, argument, depth + 1, room)
         case 5:
-            return _map(data, at, end, argument, depth + 1)
+            return _map(data, at, end, argument, depth + 1, room)
     raise CborError(f"tag {argument} is not part of the format", at)
 
 
@@ -218,25 +232,25 @@ def _text(data: bytes, at: int, start: int, length: int) -> str:
         raise CborError("text is not UTF-8", start + error.start) from None
 
 
-def _array(data: bytes, at: int, start: int, count: int, depth: int) -> tuple[tuple[Value, ...], int]:
-    _room(data, at, start, count, depth)
+def _array(data: bytes, at: int, start: int, count: int, depth: int, room: _Room) -> tuple[tuple[Value, ...], int]:
+    _take_room(data, at, start, count, depth, room)
     items: list[Value] = []
     for _ in range(count):
         value: Value = _SMALL.get(data[start : start + 1])
         if value is None:
-            value, start = _item(data, start, depth)
+            value, start = _item(data, start, depth, room)
         else:
             start += 1
         items.append(value)
     return tuple(items), start
 
 
-def _map(data: bytes, at: int, start: int, count: int, depth: int) -> tuple[dict[str | int, Value], int]:
-    _room(data, at, start, 2 * count, depth)
+def _map(data: bytes, at: int, start: int, count: int, depth: int, room: _Room) -> tuple[dict[str | int, Value], int]:
+    _take_room(data, at, start, 2 * count, depth, room)
     pairs: dict[str | int, Value] = {}
     previous = b""
     for _ in range(count):
-        key, end = _item(data, start, depth)
+        key, end = _item(data, start, depth, room)
         if type(key) is not str and type(key) is not int:
             raise CborError("map key is neither text nor an integer", start)
         encoded = data[start:end]
@@ -245,13 +259,16 @@ def _map(data: bytes, at: int, start: int, count: int, depth: int) -> tuple[dict
         if encoded < previous:
             raise CborError("map keys out of order", start)
         previous = encoded
-        pairs[key], start = _item(data, end, depth)
+        pairs[key], start = _item(data, end, depth, room)
     return pairs, start
 
 
-def _room(data: bytes, at: int, start: int, items: int, depth: int) -> None:
-    """Refuse a container before anything is spent on it: nested too deep, or with more items than bytes."""
+def _take_room(data: bytes, at: int, start: int, items: int, depth: int, room: _Room) -> None:
+    """Refuse a container before anything is spent on it: nested too deep, or with more items than bytes or `room`."""
     if depth > MAX_DEPTH:
         raise CborError(f"nested deeper than {MAX_DEPTH}", at)
     if items > len(data) - start:
         raise CborError("more items than bytes that follow", at)
+    room.left -= items
+    if room.left < 0:
+        raise CborError(f"more than {room.most} items", at)

@@ -20,6 +20,11 @@ ED25519: Final = -19
 _TAG_18: Final = b"\xd2"  # COSE_Sign1
 _ALGORITHM, _CONTENT_TYPE, _KID = 1, 3, 4  # header labels (RFC 9052, section 3.1)
 _SIGNATURE_BYTES: Final = 64
+#: a protected header is no longer than this, in bytes: ours have less than 80, whoever wants to keep a reader busy more
+MAX_PROTECTED: Final = 200
+#: an envelope is an array, two strings, an empty map and a signature; a header has three pairs
+_ENVELOPE_ITEMS: Final = 5
+_HEADER_ITEMS: Final = 7
 
 
 class EnvelopeError(Untrusted):
@@ -80,7 +85,7 @@ def unverified(envelope: bytes, *, limit: int = cbor.LIMIT) -> Unverified:
     """Take an envelope apart without trusting it. Raises `EnvelopeError` (`malformed`) unless it is canonical."""
     if envelope[:1] != _TAG_18:
         raise EnvelopeError("malformed", "not a signed envelope: COSE_Sign1 begins with tag 18")
-    match _decode(envelope[1:], limit):
+    match _decode(envelope[1:], limit, _ENVELOPE_ITEMS):
         case (bytes(protected), {**unprotected}, bytes(payload), bytes(signature)) if (
             not unprotected and len(signature) == _SIGNATURE_BYTES
         ):
@@ -90,7 +95,10 @@ def unverified(envelope: bytes, *, limit: int = cbor.LIMIT) -> Unverified:
 
 
 def _headers(protected: bytes) -> tuple[str, bytes]:
-    match _decode(protected, len(protected)):
+    if len(protected) > MAX_PROTECTED:
+        text = f"the protected header has {len(protected)} bytes, and at most {MAX_PROTECTED} are read"
+        raise EnvelopeError("malformed", text)
+    match _decode(protected, MAX_PROTECTED, _HEADER_ITEMS):
         case {1: int(algorithm), 3: str(content_type), 4: bytes(kid), **others} if not others and len(kid) == KID_BYTES:
             if algorithm != ED25519:
                 raise EnvelopeError("malformed", f"signature algorithm {algorithm} is not Ed25519 ({ED25519})")
@@ -103,8 +111,8 @@ def _signed(protected: bytes, duty: Duty, payload: bytes) -> bytes:
     return cbor.encode(("Signature1", protected, duty.label, payload))
 
 
-def _decode(data: bytes, limit: int) -> cbor.Value:
+def _decode(data: bytes, limit: int, items: int) -> cbor.Value:
     try:
-        return cbor.decode(data, limit=limit)
+        return cbor.decode(data, limit=limit, items=items)
     except CborError as error:
         raise EnvelopeError("malformed", f"not canonical CBOR: {error}") from None

@@ -6,11 +6,14 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Artefact:
-    """A format. `version` is raised by any change that an older reader would misread."""
+    """A format. `version` is raised by any change that an older reader would misread. `items` is the most CBOR items
+    that one has, 0 where only its size is bounded: more are refused before they are decoded.
+    """
 
     name: str
     version: int
     suffix: str = "+cbor"
+    items: int = 0
 
     @property
     def content_type(self) -> str:
@@ -18,22 +21,26 @@ class Artefact:
         return f"application/vnd.{self.name.replace('/', '.')}{self.suffix}"
 
 
+#: how many items an artefact has at most: one of a fixed form, and one with lists
+FEW: Final = 64
+MANY: Final = 1 << 16
+
 #: what says which revision reads earlier versions of these
 COMPATIBILITY: Final = "docs/compatibility.md"
 
-ROOT: Final = Artefact("rtshcua/root", 2)  # 2: with policies of mission keys, persons of approval keys
+ROOT: Final = Artefact("rtshcua/root", 2, items=MANY)  # 2: with policies of mission keys, persons of approval keys
 POLICY: Final = Artefact("rtshcua/policy", 7)  # 7: time zones and days of the week
 MISSION: Final = Artefact("rtshcua/mission", 1)
-BUNDLE: Final = Artefact("rtshcua/bundle", 1)
-APPROVAL: Final = Artefact("rtshcua/approval", 2)  # 2: names mission and flight
-RECALL: Final = Artefact("rtshcua/recall", 2)  # 2: names the flight
+BUNDLE: Final = Artefact("rtshcua/bundle", 1, items=FEW)
+APPROVAL: Final = Artefact("rtshcua/approval", 2, items=FEW)  # 2: names mission and flight
+RECALL: Final = Artefact("rtshcua/recall", 2, items=FEW)  # 2: names the flight
 REPLACEMENT: Final = Artefact("rtshcua/replacement", 2)  # 2: names the flight
-CANCELLATION: Final = Artefact("rtshcua/cancellation", 1)
-QUALIFICATION: Final = Artefact("rtshcua/qualification", 1)
-RECEIPT: Final = Artefact("rtshcua/receipt", 2)  # 2: with the boundary's digest
-STATEMENT: Final = Artefact("rtshcua/statement", 2)
+CANCELLATION: Final = Artefact("rtshcua/cancellation", 1, items=FEW)
+QUALIFICATION: Final = Artefact("rtshcua/qualification", 1, items=MANY)
+RECEIPT: Final = Artefact("rtshcua/receipt", 2, items=FEW)  # 2: with the boundary's digest
+STATEMENT: Final = Artefact("rtshcua/statement", 2, items=FEW)
 LOG: Final = Artefact("rtshcua/log", 4, "")  # JSON lines (RFC 8785), without a registered suffix; 4: `received_us`
-PROOF: Final = Artefact("rtshcua/proof", 1)  # what a proof of a log carries
+PROOF: Final = Artefact("rtshcua/proof", 1, items=MANY)  # what a proof of a log carries
 REQUEST: Final = Artefact("rtshcua/request", 2)  # 2: with temporal monitors
 RESPONSE: Final = Artefact("rtshcua/response", 2)  # 2: with the boundary's digest
 PERMIT: Final = Artefact("rtshcua/permit", 1)

@@ -19,7 +19,7 @@ from boundary.opening import (
 from reference import bundle_case
 from reference.bundle_case import NOW, ROOT, root
 from rtshcua.model.flat.limits import MAX_KEYS, MAX_REVOKED
-from rtshcua.wire import cose, names
+from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot
 
@@ -82,6 +82,30 @@ def test_roots_have_the_same_limits(c: Boundary) -> None:
         assert isinstance(agree_on_root(c, at_most, ROOT.public), TrustRoot)
     for too_many in (signed(MAX_KEYS + 1), signed(revoked=MAX_REVOKED + 1), bytes(MAX_ROOT + 2)):
         assert agree_on_root(c, too_many, ROOT.public) == "malformed"
+
+
+def test_items_of_roots_and_bundles_and_octets_of_headers_have_the_same_bounds(c: Boundary) -> None:
+    """Whatever is below is not looked at: the same items of a form that makes no sense are malformed in another way."""
+    trust = agree_on_root(c, SIGNED_ROOT, ROOT.public)
+    assert isinstance(trust, TrustRoot)
+    for count in (names.FEW - 4, names.FEW - 3, 8 << 20):
+        listed = (
+            cbor.encode((names.BUNDLE.name, names.BUNDLE.version))[1:] + b"\x9a" + count.to_bytes(4) + b"\x80" * count
+        )
+        assert agree_on_bundle(c, b"\x83" + listed, trust) == "malformed"
+    for name, version, slug in (("rtshcua/other", 1, "unknown-format"), (names.BUNDLE.name, 9, "unknown-version")):
+        assert agree_on_bundle(c, cbor.encode((name, version, 1))[:-1] + b"\xff", trust) == slug
+    for roles in (names.MANY - 200, names.MANY):
+        key = SigningKey.from_seed(bytes([9]) * 32, duty=Duty.MISSION).verification(roles=("r",) * roles)
+        large = TrustRoot(1, False, NOW - 1, NOW + 1, (*root().keys, key))
+        signed = cose.sign1(large.encode(), key=ROOT, duty=Duty.ROOT, content_type=names.ROOT.content_type)
+        found = agree_on_root(c, signed, ROOT.public)
+        assert found == "malformed" if roles == names.MANY else isinstance(found, TrustRoot)
+    for size in (cose.MAX_PROTECTED, cose.MAX_PROTECTED + 1):
+        content_type = "x" * (size - 24)
+        signed = cose.sign1(b"", key=ROOT, duty=Duty.ROOT, content_type=content_type)
+        expected = "wrong-content-type" if size == cose.MAX_PROTECTED else "malformed"
+        assert agree_on_root(c, signed, ROOT.kid + bytes(16)) == expected
 
 
 def test_mutants_are_refused_alike(c: Boundary) -> None:

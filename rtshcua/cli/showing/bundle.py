@@ -16,7 +16,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire import cose, names
-from rtshcua.wire.bundle import envelopes, open_bundle, parse, policy_digest
+from rtshcua.wire.bundle import envelopes, open_bundle, parse, parse_unverified, policy_digest
 from rtshcua.wire.digest import BUNDLE, digest
 from rtshcua.wire.replacement import ReplacementDocument
 from rtshcua.wire.trust import open_root
@@ -34,10 +34,11 @@ class Claimed(NamedTuple):
     mission_kid: bytes
 
 
-def claimed(data: bytes) -> Claimed:
-    """Takes a bundle apart without trusting it. Raises `Untrusted`."""
+def claimed(data: bytes, *, trusted: bool = False) -> Claimed:
+    """Takes a bundle apart without trusting it, and a very large one only if it is `trusted`. Raises `Untrusted`."""
     first, second = (cose.unverified(envelope) for envelope in envelopes(data))
-    policy, mission = parse(names.POLICY, first.payload, Policy), parse(names.MISSION, second.payload, Mission)
+    read = parse if trusted else parse_unverified
+    policy, mission = read(names.POLICY, first.payload, Policy), read(names.MISSION, second.payload, Mission)
     prepared = prepare(policy)
     checked = prepared if isinstance(prepared, Refusal) else prepare_mission(mission, prepared)
     if isinstance(checked, Refusal):
@@ -51,7 +52,7 @@ def recorded_replacement(detail: str) -> ReplacementDocument:
         document = b64decode(detail, validate=True)
     except ValueError:
         raise Untrusted("malformed", "a recorded document is not base64") from None
-    said = parse(names.REPLACEMENT, cose.unverified(document).payload, ReplacementDocument)
+    said = parse_unverified(names.REPLACEMENT, cose.unverified(document).payload, ReplacementDocument)
     return replace(said, kept=max(said.kept, 0))
 
 
@@ -68,8 +69,8 @@ def over(said: ReplacementDocument, mission: Mission) -> Mission:
 
 def show_bundle(page: Page, data: bytes, now_us: int) -> dict[str, object]:
     """Adds a bundle to the page, and gives it for a program. Raises `Untrusted`."""
-    what = claimed(data)
     trusted, verdict = _verdict(data, now_us)
+    what = claimed(data, trusted=trusted)
     page.head(f"Bundle of {len(data)} bytes")
     page.row("digest", what.digest.hex())
     page.row("policy", f"digest {what.policy_digest.hex()}, key {what.policy_kid.hex()}")

@@ -14,7 +14,7 @@ from rtshcua.model.step_number import step_words
 from rtshcua.onboard.calls import quantity
 from rtshcua.wire import cose, names
 from rtshcua.wire.approval import ApprovalDocument
-from rtshcua.wire.bundle import parse
+from rtshcua.wire.bundle import parse_unverified
 from rtshcua.wire.cancellation import CancellationDocument
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.names import Artefact
@@ -62,7 +62,7 @@ def said(document: bytes) -> Said:
     """Takes a document apart without trusting it. Raises `Untrusted`."""
     kind = kind_of(document)
     envelope = cose.unverified(document)
-    return Said(kind, envelope.kid, parse(kind, envelope.payload, _SHAPES[kind]))
+    return Said(kind, envelope.kid, parse_unverified(kind, envelope.payload, _SHAPES[kind]))
 
 
 def recorded(detail: str, people: People = NOBODY) -> str:

@@ -33,6 +33,8 @@ _RFC9162_SHA256: Final = 1
 _INCLUSION: Final = -1
 _RECORD, _ROOT = "rtshcua/record", "rtshcua/root"
 _HASH: Final = 32
+#: CBOR items of a receipt, of its header, and of its proof, whose path has at most 64 nodes: that many each at most
+_ITEMS: Final = 128
 
 
 class Received(NamedTuple):
@@ -66,10 +68,10 @@ def make_receipt(
 def check_receipt(data: bytes, pinned: bytes) -> Received | Flaw:
     """What the receipt proves under the pinned root key (32 bytes) or its name (16), or what is wrong with it."""
     try:
-        value = cbor.decode(data[1:], limit=MAX_PROOF) if data.startswith(TAG_18) else None
+        value = cbor.decode(data[1:], limit=MAX_PROOF, items=_ITEMS) if data.startswith(TAG_18) else None
         match value:
             case (bytes(protected), {396: {-1: (bytes(proof),), **no_more}, **others}, None, bytes(signature)):
-                parts = cbor.decode(protected, limit=len(protected)), cbor.decode(proof, limit=len(proof))
+                parts = cbor.decode(protected, items=_ITEMS), cbor.decode(proof, items=_ITEMS)
                 match others:
                     case {"rtshcua/record": bytes(line), "rtshcua/root": bytes(root)} if (
                         len(others) == 2 and not no_more

@@ -6,7 +6,6 @@ that no float decides on which side of a fence a place lies.
 """
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal, localcontext
@@ -18,18 +17,19 @@ from rtshcua.ground.checker.features import chosen
 from rtshcua.ground.checker.polygons import Corner, contains, crossing, tangled
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.checker.unread import refuse_height
+from rtshcua.ground.language.size import without_texts
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
 #: a FeatureCollection's MultiPolygon takes nine, foreign members (RFC 7946, 6.1) may take some more
 MAX_DEPTH = 32
+#: objects, lists, texts and numbers of a file; keys are none of them. A border of 80,000 corners has 240,000
+MAX_VALUES = 250_000
 #: characters of a number: a double needs no more than 24
 MAX_NUMBER = 64
 MAX_EXPONENT = 3  # digits; that of a double has no more
 #: a local projection has no use nearer to a pole
 MAX_LATITUDE, MAX_LONGITUDE = 85, 180
 _DEGREE = Decimal(10_000_000)
-#: a text without escapes, closed or not: what is not closed is looked at once
-_TEXT = re.compile(rb'"[^"]*+"?')
 _AS_BRACKETS = bytes.maketrans(b"{}", b"[]")
 _NO_BRACKETS = bytes(each for each in range(256) if each not in b"[]{}")
 
@@ -71,7 +71,10 @@ def _json(data: bytes) -> Any:
         text = data.decode("utf-8-sig")  # RFC 8259, 8.1: a parser may ignore a byte order mark
     except UnicodeDecodeError as error:
         raise _not_json(f"byte {error.start} (0x{data[error.start]:02x}) is not UTF-8") from error
-    if _too_deep(data):
+    bare = without_texts(data, MAX_VALUES)
+    if bare is None:
+        raise _not_json(f"it has more than {MAX_VALUES} values: leave the features out that are not needed")
+    if _too_deep(bare):
         raise _not_json(f"it is nested more than {MAX_DEPTH} deep")
     try:
         return json.loads(
@@ -82,11 +85,11 @@ def _json(data: bytes) -> Any:
         raise _not_json(f"line {error.lineno}, column {error.colno}: {message}") from error
 
 
-def _too_deep(data: bytes) -> bool:
-    """Whether brackets outside of texts are nested too deep. Each round takes away the innermost, all at once: one at a
-    time costs seconds where a file has millions. What is left over and not deep is no JSON, and is told as that.
+def _too_deep(bare: bytes) -> bool:
+    """Whether brackets in what has no texts are nested too deep. Each round takes away the innermost, all at once: one
+    at a time costs seconds where a file has many. What is left over and not deep is no JSON, and is told as that.
     """
-    left = _TEXT.sub(b"", data.replace(b"\\\\", b"").replace(b'\\"', b"")).translate(_AS_BRACKETS, _NO_BRACKETS)
+    left = bare.translate(_AS_BRACKETS, _NO_BRACKETS)
     for _ in range(MAX_DEPTH):
         if not left:
             return False

@@ -46,3 +46,46 @@ def test_anything_else_is_refused(data, slug, text):
     with pytest.raises(ArtefactError) as refused:
         unwrap(names.POLICY, data)
     assert (refused.value.slug, str(refused.value)) == (slug, text)
+
+
+@rows(
+    ("data", "slug", "text"),
+    [
+        (
+            wrap(names.MISSION, 0)[:-1] + b"\xff",
+            "unknown-format",
+            "this is `rtshcua/mission`, not `rtshcua/policy`",
+        ),
+        (b"\x83\x62\xff\xfe\x01", "unknown-format", "this is `\ufffd\ufffd`, not `rtshcua/policy`"),
+        (
+            b"\x83\x6ertshcua/policy\x20",
+            "unknown-version",
+            "`rtshcua/policy` version -1 is unknown here; only version 7 is read; "
+            "docs/compatibility.md says what reads earlier ones",
+        ),
+        (
+            b"\x83\x6ertshcua/policy\x1b" + b"\xff" * 8 + b"\x00",
+            "malformed",
+            "this is no `rtshcua/policy`: not canonical CBOR: integer outside 64 bits (byte 16)",
+        ),
+        (
+            b"\x83\x78\xff\x00\x00",
+            "malformed",
+            "this is no `rtshcua/policy`: not canonical CBOR: string longer than the bytes that follow (byte 1)",
+        ),
+    ],
+)
+def test_name_and_version_come_before_all_that_is_below(data, slug, text):
+    with pytest.raises(ArtefactError) as refused:
+        unwrap(names.POLICY, data)
+    assert (refused.value.slug, str(refused.value)) == (slug, text)
+
+
+def test_more_items_than_an_artefact_has_are_malformed():
+    most = tuple(range(names.FEW - 4))
+    assert unwrap(names.BUNDLE, wrap(names.BUNDLE, most)) == most
+    with pytest.raises(ArtefactError, match="more than 64 items"):
+        unwrap(names.BUNDLE, wrap(names.BUNDLE, (*most, 1)))
+    assert len(unwrap(names.POLICY, wrap(names.POLICY, (*most, 1)))) == len(most) + 1
+    with pytest.raises(ArtefactError, match="more than 10 items"):
+        unwrap(names.POLICY, wrap(names.POLICY, most), items=10)

@@ -246,6 +246,15 @@ def test_more_bytes_than_the_limit_are_refused_unread():
     assert refused.value.offset == 2
 
 
+@rows(("value", "count"), [(1, 1), ([1, [2], 3], 5), ({1: 2, 3: [4]}, 6), ([[], {}, []], 4), ({}, 1)])
+def test_items_are_counted_keys_too_and_the_outermost_one(value, count):
+    data = cbor.encode(value)
+    assert cbor.encode(cbor.decode(data, items=count)) == data
+    if count > 1:
+        with pytest.raises(cbor.CborError, match=f"more than {count - 1} items"):
+            cbor.decode(data, items=count - 1)
+
+
 @rows(
     "data",
     [

@@ -128,6 +128,15 @@ def test_no_other_header_is_taken_even_if_signed(header):
     assert refusal(rebuilt(protected=protected, signature=signature)) == "malformed"
 
 
+def test_a_header_that_is_too_long_is_malformed_whatever_it_holds():
+    for size in (cose.MAX_PROTECTED, cose.MAX_PROTECTED + 1):
+        header = bytes(size)
+        with pytest.raises(cose.EnvelopeError) as refused:
+            cose.unverified(b"\xd2" + cbor.encode((header, {}, b"", bytes(64))))
+        assert refused.value.slug == "malformed"
+        assert ("and at most 200 are read" in str(refused.value)) == (size > cose.MAX_PROTECTED)
+
+
 def test_a_header_that_is_not_canonical():
     protected = b"\xa3\x01\x32" + parts()[0][3:] + b"\0"
     assert refusal(rebuilt(protected=protected)) == "malformed"

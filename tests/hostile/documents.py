@@ -1,0 +1,43 @@
+"""Documents that take long to decode, verify or hash for who takes them apart before it knows whose they are."""
+
+from rtshcua.wire import cose, names
+from rtshcua.wire.document import MAX_DOCUMENT
+from rtshcua.wire.keys import Duty, SigningKey
+
+STRANGER = SigningKey.from_seed(bytes([77]) * 32, duty=Duty.MISSION, development=True)
+
+
+def head(major: int, count: int) -> bytes:
+    """A head of five octets (RFC 8949, section 3)."""
+    return bytes([major << 5 | 26]) + count.to_bytes(4)
+
+
+def enveloped(protected: bytes, payload: bytes) -> bytes:
+    """An envelope that nobody signed."""
+    return b"\xd2\x84" + _string(protected) + b"\xa0" + _string(payload) + _string(bytes(64))
+
+
+def _string(octets: bytes) -> bytes:
+    size = len(octets)
+    if size < 256:
+        return (bytes([0x40 | size]) if size < 24 else bytes([0x58, size])) + octets
+    return (b"\x59" + size.to_bytes(2) if size < 1 << 16 else head(2, size)) + octets
+
+
+def nonsense(key: SigningKey) -> bytes:
+    """Tiny items as far as they fit, signed as a replacement."""
+    count = MAX_DOCUMENT - 300
+    payload = b"\x83\x73" + names.REPLACEMENT.name.encode() + b"\x02" + head(4, count) + b"\x80" * count
+    return cose.sign1(payload, key=key, duty=Duty.MISSION, content_type=names.REPLACEMENT.content_type)
+
+
+def hostile(key: SigningKey) -> dict[str, tuple[bytes, str]]:
+    """By name: a document, and how it is refused. `key` is one that is trusted for missions."""
+    return {
+        "a header of tiny items": (enveloped(head(4, 260_000) + b"\x80" * 260_000, b""), "malformed"),
+        "a header of pairs": (enveloped(head(5, 60_000) + b"\x00\x80" * 60_000, b""), "malformed"),
+        "tiny items by a mission key": (nonsense(key), "malformed"),
+        "tiny items by a stranger": (nonsense(STRANGER), "unknown-key"),
+        "by a key that did not sign it": (nonsense(key)[:-64] + bytes(64), "bad-signature"),
+        "no envelope": (b"\xd2\x84" + b"\x80" * (MAX_DOCUMENT - 2), "malformed"),
+    }

@@ -26,7 +26,7 @@ from typing import Final, NamedTuple
 import msgspec
 
 from rtshcua.onboard.ports import Presented
-from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
+from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT, MAX_WITHOUT_MISSION
 
 #: how many may follow a flight at once at one socket; one more takes the place of whoever was quiet for longest
 MOST_READERS: Final = 8
@@ -42,6 +42,11 @@ LONGEST: Final = MAX_DOCUMENT * 4 // 3 + 1024
 GAP_US: Final = 20_000
 #: the longest path of a Unix socket, in bytes (unix(7))
 LONGEST_PATH: Final = 107
+#: how much of long lines is read of one user, in bytes: so many a second, and so many at once. Shorter ones, which a
+#: recall is, count for nothing
+WORK_RATE: Final = 1 << 17
+WORK_AT_ONCE: Final = 1 << 19
+SHORT: Final = MAX_WITHOUT_MISSION * 4 // 3 + 64
 _CHUNK: Final = 1 << 16
 _CREDENTIALS: Final = struct.Struct("iII")
 _PATIENCE_S: Final = 1.0
@@ -158,6 +163,7 @@ class AgentSocket:
         self._senders: dict[int, tuple[_Reader, int]] = {}
         self._numbers = count(1) if numbers is None else numbers
         self._next_us = 0
+        self._budgets: dict[int | None, tuple[int, int]] = {}  # by user: when it was counted, and what was left
         self._listener = _listen(path, group)
         self._place = _place(path)
 
@@ -237,7 +243,19 @@ class AgentSocket:
         self._drop(quiet)
         return True
 
+    def _has_budget(self, user: int | None, octets: int, now_us: int) -> bool:
+        """Whether so much more of a user is looked at now; what is, is counted."""
+        at_us, left = self._budgets.get(user, (now_us, WORK_AT_ONCE))
+        left = min(WORK_AT_ONCE, left + (now_us - at_us) * WORK_RATE // 1_000_000)
+        may = octets <= left
+        self._budgets[user] = now_us, left - octets if may else left
+        return may
+
     def _taken(self, reader: _Reader, line: bytes, now_us: int) -> Presented | None:
+        if len(line) > SHORT and not self._has_budget(reader.peer.user, len(line), now_us):
+            text = f"of one user {WORK_RATE >> 10} KiB a second are looked at: hand it in again later"
+            self._send(reader, _answer(_number(line), "busy", text))
+            return None
         try:
             handed = _read(line)
             document = b64decode(handed.document, validate=True)

@@ -4,12 +4,14 @@ import os
 import sys
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from hashlib import sha256
 from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
 import msgspec
+from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import AgentSocket
 from rtshcua.cli.showing import words
@@ -17,6 +19,9 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Append, Event, Presented, Reply
+from rtshcua.wire import names
+from rtshcua.wire.document import MAX_WITHOUT_MISSION, kind_of
+from rtshcua.wire.untrusted import Untrusted
 
 FORMAT: Final = "rtshcua/agent"
 VERSION: Final = 1
@@ -27,11 +32,22 @@ ALIKE: Final = (
     "nothing tells an agent there from an operator. Let the agent run as another user (`--agent-group`)"
 )
 
-#: what is larger is looked at ahead in another thread, in bytes: a mission takes some ms a step to verify and prepare
-_LARGE: Final = 1 << 11
+#: replacements that wait to be looked at in another thread, at each socket: one takes some ms a step
 _MOST_AHEAD: Final = 8
-#: how long that thread may keep the flight's from running, in seconds
-_SWITCH_S: Final = 0.000_5
+#: how long that thread may keep the flight's from running each time, in seconds
+_SWITCH_S: Final = 0.000_1
+#: replacements of which it is kept what became of them, so that none is looked at twice
+_MOST_KNOWN: Final = 256
+#: what stays so, whatever happens later
+_LASTING: Final = frozenset(
+    {
+        "malformed", "unknown-format", "unknown-version", "unknown-key", "revoked-key", "wrong-duty", "bad-signature",
+        "other-flight", "superseded", "already-released", "other-steps", "id-seen", "no-step", "id-mismatch",
+        "binding-mismatch", "wrong-policy", "wrong-vehicle", "wrong-source", "wrong-role", "key-other-policy",
+    }
+)  # fmt: skip
+_TAKEN_IN: Final = ("superseded", "it was taken in before")
+_FAILED: Final = ("failed", "it could not be looked at")
 
 _encode = msgspec.json.Encoder().encode
 
@@ -41,7 +57,7 @@ class _Door:
 
     def __init__(self, socket: AgentSocket) -> None:
         self.socket = socket
-        self.ahead: list[tuple[Future[None], Presented]] = []
+        self.ahead: list[tuple[Future[Untrusted | None], Presented]] = []
         self.worker = ThreadPoolExecutor(1)
 
 
@@ -78,28 +94,67 @@ class Agents:
             self._close()
             raise
         self._watches = path is not None and operators is not None
+        self._over = False  # the mission is, and nothing more is looked at
+        #: the digests of the replacements that were looked at and not answered yet, by sender
+        self._asked: dict[int, bytes] = {}
+        #: why the ones that were would be refused again
+        self._known: dict[bytes, tuple[str, str]] = {}
 
     def events(self, now: Now) -> Sequence[Event]:
-        """The documents that came in, large ones after they were looked at ahead."""
+        """The documents that came in. What takes longer than some 0.5 ms to look at was looked at in another thread;
+        what was refused there, or is refused by its outline, says so.
+        """
         found: list[Event] = [*self._left]
         self._left = ()
         for door in self._sockets:
             event = door.socket.poll(now.monotonic_us)
             if event is not None:
-                if len(event.document) <= _LARGE or self._waits:
-                    found.append(event)
-                elif len(door.ahead) == _MOST_AHEAD:
-                    door.socket.answer(event.sender, "busy", "other documents are being looked at")
-                else:
-                    sys.setswitchinterval(_SWITCH_S)
-                    consider = self._loaded.boundary.consider
-                    door.ahead.append((door.worker.submit(consider, event.document, now), event))
+                found += self._sorted(door, event, now)
             while door.ahead and door.ahead[0][0].done():
-                found.append(door.ahead.pop(0)[1])
+                future, event = door.ahead.pop(0)
+                error = future.exception() or future.result()
+                if error is not None:
+                    refused = (error.slug, str(error)) if isinstance(error, Untrusted) else _FAILED
+                    event = replace(event, refused=refused)
+                found.append(event)
+                if not any(each.ahead for each in self._sockets):
+                    sys.setswitchinterval(self._switch_s)
         if self._watches and not self._sockets[-1].socket.users.isdisjoint((0, os.geteuid())):
             self._watches = False
             self._notes.append(ALIKE)
         return found
+
+    def _sorted(self, door: _Door, event: Presented, now: Now) -> Sequence[Event]:
+        """What comes of a document at once."""
+        if self._waits or self._over:
+            return (event,)
+        document = event.document
+        try:
+            kind = kind_of(document)
+        except Untrusted as error:  # what is large is not hashed here either
+            small = len(document) <= MAX_WITHOUT_MISSION
+            return (event if small else replace(event, refused=(error.slug, str(error))),)
+        if kind is not names.REPLACEMENT:
+            return (event,)
+        digest = sha256(document).digest()
+        known = self._known.get(digest)
+        if known is not None:
+            return (replace(event, refused=known),)
+        if len(door.ahead) == _MOST_AHEAD:
+            door.socket.answer(event.sender, "busy", "other documents are being looked at")
+            return ()
+        sys.setswitchinterval(_SWITCH_S)
+        self._asked[event.sender] = digest
+        door.ahead.append((door.worker.submit(self._loaded.boundary.consider, document, now), event))
+        return ()
+
+    def _learn(self, reply: Reply) -> None:
+        """Keep what became of a replacement, if it stays so."""
+        digest = self._asked.pop(reply.sender, None)
+        if digest is not None and (reply.slug == "accepted" or reply.slug in _LASTING):
+            self._known[digest] = _TAKEN_IN if reply.slug == "accepted" else (reply.slug, reply.text)
+            while len(self._known) > _MOST_KNOWN:
+                del self._known[next(iter(self._known))]
 
     def fly(self, loaded: Loaded, left: Sequence[Event] = ()) -> None:
         """What waited has a bundle that flies: its mission is told, and what comes in is for that flight, first of all
@@ -116,6 +171,7 @@ class Agents:
 
     def turn_away(self, now: Now) -> None:
         """Answer what came in that it is too late: the mission is over, and nobody decides about it any more."""
+        self._over = True
         for event in self.events(now):
             if isinstance(event, Presented):
                 self.watch([Reply(event.sender, "falling-back", "the mission is over")])
@@ -131,6 +187,7 @@ class Agents:
             if isinstance(action, Append):
                 self.tell(action.line)
             elif isinstance(action, Reply):
+                self._learn(action)
                 self.answer(action.sender, action.slug, action.text)
         if self._told != self._loaded.bundle.mission_digest:
             self._told = self._loaded.bundle.mission_digest

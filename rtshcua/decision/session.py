@@ -28,7 +28,7 @@ from rtshcua.wire.document import DocumentError, check_key, check_root, kind_of
 from rtshcua.wire.permit import LINK_VALID_US
 from rtshcua.wire.recall import open_recall
 from rtshcua.wire.receipt import ACCEPTED, APPROVAL, CANCELLATION, RECALL, REPLACEMENT, UNKNOWN, Receipt
-from rtshcua.wire.replacement import MAX_REPLACEMENTS, Replacement, fit_replacement, open_replacement
+from rtshcua.wire.replacement import MAX_REPLACEMENTS, Replacement, check_stays, fit_replacement, open_replacement
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.response import Status
 from rtshcua.wire.trust import TrustRoot
@@ -43,10 +43,13 @@ _KINDS: Final = {
 
 
 class _Ahead(NamedTuple):
-    """What was found ahead of a document: the replacement in it, prepared, or why it is not to be trusted."""
+    """What was found ahead of a document: the replacement in it, prepared, or why it is not to be trusted; and the
+    digest of the mission whose steps it was compared with.
+    """
 
     found: Replacement | Untrusted
     prepared: tuple[PreparedInvocation, ...]
+    compared: bytes = b""
 
 
 class InForce:
@@ -104,22 +107,29 @@ class InForce:
         """When a step was received on board, monotonic (paper symbol `t_r`): nothing is released before."""
         return self._received_us[step]
 
-    def consider(self, document: bytes, now: Now) -> None:
+    def consider(self, document: bytes, now: Now) -> Untrusted | None:
         """Verify and prepare a replacement ahead, in whatever thread, so that `take` need not: that takes a while.
 
+        Gives why it is not to be trusted.
+
         Nothing comes of it but time: it rests on the document, the policy and the root, which stay as they are, and
-        `take` asks again whether these have expired.
+        `take` asks again whether these have expired; and on the mission that it supersedes, if that is in force.
         """
         try:
             if kind_of(document) is not names.REPLACEMENT:
-                return
-            found = self._opened(document, now)
-            ahead = _Ahead(found, self._prepared(found.mission))
+                return None
+            bundle, found = self.bundle, self._opened(document, now)
+            compared = b""
+            if found.supersedes == bundle.mission_digest:
+                check_stays(found, bundle)
+                compared = bundle.mission_digest
+            ahead = _Ahead(found, self._prepared(found.mission), compared)
         except Untrusted as error:
             ahead = _Ahead(error, ())
         self._ahead[document] = ahead
         for old in list(self._ahead)[:-MOST_AHEAD]:
             self._ahead.pop(old, None)
+        return ahead.found if isinstance(ahead.found, Untrusted) else None
 
     def take(self, document: bytes, now: Now, *, decided: int, released: int, current: int = 0) -> Receipt:
         """Take a document in. The first `decided` steps are decided for good, the first `released` were released; those
@@ -197,7 +207,7 @@ class InForce:
             for key in (self.bundle.policy_key, ahead.found.key):
                 check_key(key, self.vehicle, now)
             found = ahead.found
-        after = fit_replacement(found, self.bundle, released)
+        after = fit_replacement(found, self.bundle, released, compared=b"" if ahead is None else ahead.compared)
         new = frozenset(each.invocation_id for each in found.mission.invocations[found.kept :])
         if new & self._seen:
             raise DocumentError("id-seen", "a new step has the id of one that this flight knew before")

@@ -171,11 +171,13 @@ class Presented(Event, frozen=True):
     """Somebody handed over a signed document, as yet unverified: an approval, a recall, a replacement, a
     cancellation.
 
-    `sender` numbers who gets the answer.
+    `sender` numbers who gets the answer. `refused` is why it is refused, as a slug and a text, where that was found out
+    before: then it is not looked at again.
     """
 
     document: bytes
     sender: int = 0
+    refused: tuple[str, str] | None = None
 
 
 class Anchored(Event, frozen=True):

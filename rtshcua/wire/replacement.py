@@ -92,8 +92,9 @@ def open_replacement(
     return found
 
 
-def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle:
+def fit_replacement(found: Replacement, bundle: Bundle, released: int, *, compared: bytes = b"") -> Bundle:
     """What is in force after a replacement of the mission in `bundle`, of which `released` steps were released.
+    `compared` is the digest of the mission that `check_stays` was asked about before.
 
     Raises `DocumentError`: `superseded` (it replaces what is not in force), `already-released`, `other-steps`; and
     `BundleError` for a key that may not speak for what is replaced.
@@ -103,9 +104,17 @@ def fit_replacement(found: Replacement, bundle: Bundle, released: int) -> Bundle
     if found.kept < released:
         text = f"it changes {step_words(found.kept)}, and {released} steps were released already"
         raise DocumentError("already-released", text)
+    if compared != bundle.mission_digest:
+        check_stays(found, bundle)
+    return found.over(bundle)
+
+
+def check_stays(found: Replacement, bundle: Bundle) -> None:
+    """Whether the steps of `bundle` that are to stay are the same, and the key may set the others aside. It takes as
+    long as there are steps. Raises `DocumentError` and `BundleError`.
+    """
     _check_kept(bundle.mission, found.mission, found.kept)
     check_set_aside(found.key, bundle, found.kept)
-    return found.over(bundle)
 
 
 def _after(flight: bytes, supersedes: bytes, kept: int) -> bytes:

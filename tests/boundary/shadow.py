@@ -33,6 +33,7 @@ from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.receipt import decode as read_receipt
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 from rtshcua.wire.trust import TrustRoot
+from rtshcua.wire.untrusted import Untrusted
 from virtual import case
 
 #: what the boundary in C signs its own evidence with
@@ -164,8 +165,8 @@ class BothBoundaries:
         self._counts["requests"] += 1
         return one
 
-    def consider(self, document: bytes, now: Now) -> None:
-        self._here.consider(document, now)
+    def consider(self, document: bytes, now: Now) -> Untrusted | None:
+        return self._here.consider(document, now)
 
     def present(self, document: bytes, now: Now, released: int) -> bytes:
         one: bytes = self._here.present(document, now, released)

@@ -29,6 +29,7 @@ from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt
 from rtshcua.wire.receipt import encode as encode_receipt
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref, Request, decode
 from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Status, encode, encode_refusal
+from rtshcua.wire.untrusted import Untrusted
 
 #: how far UTC and monotonic time may part in a session, in us: more than a good clock is off, and less than matters
 CLOCKS_PART_US: Final = 3_000_000
@@ -134,9 +135,12 @@ class SoftwareBoundary:
                 return self._chain.repeat(payload)
         return self._chain.add(Tag.DECIDED, payload)
 
-    def consider(self, document: bytes, now: Now) -> None:
-        """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick."""
-        self._in_force.consider(document, now)
+    def consider(self, document: bytes, now: Now) -> Untrusted | None:
+        """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick.
+
+        Gives why it is not to be trusted.
+        """
+        return self._in_force.consider(document, now)
 
     def present(self, document: bytes, now: Now, released: int, own: Now | None = None) -> bytes:
         """Take in a signed document, if it is to be trusted. Nothing is raised, and nothing else is changed.

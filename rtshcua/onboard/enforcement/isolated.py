@@ -31,6 +31,7 @@ from rtshcua.wire.receipt import REPLACEMENT, UNKNOWN, Receipt, decode
 from rtshcua.wire.receipt import encode as encode_receipt
 from rtshcua.wire.request import STEP
 from rtshcua.wire.response import Status, encode_refusal
+from rtshcua.wire.untrusted import Untrusted
 
 #: makes one call, and gives its answer
 Call = Callable[[bytes], bytes]
@@ -183,9 +184,9 @@ class IsolatedBoundary:
         answer = self._caller(ENFORCE, request)
         return encode_refusal(Status.MALFORMED) if isinstance(answer, Refusal) else answer
 
-    def consider(self, document: bytes, now: Now) -> None:
-        """Look at a document ahead, for what this end makes of it."""
-        self._in_force.consider(document, now)
+    def consider(self, document: bytes, now: Now) -> Untrusted | None:
+        """Look at a document ahead, for what this end makes of it. Gives why it is not to be trusted."""
+        return self._in_force.consider(document, now)
 
     def present(self, document: bytes, now: Now, released: int) -> bytes:
         """The boundary's receipt; what it accepted is in force at this end too."""

@@ -244,14 +244,17 @@ class EventHandler:
 
     def _presented(self, now: Now, event: ports.Presented) -> None:
         """Present one document, act on what became of it, and answer."""
-        receipt = self._receipt(now, event.document)
+        receipt = self._receipt(now, event)
         if receipt.accepted:
             self._accepted(now, receipt, event.document)
         else:
             self._refused(now, receipt)
         self._journal.add(Reply(event.sender, receipt.slug, receipt.text))
 
-    def _receipt(self, now: Now, document: bytes) -> Receipt:
+    def _receipt(self, now: Now, event: ports.Presented) -> Receipt:
+        document = event.document
+        if event.refused is not None:
+            return Receipt(UNKNOWN, *event.refused)
         if self._controller.stage is Stage.FALLING and not _recalls(document):
             return Receipt(UNKNOWN, "falling-back", "the mission is over: the vehicle falls back")
         receipt = decode(self._boundary.present(document, now, self._controller.released))

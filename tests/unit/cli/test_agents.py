@@ -22,6 +22,7 @@ from rtshcua.cli.live.telling import Teller
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending, Event, Presented, Reply
+from rtshcua.wire.keys import Duty, SigningKey
 
 
 class Followed(Run):
@@ -170,8 +171,11 @@ def test_operators_have_a_socket_of_their_own_and_are_looked_at_first(tmp_path: 
 
 
 def test_what_agents_make_the_flight_look_at_keeps_no_operator_waiting(tmp_path: Path) -> None:
-    """Large documents are looked at ahead, by a thread for each socket, and no more of them than that."""
-    of, over, large = low(), threading.Event(), b64encode(bytes(3_000)).decode()
+    """Replacements are looked at ahead, by a thread for each socket, and no more of them than that."""
+    of, over = low(), threading.Event()
+    seeds = (number.to_bytes(32) for number in range(1, 14))
+    keys = [SigningKey.from_seed(seed, duty=Duty.MISSION, development=True) for seed in seeds]
+    large = iter([b64encode(replacement(of, key=key)).decode() for key in keys])
     with tempfile.TemporaryDirectory(dir="/tmp") as name, ExitStack() as stack:
         paths = [Path(name) / "a", Path(name) / "o"]
         agents = stack.enter_context(Agents(paths[0], of, operators=paths[1]))
@@ -181,7 +185,7 @@ def test_what_agents_make_the_flight_look_at_keeps_no_operator_waiting(tmp_path:
         for link, path, times in zip(links, paths, (12, 1), strict=True):
             link.connect(str(path))
             for _ in range(times):
-                link.sendall(json.dumps({"document": large}).encode() + b"\n")
+                link.sendall(json.dumps({"document": next(large)}).encode() + b"\n")
         found: list[Event] = []
         for turn in range(1, 200):
             found += agents.events(Now(turn * GAP_US, 1, 0))

@@ -277,6 +277,14 @@ def test_a_replacement_considered_ahead_is_refused_when_its_key_or_root_has_expi
     assert take(of, replacement(OF), now).slug == "key-expired"
 
 
+def test_a_replacement_of_what_is_not_in_force_is_compared_with_nothing_ahead() -> None:
+    of = flight()
+    document = replacement(OF)
+    take(of, document)
+    assert of.consider(document, START) is None
+    assert take(of, document).slug == "superseded"
+
+
 def test_only_the_last_replacements_considered_ahead_are_kept() -> None:
     of = flight()
     documents = [replacement(OF, mission=replace(shorter(OF), issued_at_us=n)) for n in range(MOST_AHEAD + 1)]

@@ -1,0 +1,166 @@
+"""Whoever floods the agent socket: how much later are the frames of the vehicle taken in?
+
+A process sends a frame every 20 ms, and the thread that flies takes each in, by the driver, and looks at the agent
+socket in between, as a run does. In turns nobody hands anything in, and another process hands in whatever takes long to
+decode, verify or hash, as fast as it is read, with a mission key and without. Of each the worst gap between two frames
+in a block counts, and of the blocks the median. Exits with 1 where a flood makes it longer than `LIMIT` allows.
+"""
+
+import json
+import multiprocessing
+import socket
+import sys
+import time
+from base64 import b64encode
+from contextlib import suppress
+from multiprocessing.synchronize import Event as Switch
+from pathlib import Path
+from select import select
+from statistics import median
+from tempfile import TemporaryDirectory
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from hostile.documents import hostile
+from hostile.target import Target, greeting
+from reference.documents import low, low_mission, replacement
+from reference.world import MISSION_KEY, ROOT, ROOT_KEY, START, VEHICLE, Run, loaded, sealed_again
+from rtshcua.adapters.boundary_process import BoundaryProcess
+from rtshcua.cli.agents import Agents
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.isolated import Caller
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.wire.document import MAX_DOCUMENT
+
+LIMIT = 1.2
+BLOCKS, BLOCK_S = 7, 3.0
+EVERY_S = 0.02
+PIN = ROOT_KEY.verification().public
+
+
+def send(port: int, frames: list[bytes]) -> None:
+    """Send a frame every 20 ms, until it is ended."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        begun, number = time.monotonic(), 0
+        while True:
+            number += 1
+            time.sleep(max(0.0, begun + number * EVERY_S - time.monotonic()))
+            link.sendto(frames[number % len(frames)], ("127.0.0.1", port))
+
+
+def flood(path: str, documents: list[bytes], switch: Switch) -> None:
+    """Hand documents in as fast as they are read, while the switch is on."""
+    lines = [json.dumps({"id": 1, "document": b64encode(each).decode()}).encode() + b"\n" for each in documents]
+    while True:
+        switch.wait()
+        with suppress(OSError), socket.socket(socket.AF_UNIX) as link:
+            link.connect(path)
+            link.setblocking(False)
+            for line in lines:
+                rest = memoryview(line)
+                while rest and switch.is_set():
+                    readable, writable, _ = select([link], [link], [], 0.1)
+                    if readable and not link.recv(1 << 20):
+                        break
+                    if writable:
+                        with suppress(BlockingIOError):
+                            rest = rest[link.send(rest) :]
+
+
+class Flight:
+    """What a run does in each turn of its loop, with what a flood reaches: frames, sockets, the runtime's step."""
+
+    def __init__(self, of: Loaded, folder: Path) -> None:
+        self.run = Run(of, ready=False)
+        self.agents = Agents(folder / "s", of)
+        self.driver = Target("px4", keyed=False)
+        self.frames = [self.driver.says(each) for each in greeting("px4")]
+        self.link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.link.bind(("127.0.0.1", 0))
+        self.begun_us = time.monotonic_ns() // 1000
+        self.handed_in = 0
+
+    def now(self) -> Now:
+        """The flight's time: it began as the bundle was received."""
+        passed_us = time.monotonic_ns() // 1000 - self.begun_us
+        return Now(START.monotonic_us + passed_us, START.utc_us + passed_us, START.utc_error_us)
+
+    def worst_gap_s(self, lasts_s: float) -> float:
+        """The longest time between two frames that were taken in."""
+        until_s, last_s, worst_s = time.monotonic() + lasts_s, 0.0, 0.0
+        while last_s < until_s:
+            if select([self.link], [], [], 0.05)[0]:
+                self.driver.receive(self.link.recv(2048))
+                taken_s = time.monotonic()
+                worst_s, last_s = max(worst_s, taken_s - last_s if last_s else 0.0), taken_s
+            now = self.now()
+            events = self.agents.events(now)
+            self.handed_in += len(events)
+            self.agents.watch(self.run.runtime.step(now, events))
+        return worst_s
+
+    def close(self) -> None:
+        """Listen no more."""
+        self.agents.__exit__(None, None, None)
+        self.link.close()
+
+
+def measured(name: str, of: Loaded, folder: Path, blocks: int = BLOCKS, lasts_s: float = BLOCK_S) -> float:
+    """Print the gaps of a mode, and give how many times the quiet one that of a flood is."""
+    flight = Flight(of, folder)
+    documents = [document for document, _ in hostile(MISSION_KEY).values()] + [replacement(of)] * 2
+    assert max(map(len, documents)) <= MAX_DOCUMENT
+    start = multiprocessing.get_context("fork")
+    switch = start.Event()
+    others = [
+        start.Process(target=send, args=(flight.link.getsockname()[1], flight.frames), daemon=True),
+        start.Process(target=flood, args=(str(folder / "s"), documents, switch), daemon=True),
+    ]
+    for each in others:
+        each.start()
+    try:
+        flight.worst_gap_s(2.0)
+        gaps: tuple[list[float], list[float]] = ([], [])
+        for _ in range(blocks):
+            for flooded, of_kind in enumerate(gaps):
+                (switch.set if flooded else switch.clear)()
+                of_kind.append(flight.worst_gap_s(lasts_s))
+        assert flight.handed_in, "nothing was handed in"
+    finally:
+        for each in others:
+            each.kill()
+            each.join()
+        flight.close()
+    quiet, flooded_s = map(median, gaps)
+    ratio = flooded_s / quiet
+    told = "held  " if ratio <= LIMIT else "MISSED"
+    print(
+        f"{told}  flood, {name}: worst gap {flooded_s * 1e3:.1f} ms between frames, "
+        f"quiet {quiet * 1e3:.1f} ms, ratio {ratio:.2f}, limit {LIMIT} ({flight.handed_in} documents taken up)"
+    )
+    return ratio
+
+
+def in_process(folder: Path, blocks: int = BLOCKS, lasts_s: float = BLOCK_S) -> float:
+    """The same with the boundary in a process of its own."""
+    process = BoundaryProcess(ROOT.sign(ROOT_KEY), PIN, VEHICLE, folder, paced=True)
+    try:
+        of = load(
+            sealed_again(loaded(mission=low_mission())), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS,
+            session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False, caller=Caller(process.call),
+        )  # fmt: skip
+        assert isinstance(of, Loaded), of
+        return measured("process", of, folder, blocks, lasts_s)
+    finally:
+        process.close()
+
+
+def main() -> int:
+    """Measures both modes, prints, and says whether the limit held."""
+    with TemporaryDirectory(dir="/tmp") as one, TemporaryDirectory(dir="/tmp") as other:
+        worst = max(measured("software", low(), Path(one)), in_process(Path(other)))
+    return int(worst > LIMIT)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,166 @@
+"""Threat: an agent, with a mission key or without, hands in what takes long to decode, verify or hash, again and again:
+the thread that flies would stand still meanwhile, and what comes from the vehicle would wait.
+"""
+
+import json
+import socket
+import tempfile
+import threading
+import time
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hostile.documents import enveloped, head, hostile
+from reference.documents import low, recall, replacement
+from reference.world import MISSION_KEY, Run
+from rtshcua.adapters.agent_socket import GAP_US, SHORT, WORK_AT_ONCE, WORK_RATE, AgentSocket
+from rtshcua.cli.agents import Agents
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.ports import Event, Presented
+from rtshcua.wire import cbor, cose
+from rtshcua.wire.cose import MAX_PROTECTED, EnvelopeError
+
+#: CBOR items that one turn may decode in the thread that flies: some 0.1 ms
+ITEMS = 150
+HOSTILE = hostile(MISSION_KEY)
+
+
+class Flooded(Run):
+    """A run, and somebody at its socket; counts what is decoded in which thread."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        of = low()
+        self.agents = Agents(folder / "s", of)
+        self.link = socket.socket(socket.AF_UNIX)
+        self.link.connect(str(folder / "s"))
+        self.decoded: Counter[int] = Counter()
+        self.looked_at: list[bytes] = []
+        self.me = threading.get_ident()
+        self.most = 0
+        item, consider = cbor._item, of.boundary.consider
+
+        def counted(*arguments: Any) -> Any:
+            self.decoded[threading.get_ident()] += 1
+            return item(*arguments)
+
+        def considered(document: bytes, now: Now) -> Any:
+            assert threading.get_ident() != self.me
+            self.looked_at.append(document)
+            return consider(document, now)
+
+        monkeypatch.setattr(cbor, "_item", counted)
+        monkeypatch.setattr(of.boundary, "consider", considered)
+        super().__init__(of)
+
+    def hand(self, document: bytes, *, over: bool = False) -> str:
+        """What is answered; how much the flight's thread decoded meanwhile is kept."""
+        self.agents._sockets[0].socket._budgets.clear()
+        line = json.dumps({"id": 5, "document": b64encode(document).decode()}).encode() + b"\n"
+        sender = threading.Thread(target=self.link.sendall, args=(line,))
+        sender.start()
+        slug = ""
+        while not slug:
+            assert over or self.ending is None
+            if not self.agents._sockets[0].ahead:  # else the other thread is waited for
+                self.clock.advance(GAP_US)
+            before = self.decoded[self.me]
+            if over:
+                self.agents.turn_away(self.clock.now())
+            else:
+                events: list[Event] = list(self.agents.events(self.clock.now()))
+                self.agents.watch(self.tick(*events) if events else ())
+            self.most = max(self.most, self.decoded[self.me] - before)
+            slug = self._answer()
+            time.sleep(0.001)  # the other thread has something to do
+        sender.join()
+        return slug
+
+    def _answer(self) -> str:
+        try:
+            lines = [json.loads(line) for line in self.link.recv(1 << 22, socket.MSG_DONTWAIT).splitlines()]
+        except BlockingIOError:
+            return ""
+        return next((line["slug"] for line in lines if line["type"] == "answer"), "")
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Iterator[Flooded]:
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        found = Flooded(Path(name), monkeypatch)
+        with found.agents:
+            yield found
+        found.link.close()
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_the_flights_thread_decodes_little_of_whatever_is_handed_in(run: Flooded, name: str) -> None:
+    document, slug = HOSTILE[name]
+    assert run.hand(document) == slug
+    assert run.hand(document) == slug
+    assert run.most <= ITEMS
+    assert len(run.looked_at) <= 1, "its refusal is remembered"
+
+
+def test_a_replacement_that_is_handed_in_twice_is_looked_at_once(run: Flooded) -> None:
+    document = replacement(run.loaded)
+    assert run.hand(document) == "accepted"
+    assert run.hand(document) == "superseded"
+    assert run.looked_at == [document]
+    assert run.most <= ITEMS
+
+
+def test_while_it_falls_back_and_after_the_mission_nothing_is_decoded_either(run: Flooded) -> None:
+    run.until_flies("goto")
+    assert run.hand(recall(run.loaded, now=run.clock.now())) == "accepted"
+    run.most = 0
+    for document, slug in HOSTILE.values():
+        assert run.hand(document) in ("falling-back", slug)
+    for document, _ in HOSTILE.values():
+        assert run.hand(document, over=True) == "falling-back"
+    assert run.most <= ITEMS
+
+
+def test_a_protected_header_is_malformed_by_its_length() -> None:
+    for size in (MAX_PROTECTED, MAX_PROTECTED + 1):
+        with pytest.raises(EnvelopeError) as error:
+            cose.unverified(enveloped(head(2, size - 5) + bytes(size - 5), b""))
+        assert (error.value.slug, "bytes, and at most" in str(error.value)) == ("malformed", size > MAX_PROTECTED)
+
+
+def test_a_user_has_a_budget_and_what_is_short_counts_for_nothing() -> None:
+    long, short = (json.dumps({"document": "A" * size}).encode() + b"\n" for size in (349_000, SHORT // 4 * 4 - 400))
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        agents = AgentSocket(Path(name) / "s", bytes)
+        with socket.socket(socket.AF_UNIX) as flood, socket.socket(socket.AF_UNIX) as other:
+            for link in (flood, other):
+                link.connect(str(Path(name) / "s"))
+            sender = threading.Thread(target=flood.sendall, args=(long * 20,))
+            sender.start()
+            seconds, taken, shorts = 20, 0, 0
+            for turn in range(seconds * 50):
+                if turn % 50 == 0:
+                    other.sendall(short)
+                event = agents.poll(turn * GAP_US)
+                if isinstance(event, Presented):
+                    taken += len(event.document) > SHORT
+                    shorts += len(event.document) <= SHORT
+                time.sleep(0.000_1)  # the sender has something to do
+            sender.join(20)
+            agents.close()
+    assert 1 <= taken <= (WORK_AT_ONCE + seconds * WORK_RATE) // len(long)
+    assert shorts >= seconds - 2
+
+
+def test_what_failed_to_be_looked_at_is_refused_and_never_looked_at_here(
+    run: Flooded, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(document: bytes, now: Now) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(run.loaded.boundary, "consider", fails)
+    assert run.hand(replacement(run.loaded)) == "failed"

@@ -1,0 +1,75 @@
+"""A sample of each benchmark: that it still measures what it says, whatever the figures are. `make bench` measures."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+#: by benchmark, what of it is made smaller; `_` are its words on the command line
+SAMPLES: dict[str, dict[str, Any]] = {
+    "analysis": {"SIZES": (20, 40), "ROUNDS": 1},
+    "archive": {"EACH": 20},
+    "boundary": {"ROUNDS": 1, "BATCHES": 1, "CALLS": 2},
+    "boundary_process": {"BLOCKS": 1, "ROUNDS": 2, "STARTS": 1},
+    "compile": {"SIZES": (200, 400), "ROUNDS": 1},
+    "day": {"HOURS": 1, "FLIGHTS": 1, "TEN": 1},
+    "decide": {"ROUNDS": 1, "CALLS": 2},
+    "documents": {"BLOCKS": 1, "ROUNDS": 2},
+    "editor": {"LINES": 100, "ROUNDS": 1, "PAUSE": 0.01},
+    "end_to_end": {"ROUNDS": {"short": (1, 1)}},
+    "endurance": {"HOURS": 1, "HOUR_US": 240_000_000},
+    "enforce": {"BLOCKS": 1, "ROUNDS": 2},
+    "evidence": {"RECORDS": 200, "SYNCED_RECORDS": 3, "ROUNDS": 1, "BLOCK": 100},
+    "fence": {"ROUNDS": 1, "PLACES": 10, "PEER_S": 0.05},
+    "fleet": {"VEHICLES": 1, "SPEED": 10},
+    "flood": {"BLOCKS": 1, "BLOCK_S": 0.5},
+    "format": {"LINES": 100, "ROUNDS": 1},
+    "hostile_link": {"DATAGRAMS": 8_000, "BLOCK": 1_000, "GOOD": 100},
+    "lint": {"ROUNDS": 1, "FEW": 10, "MANY": 20},
+    "many_rules": {"FEW": 10, "MANY": 40, "ROUNDS": 1},
+    "missions": {"SIZES": (15, 30), "ROUNDS": 1},
+    "parse": {"LINES": 100, "MOST_LINES": 400, "ROUNDS": 1},
+    "proofs": {"SIZE": 256, "BLOCKS": 1, "ROUNDS": 2},
+    "reaction": {"PROCESSES": 1, "IN_PROCESS": 2, "QUICK": 2},
+    "recorded_flights": {},
+    "startup": {"ROUNDS": 1},
+    "verify": {"RECORDS": 300, "ROUNDS": 1},
+    "virtual_time": {"FRAMES": 5, "MANY_FRAMES": 5, "ROUNDS": 1},
+    "witness": {"EPOCHS": 2, "RECORDS": 16, "BLOCKS": 1},
+}
+#: what is run with the constants of a module changed
+_RUN = """
+import runpy, sys
+path, changed = sys.argv[1], eval(sys.argv[2])
+source = open(path, encoding="utf-8").read()
+sys.argv = [path]
+sys.path.insert(0, path.rpartition("/")[0])
+name = path.rpartition("/")[2].removesuffix(".py")
+module = __import__(name)
+missing = [each for each in changed if not hasattr(module, each)]
+assert not missing, missing
+vars(module).update(changed)
+sys.exit(module.main())
+"""
+
+
+def test_every_benchmark_has_a_sample() -> None:
+    assert {path.stem for path in (CHECKOUT / "bench").glob("*.py")} == set(SAMPLES)
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_sample_of_each_benchmark_runs(name: str, tmp_path: Path) -> None:
+    path = CHECKOUT / "bench" / f"{name}.py"
+    words = [sys.executable, "-c", _RUN, str(path), repr(SAMPLES[name])]
+    done = subprocess.run(
+        words, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True, check=False, timeout=300
+    )
+    # a limit may be missed: a sample says nothing about figures
+    assert done.returncode in (0, 1), done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
+    assert done.stdout, json.dumps(words)

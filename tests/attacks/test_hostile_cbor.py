@@ -19,8 +19,8 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.cose_receipt import check_receipt
 from rtshcua.evidence.proofs.file import MAX_PROOF, read_extra
-from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.checker.geojson import read_area
+from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.language.size import MAX_SIZE
 from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.bundle import MAX_BUNDLE, claimed_vehicle, envelopes

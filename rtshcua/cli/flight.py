@@ -175,8 +175,6 @@ class Flight:
             self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
         if ending is Ending.CRASHED:
             self._feed.post(Note(_CRASHED))
-        elif self._may_fly:
-            self._feed.post(Note(self._may_fly))
         missing = self._close(ending)
         lacks = ExitCode.FULL
         found = ReadBack(None) if missing else read_back(self._run.path / LOG, self._root)

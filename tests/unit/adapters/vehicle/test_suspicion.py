@@ -1,0 +1,81 @@
+"""One report ends nothing where anybody can put in a frame; reports that go back and forth are of two."""
+
+import pytest
+
+from rtshcua.adapters.vehicle.source_time import SourceTime
+from rtshcua.adapters.vehicle.suspicion import OFTEN, UNBROKEN_US, WITHIN_US, Contradictions, Suspicion
+
+S = 1_000_000
+LAND = ("mode", "Land", 7)
+
+
+def judged(suspicion: Suspicion, found: tuple[str, str, int] | None, up_us: int = S, **more: bool) -> str | None:
+    return suspicion.judge(found, up_us, disputed=more.get("disputed", False), at_once=more.get("at_once", False))
+
+
+def test_a_second_report_of_the_kind_confirms_and_the_same_one_seen_again_does_not() -> None:
+    one = Suspicion()
+    assert judged(one, LAND) is None
+    assert judged(one, LAND) is None, "nothing new came"
+    assert one.stands
+    assert judged(one, ("mode", "Return", 8)) == "Return"
+    assert not one.stands
+
+
+def test_another_report_refutes_it_and_that_is_told() -> None:
+    one = Suspicion()
+    judged(one, LAND)
+    assert judged(one, None) is None
+    assert (one.stands, one.refuted) == (False, "Land")
+
+
+def test_another_kind_is_no_confirmation() -> None:
+    one = Suspicion()
+    judged(one, LAND)
+    assert judged(one, ("target", "another target", 30)) is None
+    assert judged(one, ("target", "another target", 31)) == "another target"
+
+
+def test_near_a_frame_of_ours_one_report_counts_but_not_while_two_speak() -> None:
+    assert judged(Suspicion(), LAND, at_once=True) == "Land"
+    assert judged(Suspicion(), LAND, at_once=True, disputed=True) is None
+
+
+def test_while_two_speak_it_counts_when_nothing_else_is_said_for_a_while() -> None:
+    one = Suspicion()
+    judged(one, LAND, S, disputed=True)
+    assert judged(one, ("mode", "Land", 9), S + UNBROKEN_US - 1, disputed=True) is None
+    assert judged(one, ("mode", "Land", 20), S + UNBROKEN_US, disputed=True) == "Land"
+
+
+@pytest.mark.parametrize(("each_us", "stand"), [(WITHIN_US // OFTEN, True), (WITHIN_US, False)])
+def test_values_that_go_back_and_forth_are_of_two(each_us: int, stand: bool) -> None:
+    one = Contradictions()
+    for number in range(OFTEN + 2):
+        one.report(number % 2, number * each_us)
+    assert one.stand((OFTEN + 1) * each_us) == stand
+    assert not one.stand((OFTEN + 1) * each_us + WITHIN_US + 1)
+
+
+def test_values_that_only_go_on_are_of_one() -> None:
+    one = Contradictions()
+    for number in range(20):
+        one.report(number // 4, number * 100_000)
+    assert not one.stand(2 * S)
+
+
+def test_one_frame_with_a_number_far_ahead_does_not_make_the_others_late_for_long() -> None:
+    """All that the vehicle said after it counted as overtaken, up to 127 frames."""
+    source = SourceTime()
+    for number in range(20):
+        source._follow(number, None, number * 1_000)
+    source._follow(90, None, 20_000)
+    forged = source.place
+    late = 0
+    for number in range(20, 60):
+        source._follow(number, None, number * 1_000 + 1_000)
+        late += source.place < forged
+    assert late <= 6
+    before = source.place
+    source._follow(60, None, 70_000)
+    assert source.place == before + 1

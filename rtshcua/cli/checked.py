@@ -1,7 +1,9 @@
 """What `rtshcua check` does, however its command line was read."""
 
+import textwrap
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from rtshcua.cli.asked import SPECIFICATION, unfolded
@@ -20,6 +22,7 @@ from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.codes import UNKNOWN_NAME
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.handbook.model import ChangeTold
 
 
 def check_sources(
@@ -65,7 +68,15 @@ def check_sources(
     return findings.finish(
         code,
         missions=[{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
-        versions=[{"policy": each.name, "version": each.version, "earlier": each.earlier} for each in found.versions],
+        versions=[
+            {
+                "policy": each.name,
+                "version": each.version,
+                "earlier": each.earlier,
+                "changes": [asdict(change) for change in each.changes],
+            }
+            for each in found.versions
+        ],
         left_out=[each._asdict() for each in found.left_out],
         issued_now=[{"code": each.code.id, "message": each.message} for each in found.now],
     )
@@ -86,9 +97,28 @@ def _tell(found: Found, since: Path | None, now_us: int) -> None:
         at = utc(now_us).replace(" ", "T")
         out(f"the dates of zones count from the time of issue: `rtshcua check --at {at}` shows where")
     for each in found.versions:
-        out(f"{each.name}: version {each.version}, and {each.earlier} in {since}")
+        same = "" if each.changes else "; they mean the same"
+        out(f"{each.name}: version {each.version}, and {each.earlier} in {since}{same}")
+        for change in each.changes:
+            _tell_change(change)
     if since is not None and not found.versions:
         out(f"nothing in {since} is an earlier version of a policy here")
+
+
+def _tell_change(change: ChangeTold) -> None:
+    """One difference: which way it goes, and its words then and now."""
+    out_wrapped(f"  {change.direction:<11}  ", change.what)
+    for what, lines in (("before", change.before), ("now", change.after)):
+        for line in lines or ("there was none" if what == "before" else "there is none",):
+            out_wrapped(f"  {'':11}    {what:<6}  ", line)
+
+
+def out_wrapped(head: str, text: str) -> None:
+    """A line of at most 80 columns, and what does not fit beneath, under its text."""
+    body = " ".join(text.split())
+    beneath = " " * len(head)
+    for line in textwrap.wrap(body, 80, initial_indent=head, subsequent_indent=beneath, break_on_hyphens=False):
+        out(line)
 
 
 def _unfit(target: Path, files: Sequence[Path]) -> Refusal | None:

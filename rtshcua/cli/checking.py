@@ -10,7 +10,9 @@ from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.proofs.bounds import Bounds
-from rtshcua.ground.versions.raised import Compared, compare
+from rtshcua.ground.handbook.changes import told_changes
+from rtshcua.ground.handbook.model import ChangeTold
+from rtshcua.ground.versions.raised import compare
 from rtshcua.model.flat.policy import Policy
 
 
@@ -42,6 +44,15 @@ class LeftOut(NamedTuple):
         return f"{self.policy} on {self.vehicle}: {' and '.join(counts)} `where fitted` left out, without {without}"
 
 
+class Version(NamedTuple):
+    """A policy that an earlier one was found for: both versions, and what differs, on any vehicle."""
+
+    name: str
+    version: int
+    earlier: int
+    changes: tuple[ChangeTold, ...]
+
+
 class Found(NamedTuple):
     """Everything that was found, each thing once; of what has no errors its bounds, its versions, what is left out.
 
@@ -51,7 +62,7 @@ class Found(NamedTuple):
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
     missions: tuple[Mission, ...]
-    versions: tuple[Compared, ...]
+    versions: tuple[Version, ...]
     left_out: tuple[LeftOut, ...]
     now: tuple[Diagnostic, ...]
 
@@ -66,14 +77,16 @@ def check_all(asked: Iterable[Asked], earlier: Earlier, issued_at_us: int = 0, n
     found: dict[tuple[object, ...], Diagnostic] = {}
     sources: dict[str, Source] = {}
     missions: dict[tuple[str, str], Mission] = {}
-    versions: dict[Compared, None] = {}
+    versions: dict[tuple[str, int, int], dict[ChangeTold, None]] = {}
     left_out: dict[LeftOut, None] = {}
     for each in asked:
         program = each.reading.program
         checked = examine(each.reading, issued_at_us)
         sources |= program.sources
         compared = compare(checked.policies, earlier.policies, earlier.name, program.sources)
-        versions |= dict.fromkeys(compared)
+        for one in compared:
+            changes = versions.setdefault((one.name, one.version, one.earlier), {})
+            changes |= dict.fromkeys(told_changes(one.old, one.new))
         left_out |= {_left_out(lowered.policy): None for lowered in checked.policies if lowered.policy.left_out}
         wrong = [*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)]
         for diagnostic in wrong:  # a file that two programs share has its findings once
@@ -88,7 +101,7 @@ def check_all(asked: Iterable[Asked], earlier: Earlier, issued_at_us: int = 0, n
         tuple(found.values()),
         sources,
         tuple(missions.values()),
-        tuple(versions),
+        tuple(Version(*key, tuple(changes)) for key, changes in versions.items()),
         tuple(left_out),
         tuple(one for key, one in now.items() if key not in found),
     )

@@ -16,6 +16,7 @@ from rtshcua.ground.handbook.words.cases import (
 )
 from rtshcua.ground.handbook.words.vocabulary import Vocabulary
 from rtshcua.ground.language.load import Program
+from rtshcua.ground.testing.boundaries.suite import GENERATED
 from rtshcua.ground.testing.run import Ran
 from rtshcua.model.ir.tests import TestDecl
 
@@ -36,12 +37,17 @@ def starts_and_cases(tried: Sequence[Tried]) -> tuple[tuple[Start, ...], tuple[C
     for one in tried:
         symbols = collect(one.program.units, one.program.broken)
         vocabulary = Vocabulary(frozenset(symbols.signals), frozenset(symbols.zones))
-        told += [(each, _start(one.program, each, vocabulary), vocabulary) for each in one.ran]
-    starts = tuple(dict.fromkeys(start for _, start, _ in told))
+        told += [
+            (each, _start(one.program, each, vocabulary), vocabulary, _generated(one.program, each)) for each in one.ran
+        ]
+    starts = tuple(dict.fromkeys(start for _, start, *_ in told))
     names = [start.name for start in starts]
     return starts, tuple(
-        _case(ran, f"`{start.name}`" + (f" ({start.place})" if names.count(start.name) > 1 else ""), vocabulary)
-        for ran, start, vocabulary in told
+        replace(
+            _case(ran, f"`{start.name}`" + (f" ({start.place})" if names.count(start.name) > 1 else ""), vocabulary),
+            generated=generated,
+        )
+        for ran, start, vocabulary, generated in told
     )
 
 
@@ -67,6 +73,12 @@ def _case(ran: Ran, start: str, names: Vocabulary) -> CaseTold:
     contracts = ran.case.policy.lowered.policy.contracts
     decided = told_decision(ran.trace.decision, [contract.name for contract in contracts])
     return replace(told[ran.case.row or 0], decided=decided, met=ran.met)
+
+
+def _generated(program: Program, ran: Ran) -> bool:
+    """Whether a case stands in a file that `rtshcua test --generate` wrote."""
+    source = program.sources.get(ran.case.test.span.file)
+    return source is not None and source.text.lstrip().startswith(GENERATED)
 
 
 def _start(program: Program, ran: Ran, names: Vocabulary) -> Start:

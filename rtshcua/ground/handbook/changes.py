@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from rtshcua.ground.handbook.model import ChangeTold
 from rtshcua.ground.handbook.words.differences import told_difference
 from rtshcua.ground.versions.differences import compared
+from rtshcua.ground.versions.direction import direction
 from rtshcua.ground.versions.meaning import Fields, Meaning
 from rtshcua.model.flat.policy import Policy
 
@@ -21,6 +22,14 @@ class Changes:
     rules: frozenset[int] = frozenset()
 
 
+def told_changes(old: Policy, new: Policy) -> tuple[ChangeTold, ...]:
+    """What differs, in words, and which way each goes."""
+    return tuple(
+        ChangeTold(each.told.removeprefix("looser: "), *told_difference(each, old, new), direction(each, old, new))
+        for each in compared(old, new)
+    )
+
+
 def changes(old: Policy, new: Policy) -> Changes:
     """What differs in meaning, as `check --since` counts it."""
     common = frozenset(zone.name for zone in old.zones[: old.declared])
@@ -29,7 +38,7 @@ def changes(old: Policy, new: Policy) -> Changes:
     before, after = Meaning(old, common, moved=moved), Meaning(new, common, moved=moved)
     known = {rule.meaning for rule in before.rules()}
     return Changes(
-        tuple(ChangeTold(each.told, *told_difference(each, old, new)) for each in compared(old, new)),
+        told_changes(old, new),
         _changed(before.zones(), after.zones()),
         _changed(before.skills(), after.skills()),
         _changed(before.signals(), after.signals()),

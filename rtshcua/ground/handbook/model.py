@@ -206,6 +206,7 @@ class CaseTold:
     expect: str
     decided: str
     met: bool
+    generated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,11 +229,29 @@ class ScenarioTold:
 
 @dataclass(frozen=True, slots=True)
 class ChangeTold:
-    """What is new or other than before, and its words then and now: none where there was, or is, no such thing."""
+    """What is new or other than before, and its words then and now: none where there was, or is, no such thing.
+
+    `direction`: `stricter`, `looser` or `cannot tell`, of this change by itself.
+    """
 
     what: str
     before: tuple[str, ...]
     after: tuple[str, ...]
+    direction: str = "cannot tell"
+
+
+@dataclass(frozen=True, slots=True)
+class Glance:
+    """A policy on one page: who may have what done, where, how high, what needs a person, what happens when something
+    goes wrong, and what the policy does not cover.
+    """
+
+    who: tuple[Fact, ...]
+    where: tuple[str, ...]
+    height: tuple[str, ...]
+    person: tuple[str, ...]
+    wrong: tuple[Fact, ...]
+    beyond: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,11 +19,13 @@ from rtshcua.ground.handbook.drawing.canvas import number
 from rtshcua.ground.handbook.drawing.patterns import drawn
 from rtshcua.ground.handbook.drawing.plan import mission_plan, plans
 from rtshcua.ground.handbook.drawing.profile import profiles
+from rtshcua.ground.handbook.glance import glance
 from rtshcua.ground.handbook.glossary import GLOSSARY
 from rtshcua.ground.handbook.model import Chapter, Handbook
 
 _TEMPLATES = (
     "handbook.html",
+    "glance.html",
     "chapter.html",
     "rights.html",
     "skills.html",
@@ -55,6 +57,7 @@ def page(handbook: Handbook) -> str:
         glossary=GLOSSARY,
         reasons=REASONS,
         anchor_of=_reason,
+        glance=glance,
         plans=plans,
         mission_plan=mission_plan,
         profiles=profiles,

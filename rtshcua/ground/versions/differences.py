@@ -106,4 +106,5 @@ def _alike(one: Written, other: Written) -> bool:
 
 
 def _quoted(rule: Written) -> str:
-    return rule.text if len(rule.text) <= _QUOTED else f"{rule.text[: _QUOTED - 3]}..."
+    text = " ".join(rule.text.split())
+    return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 3]}..."

@@ -31,6 +31,8 @@ class Compared(NamedTuple):
     version: int
     earlier: int
     finding: Diagnostic | None
+    old: Policy
+    new: Policy
 
 
 def compare(
@@ -45,8 +47,8 @@ def compare(
         old = before(lowered.policy, earlier)
         if old is not None:
             finding = _finding(lowered, old, where, sources)
-            found.append(Compared(old.name, lowered.policy.version, old.version, finding))
-    return tuple(dict.fromkeys(found))
+            found.append(Compared(old.name, lowered.policy.version, old.version, finding, old, lowered.policy))
+    return tuple(found)
 
 
 def before(policy: Policy, earlier: Iterable[Policy]) -> Policy | None:

@@ -214,27 +214,36 @@ def old(here: Path, capsys: pytest.CaptureFixture[str]) -> Path:
 def test_a_policy_that_changes_needs_a_new_version(old: Path, earlier: str, capsys: pytest.CaptureFixture[str]) -> None:
     code, answered = answer(capsys, "a", "b", "--since", earlier)
     assert (code, answered["diagnostics"]) == (ExitCode.OK, [])
-    assert answered["versions"] == [{"policy": "meadow_flight", "version": 2, "earlier": 2}]
+    (compared,) = answered["versions"]
+    changes = compared.pop("changes")
+    assert compared == {"policy": "meadow_flight", "version": 2, "earlier": 2}
+    assert changes == []
     put({"policy.rts": "// said again\n" + POLICY})
     assert answer(capsys, "a", "b", "--since", earlier)[0] == ExitCode.OK
     changed = POLICY.replace("15 m", "16 m")
     put({"policy.rts": changed})
     code, answered = answer(capsys, "a", "b", "--since", earlier)
     assert (code, found(answered)) == (ExitCode.DIAGNOSTICS, [("E0716", "policy.rts")])
-    assert answered["versions"] == [{"policy": "meadow_flight", "version": 2, "earlier": 2}]
+    (compared,) = answered["versions"]
+    changes = compared.pop("changes")
+    assert compared == {"policy": "meadow_flight", "version": 2, "earlier": 2}
+    assert [each["direction"] for each in changes] == ["looser"]
+    assert changes[0]["before"] != changes[0]["after"]
     (finding,) = answered["diagnostics"]
     assert changed[finding["at"]["start"] : finding["at"]["end"]] == "2"
     assert finding["fixes"][0]["replacement"] == "3"
     assert "`permit takeoff by role operator" in finding["help"]
     put({"policy.rts": changed.replace("version 2", "version 3")})
-    assert answer(capsys, "policy.rts", "--since", earlier)[1]["versions"] == [
-        {"policy": "meadow_flight", "version": 3, "earlier": 2}
-    ]
+    (raised,) = answer(capsys, "policy.rts", "--since", earlier)[1]["versions"]
+    assert [each["direction"] for each in raised.pop("changes")] == ["looser"]
+    assert raised == {"policy": "meadow_flight", "version": 3, "earlier": 2}
 
 
 def test_a_person_is_told_what_was_compared(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "a", "--since", "old.bundle"]) == ExitCode.OK
-    assert capsys.readouterr().out.splitlines()[-1] == "meadow_flight: version 2, and 2 in old.bundle"
+    assert (
+        capsys.readouterr().out.splitlines()[-1] == "meadow_flight: version 2, and 2 in old.bundle; they mean the same"
+    )
     put({"policy.rts": POLICY.replace("meadow_flight", "other_flight")})
     assert main(["check", "policy.rts", "--since", "old.bundle"]) == ExitCode.OK
     assert "nothing in old.bundle is an earlier version" in capsys.readouterr().out

@@ -29,7 +29,9 @@ _DIMENSIONS: Final = {dimension.value: dimension for dimension in Dimension}
 def told_difference(one: Difference, old: Policy, new: Policy) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """A line or more of what was, and of what is; none where there was, or is, no such thing."""
     if one.what == "rule":
-        before, after = (tuple(name(each) for each in (text,) if each) for text in (one.before, one.after))
+        before, after = (
+            tuple(name(" ".join(each.split())) for each in (text,) if each) for text in (one.before, one.after)
+        )
     else:
         before, after = _told(one, old), _told(one, new)
     return before, (*after, ELSE) if before == after else after

@@ -9,10 +9,13 @@ from typing import Any
 
 import pytest
 
+from rtshcua.cli.app import main
+from rtshcua.ground.handbook.glance import glance
 from rtshcua.ground.handbook.handbook import Part, handbook
 from rtshcua.ground.handbook.model import ChangeTold, Handbook
 from rtshcua.ground.handbook.page import page
 from rtshcua.ground.handbook.words.differences import ELSE
+from rtshcua.ground.testing.boundaries.suite import GENERATED
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.outcome import Reason
 
@@ -24,17 +27,73 @@ def words(markup: str) -> str:
     return " ".join(unescape(re.sub(r"<[^>]*>", "", markup)).split())
 
 
-def test_the_box_comes_last_and_says_what_is_agreed(everything: Handbook) -> None:
+def test_the_page_begins_with_what_is_signed_on_one_page(everything: Handbook) -> None:
     text = page(everything)
     (chapter,) = everything.chapters
-    at = [text.index(f'<section id="{each}"') for each in ("findings", "glossary")]
-    sign = text.index('id="p1-sign"')
-    assert [*at, sign] == sorted([*at, sign])
-    assert "<section" not in text[sign:]
-    box = words(text[sign:])
+    glance, sign, contents = (text.index(f'id="{each}"') for each in ("p1-glance", "p1-sign", "contents"))
+    assert glance < sign < contents < text.index('id="p1"')
+    first = words(text[glance:sign])
+    heads = ("Who may have what done", "Where", "How high", "What needs a person", "When something goes wrong",
+             "What is not covered")  # fmt: skip
+    places = [first.index(each) for each in heads]
+    assert places == sorted(places)
+    box = words(text[sign:contents])
     assert "the policy everything version 3 with the digest" in box
     assert chapter.digest in box.replace(" ", "")
-    assert "these missions, as this page lists them, fly under it: look." in box
+    assert "these missions, as it lists them, fly under it: look." in box
+
+
+def test_the_first_page_says_what_the_chapter_says(standard: Handbook) -> None:
+    (chapter,) = standard.chapters
+    first = glance(chapter)
+    assert {fact.what for fact in first.who} == {"role `operator`", "role `supervisor`", "everybody else"}
+    assert any("after approval" in fact.value or "on conditions" in fact.value for fact in first.who)
+    assert first.where[0] == chapter.airspace
+    assert any(each.startswith("`city`: ") and "120 m" in each for each in first.height)
+    assert any("`takeoff` may be asked for `altitude`" in each for each in first.height)
+    assert any("approved by a person of the role `supervisor`" in each for each in first.person)
+    told = {fact.what: fact.value for fact in first.wrong}
+    assert told["Records cannot be kept"] == chapter.evidence
+    assert told["A step is denied in the air"] == " ".join(chapter.contingency)
+    assert any("`battery`" in each for each in first.beyond), "what is known"
+    assert any("without the sensor" in each for each in first.beyond)
+
+
+def test_what_a_policy_does_not_have_is_said(everything: Handbook) -> None:
+    (chapter,) = everything.chapters
+    bare = replace(
+        chapter, missions=(), cases=(), scenarios=(), zones=(), contingency=(), skills=(), signals=(),
+        rules=tuple(each for each in chapter.rules if each.kind not in ("confirm", "degrade")), rules_left_out=(),
+    )  # fmt: skip
+    first = glance(bare)
+    assert first.person == ("Nothing: no rule asks a person to approve a step.",)
+    assert first.height == ("This policy sets no limit to the height.",)
+    assert any("No mission is listed" in each for each in first.beyond)
+    assert any("No test of this policy" in each for each in first.beyond)
+    many = replace(chapter, rules=tuple(replace(chapter.rules[0], kind="confirm", number=each) for each in range(9)))
+    assert glance(many).person[-1] == "3 more: see the rules"
+
+
+def test_generated_tests_fold_away_and_others_do_not(everything: Handbook) -> None:
+    (chapter,) = everything.chapters
+    cases = (*chapter.cases, *(replace(each, generated=True) for each in chapter.cases))
+    text = page(replace(everything, chapters=(replace(chapter, cases=cases),)))
+    folded = text.partition('<details class="folded">')[2].partition("</details>")[0]
+    assert f"{len(chapter.cases)} generated case" in folded
+    assert folded.count('<tr><th scope="row">') == len(chapter.cases)
+    before = text.partition('id="p1-cases"')[2].partition("<details")[0]
+    assert before.count('<tr><th scope="row">') == len(chapter.cases)
+    assert "<details" not in page(everything)
+
+
+def test_cases_of_a_file_that_was_generated_are_known_by_its_head(tmp_path: Path, part: Callable[[Path], Part]) -> None:
+    made = tmp_path / "limits.rts"
+    policy = EVERYTHING.parents[4] / "policies" / "bridge_inspection.rts"
+    assert main(["test", str(policy), "--generate", "--skill", "hover", "-o", str(made)]) == 0
+    assert made.read_text().startswith(GENERATED)
+    (chapter,) = handbook([part(made)], made_at_us=0, made_by="x").chapters
+    assert chapter.cases
+    assert all(each.generated for each in chapter.cases)
 
 
 def test_without_missions_none_is_agreed_to(everything: Handbook) -> None:
@@ -44,7 +103,7 @@ def test_without_missions_none_is_agreed_to(everything: Handbook) -> None:
 
 def test_each_policy_has_a_box(everything: Handbook) -> None:
     text = page(replace(everything, chapters=everything.chapters * 2))
-    assert text.index('id="glossary"') < text.index('id="p1-sign"') < text.index('id="p2-sign"')
+    assert text.index('id="p1-sign"') < text.index('id="p2-sign"') < text.index('id="contents"')
 
 
 @pytest.mark.parametrize(("count", "length"), [(1, 64), (4, 64), (5, 32)])

@@ -9,7 +9,9 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.compiler.policy import LoweredPolicy
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.versions.differences import compared as parted
 from rtshcua.ground.versions.differences import differences
+from rtshcua.ground.versions.direction import CANNOT_TELL, LOOSER, STRICTER, direction
 from rtshcua.ground.versions.raised import Compared, compare
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
@@ -273,3 +275,81 @@ def test_the_newest_of_several_earlier_ones_counts(before: LoweredPolicy) -> Non
 
 def test_a_program_with_errors_has_no_policies_to_compare() -> None:
     assert examine_program(load_text(TEXT + "zone z = nowhere"), dialect.load()).policies == ()
+
+
+# ------------------------------------------------------------------------------------------ stricter or looser
+
+
+@rows(
+    ("old", "new", "way"),
+    [
+        # rules
+        ("top <= 20 m and", "top <= 18 m and", STRICTER),
+        ("top <= 20 m and", "top < 20 m and", STRICTER),
+        ("top <= 20 m and", "", LOOSER),
+        ("top <= 20 m and", "top <= 20 m and battery > 50 % and", STRICTER),
+        ("top <= 20 m and", "top >= 6 m and", CANNOT_TELL),
+        ("top <= 20 m and", "(top <= 20 m or battery > 50 %) and", LOOSER + "?"),
+        (" when top <= 20 m and pace == slow", "", LOOSER),
+        ("by role operator, trainee", "by role operator", STRICTER),
+        ("role operator, trainee through agent, operator when top", "any when top", LOOSER),
+        ("  permit home, down by any\n", "  permit home, down by any\n  permit look by role chief\n", LOOSER),
+        ("phase == landing or local time in", "local time in", LOOSER + "?"),
+        ("at < 10 m by role chief", "at < 15 m by role chief", STRICTER),
+        ("at < 10 m by role chief", "at < 7 m by role chief", LOOSER),
+        ("at < 10 m by role chief within", "at < 10 m by role chief and another of role boss within", STRICTER),
+        ("by role chief within 30 s", "by role chief within 60 s", CANNOT_TELL),
+        ("by role chief within", "by role boss within", CANNOT_TELL),
+        ("  confirm look when at < 10 m by role chief within 30 s\n", "", LOOSER),
+        ("degrade any when battery < 25 % to", "degrade any when battery < 30 % to", CANNOT_TELL),
+        # where
+        ("airspace inside field outside school", "airspace inside field outside school, roof", STRICTER),
+        ("airspace inside field outside school", "airspace inside field", LOOSER),
+        ("airspace inside field outside school", "airspace inside field, roof", CANNOT_TELL),
+        ("circle(47.39850 N, 8.54600 E, 40 m) ceiling 60 m", "circle(47.39850 N, 8.54600 E, 45 m) ceiling 60 m",
+         CANNOT_TELL),
+        # skills
+        ("top: altitude in 5 m .. 50 m", "top: altitude in 5 m .. 40 m", STRICTER),
+        ("top: altitude in 5 m .. 50 m", "top: altitude in 3 m .. 60 m", LOOSER),
+        ("top: altitude in 5 m .. 50 m", "top: altitude in 3 m .. 40 m", CANNOT_TELL),
+        ("one of slow, quick", "one of slow, quick, wild", CANNOT_TELL),
+        ("require battery > 30 %", "require battery > 35 %", STRICTER),
+        ("require battery > 30 %", "require battery > 25 %", LOOSER),
+        ("fallback home, down energy at most 5 %", "fallback home, down energy at most 6 %", LOOSER),
+        ("fallback home, down energy at most 5 %", "fallback down energy at most 5 %", CANNOT_TELL),
+        ("valid for 40 min lasts at most 1 min", "valid for 30 min lasts at most 1 min", STRICTER),
+        ("valid for 40 min lasts at most 1 min", "valid for 30 min lasts at most 2 min", CANNOT_TELL),
+        # the vehicle
+        ("reserve 15 %", "reserve 20 %", STRICTER),
+        ("reserve 15 %", "reserve 10 %", LOOSER),
+        ("position error 3 m", "position error 4 m", CANNOT_TELL),
+    ],
+)  # fmt: skip
+def test_which_way_a_difference_goes(before: LoweredPolicy, old: str, new: str, way: str) -> None:
+    after = lowered(changed({old: new})).policy
+    found = [direction(each, before.policy, after) for each in parted(before.policy, after)]
+    if way.endswith("?"):  # true, and more than intervals decide: it may say so, and must not say the opposite
+        assert found in ([way[:-1]], [CANNOT_TELL])
+        return
+    assert found == [way]
+    back = [direction(each, after, before.policy) for each in parted(after, before.policy)]
+    assert back == [{STRICTER: LOOSER, LOOSER: STRICTER}.get(way, way)], "the other way round it is the opposite"
+
+
+def test_a_zone_of_the_airspace_grows_or_shrinks_by_its_use() -> None:
+    """Where no condition names it: then what it is to the airspace is all that it is."""
+    text = TEXT.replace(" area inside field and", "").replace(
+        "  degrade any when position inside grow(school, 20 m) to down\n", ""
+    )
+    old = lowered(text).policy
+
+    def way(was: str, now: str) -> list[str]:
+        assert text.count(was) == 1
+        new = lowered(text.replace(was, now)).policy
+        return [direction(each, old, new) for each in parted(old, new)]
+
+    assert way("ceiling 120 m above home", "ceiling 100 m above home") == [STRICTER]
+    assert way("ceiling 120 m above home", "ceiling 130 m above home") == [LOOSER]
+    assert way("8.54559 E, 400 m)", "8.54559 E, 500 m)") == [LOOSER]
+    assert way("8.54999 E, 40 m)", "8.54999 E, 50 m)") == [STRICTER], "what must not be entered"
+    assert way("8.54999 E, 40 m)", "8.54998 E, 40 m)") == [CANNOT_TELL]

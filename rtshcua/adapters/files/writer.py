@@ -25,6 +25,9 @@ SYNC_AFTER_S = SYNC_US / 1e6 / 2
 #: A line that was to be on the disk within `SYNC_US` and is not is told; when it is not after this time, in seconds,
 #: the disk counts as failed: it hangs.
 STUCK_S = 5.0
+#: Who looks after a longer time than this, in seconds, stood still meanwhile, and with it the thread that writes: that
+#: says nothing of the disk. A loop that goes on looks far more often.
+STOOD_S = 1.0
 
 _BEHIND = OSError(errno.ENOBUFS, "the disk does not keep up")
 _OVER = OSError(errno.ENOSPC, "the disk did not keep up, and the log ends before this")
@@ -258,7 +261,8 @@ class Keeper:
 class Lateness:
     """Watches over the sync of lines, one at a time: the next is the last that was given when the one before came true.
 
-    Times are in seconds of the caller's clock, which never goes back.
+    Times are in seconds of the caller's clock, which never goes back. A time in which nobody looked does not count: the
+    whole process stood still.
     """
 
     def __init__(self, late_s: float = SYNC_US / 1e6, stuck_s: float = STUCK_S) -> None:
@@ -267,6 +271,7 @@ class Lateness:
         self._watched = 0  # the one that is watched,
         self._since_s = 0.0  # since when,
         self._told_s = 0.0  # and after how long it was told to be late
+        self._looked_s = 0.0  # when somebody looked last
 
     def given(self, number: int, durability: int) -> None:
         """Line `number`, counted from 1, was given to the disk."""
@@ -292,8 +297,11 @@ class Lateness:
         return f"the disk has not answered for {self._stuck_s:g} s"
 
     def _waited_s(self, synced: int, now_s: float) -> float:
+        stood_s, self._looked_s = now_s - self._looked_s, now_s
         if self._promised <= synced:
             return 0.0
         if self._watched <= synced:
             self._watched, self._since_s, self._told_s = self._promised, now_s, 0.0
+        elif stood_s > STOOD_S:
+            self._since_s += stood_s
         return now_s - self._since_s

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.chain import Recorder
-from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US
+from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, LONGEST_US
 from rtshcua.model.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Append, Command, Release
@@ -149,3 +149,38 @@ def test_a_late_seal_that_finds_the_boundary_lost_waits_for_what_was_told_before
     assert [kind for kind, _ in told(journal, late)] == ["approval", "boundary-lost", "seal"]
     journal.effect(at(late + 1), "link-back")
     assert [kind for kind, _ in told(journal, late + 1)] == ["link-back"]
+
+
+def test_a_gap_is_recorded_first_where_the_epoch_is_over_for_longer_than_a_verifier_allows(journal: Journal) -> None:
+    journal.effect(at(5_000_000), "succeeded")
+    assert told(journal, 5_000_000) == [("succeeded", WRITTEN)]
+    journal.effect(at(LONGEST_US + 1), "link-back")
+    taken = [
+        json.loads(each.line) for each in journal.take(at(LONGEST_US + 1), ended=False) if isinstance(each, Append)
+    ]
+    assert [each.get("event", each["type"]) for each in taken] == ["stalled", "seal", "link-back"]
+    assert taken[0]["detail"] == f"{LONGEST_US + 1 - 5_000_000} us"
+
+
+def test_a_gap_is_told_once_where_the_seal_must_wait_for_what_the_boundary_made_before_it_was_lost(
+    journal: Journal,
+) -> None:
+    lost: list[str] = []
+
+    def attest(now: Now, *, final: bool) -> None:
+        lost.append("it is gone")
+
+    late = LONGEST_US + 1
+    journal.recorder.attest, journal.recorder.lost = attest, lambda: lost[0] if lost else None
+    journal.effect(at(late), "approval")
+    journal.effect(at(late), "succeeded")
+    assert [kind for kind, _ in told(journal, late)] == ["stalled", "approval", "succeeded", "boundary-lost", "seal"]
+
+
+def test_outside_of_a_run_an_epoch_that_is_over_is_ended_first_and_the_close_tells_of_a_gap(journal: Journal) -> None:
+    recorder = journal.recorder
+    assert recorder.caught_up(at(EPOCH_US)) == ()
+    late = EPOCH_US + EPOCH_US // 5
+    assert [json.loads(line)["type"] for line in recorder.caught_up(at(late))] == ["seal"]
+    end = recorder.closing(at(late + LONGEST_US + 1), ending="completed", tlog=None)
+    assert [json.loads(line).get("event") for line in end] == ["stalled", None]

@@ -14,6 +14,7 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.store.laying import lay
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.faults import distrust, fail, words_of
+from rtshcua.cli.recognising import read_bundle
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.library import root
@@ -57,7 +58,7 @@ def agent_bundle(
     from rtshcua.adapters.mcp_server.missions import Missions, NoPolicy
 
     try:
-        envelope, _ = envelopes(read_regular(bundle, MAX_BUNDLE))
+        envelope, _ = envelopes(read_bundle(bundle))
         signed = policy_digest(cose.unverified(envelope, limit=MAX_BUNDLE).payload)
     except Untrusted as error:
         return distrust(error)

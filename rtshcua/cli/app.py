@@ -6,6 +6,7 @@
 import gc
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -129,6 +130,11 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
     words, _, near = words.partition(" (Possible options: ")
     words = f"{words}; did you mean {near.rstrip(')')}?" if near else words
     words = words[:1].lower() + words[1:]
+    verb = re.fullmatch(r"no such command '(.*?)'(?:\. Did you mean (.*?))?\??", words, re.DOTALL)
+    if verb is not None:
+        meant = (verb[2] or "").replace("'", "").removeprefix("one of: ").partition(", ")[0]
+        help = f"did you mean `{path} {meant}`?" if meant else f"`{path} --help` lists the commands"
+        return fail(ExitCode.USAGE, f"no such command: `{path.partition(' ')[2]} {verb[1]}`", help)
     if row.name in _REPORTING and "--json" in given:
         from rtshcua.cli.findings import Findings
 

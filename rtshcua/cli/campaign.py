@@ -31,6 +31,7 @@ from rtshcua.cli.sources import compile_sources, no_source
 from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.suggest import nearest
 from rtshcua.model.faults import KINDS
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -166,7 +167,9 @@ def _here(jobs: int) -> Workers:
 def _kinds(names: Sequence[str]) -> frozenset[type] | Refusal:
     unknown = [name for name in names if name.replace("_", "-") not in KINDS]
     if unknown:
-        return Refusal("usage", f"no such fault: `{unknown[0]}`", f"there are {', '.join(KINDS)}")
+        near = nearest(unknown[0], KINDS)
+        help = f"did you mean `{near}`?" if near else f"there are {', '.join(KINDS)}"
+        return Refusal("usage", f"no such fault: `{unknown[0]}`", help)
     return frozenset(KINDS[name.replace("_", "-")] for name in names) or frozenset(KINDS.values())
 
 

@@ -14,6 +14,7 @@ from rtshcua.adapters.files.roots import opened
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
 from rtshcua.cli.faults import fail
+from rtshcua.cli.recognising import read_bundle
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.trusting import LAPSED, REVOKED
 from rtshcua.decision.prepare import prepare, prepare_mission
@@ -24,7 +25,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import cose
-from rtshcua.wire.bundle import MAX_BUNDLE, Bundle, BundleError, open_bundle
+from rtshcua.wire.bundle import Bundle, BundleError, open_bundle
 from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
 from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
@@ -46,7 +47,7 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
     revoked, or has expired, since it began: it flies on under the root of before. Raises `Untrusted` and OSError.
     """
     trusted = _root(root, now_us)
-    data = read_regular(bundle, MAX_BUNDLE)
+    data = read_bundle(bundle)
     try:
         found = open_bundle(data, root=trusted, vehicle=None, now_us=now_us)
     except Untrusted as error:

@@ -8,6 +8,7 @@ from rtshcua.cli.beside import anchors_beside, bundle_beside
 from rtshcua.cli.faults import fail
 from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.cli.pin import Pin
+from rtshcua.cli.recognising import no_log
 from rtshcua.cli.showing.page import for_terminal
 from rtshcua.cli.showing.record import Told, show_record
 from rtshcua.cli.stdout import out_json, out_rendered
@@ -32,7 +33,7 @@ def explained(
         return fail(ExitCode.USAGE, "`--explain` tells of a record of one log", f"{len(logs)} logs were given")
     path = log_of(logs[0])
     if not is_log(path):
-        return fail(ExitCode.INPUT, f"`{logs[0]}` is not a log of this program", NO_LOG_HELP)
+        return fail(ExitCode.INPUT, *no_log(log_of(logs[0]), logs[0], NO_LOG_HELP))
     told = Told(number)
     asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
     revoked = RevokedKeys(roots)

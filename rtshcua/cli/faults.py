@@ -40,7 +40,7 @@ _REMEDIES = {
 }
 #: of what is refused for another reason than that it is not to be trusted, by slug
 _CODES = dict.fromkeys(("usage", "output", "no-approver", "several-approvers"), ExitCode.USAGE)
-_CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "outside", "since"), ExitCode.INPUT)
+_CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "outside", "since", "wrong-kind"), ExitCode.INPUT)
 _CODES |= {"not-flown": ExitCode.TESTS}
 
 
@@ -82,12 +82,16 @@ def misaddressed(option: str, error: "AddressError") -> ExitCode:
 
 def distrust(error: Untrusted, help: str = "", *, where: str = "") -> ExitCode:
     """Fails for something that is not to be trusted; `where` says what it was, before the text."""
-    return refuse(Refusal(error.slug, f"{where}{error}", help or _REMEDIES.get(error.slug, "")))
+    return refuse(Refusal(error.slug, f"{where}{error}", help or _help(error)))
 
 
 def untrusted(error: Untrusted) -> Refusal:
     """What is not to be trusted, with what to do about it where that is known."""
-    return Refusal(error.slug, str(error), _REMEDIES.get(error.slug, ""))
+    return Refusal(error.slug, str(error), _help(error))
+
+
+def _help(error: Untrusted) -> str:
+    return str(getattr(error, "help", "")) or _REMEDIES.get(error.slug, "")
 
 
 def refuse(refusal: Refusal, code: ExitCode | None = None) -> ExitCode:

@@ -42,6 +42,7 @@ from rtshcua.cli.meeting import APART_UTC_NOTE, UTC_NOTE, await_utc, meet, unope
 from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, obeys, still_flies
 from rtshcua.cli.past import Past
 from rtshcua.cli.qualified import record_of, unqualified
+from rtshcua.cli.recognising import no_bundle
 from rtshcua.cli.refused import Refused as Refused
 from rtshcua.cli.showing.document import HANDED_IN, kind_of_document
 from rtshcua.cli.signing import Signing
@@ -639,6 +640,9 @@ def expect_no_source(path: Path) -> None:
     if path.suffix == ".rts":  # what names it elsewhere is of the ground
         advice = f"`rtshcua compile {path} -o {path.stem}.bundle` makes one of it"
         raise Refused(ExitCode.INPUT, "wrong-kind", f"`{path}` is a source, and no bundle", advice)
+    mistaken = no_bundle(path)
+    if mistaken is not None:
+        raise Refused(ExitCode.INPUT, mistaken.slug, str(mistaken), mistaken.help)
 
 
 def _read(path: Path) -> bytes:

@@ -14,6 +14,7 @@ from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.mcp_server.access import HOST, PATH, BadToken, token_of
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.faults import distrust, fail, say, words_of
+from rtshcua.cli.recognising import read_bundle
 from rtshcua.cli.unlock import check_trusted, unlock
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire import cose
@@ -62,7 +63,7 @@ def mcp(
         return fail(ExitCode.USAGE, "`--http` and `--token-file` go together", "or neither: the standard streams")
     store = KeyStore(data_folder())
     try:
-        envelope, _ = envelopes(read_regular(bundle, MAX_BUNDLE))
+        envelope, _ = envelopes(read_bundle(bundle))
         digest = policy_digest(cose.unverified(envelope, limit=MAX_BUNDLE).payload)
         key = unlock(store, Duty.MISSION, path=mission_key, passphrase_file=passphrase_file, whose=_AGENT)
         sources = _sources(store, key)

@@ -15,6 +15,7 @@ from rtshcua.adapters.files.recovery import InUse, Recovered, Signer, examine, r
 from rtshcua.adapters.utc import UtcWatch
 from rtshcua.cli.faults import fail, of_each, tell
 from rtshcua.cli.outcome import is_log, logs_meant
+from rtshcua.cli.recognising import no_log
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -78,7 +79,7 @@ def signer_of(log_key: SigningKey) -> Signer:
 
 def _recover(path: Path, signer: Signer | None, state: Path, *, as_json: bool) -> ExitCode:
     if not is_log(path):
-        return fail(ExitCode.INPUT, f"`{path}` is not a log of this program", _KEPT)
+        return fail(ExitCode.INPUT, *no_log(path, path, _KEPT))
     try:
         cut = _cut(path, state)
         if cut is not None:

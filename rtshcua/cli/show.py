@@ -12,6 +12,7 @@ from rtshcua.adapters.files.runs import LOG
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.cli.faults import distrust, fail
 from rtshcua.cli.outcome import CUT_AT_FIRST
+from rtshcua.cli.recognising import kind_of
 from rtshcua.cli.showing.bundle import show_bundle
 from rtshcua.cli.showing.document import kind_of_document, show_document
 from rtshcua.cli.showing.keys import KEY_FILE, show_key, show_root
@@ -53,6 +54,9 @@ def show(
         return distrust(error, where=f"`{path}`: ")
     if shown is None:
         help = "sources are shown by any editor; `rtshcua check` reports on them"
+        kind = kind_of(file)
+        if kind is not None:
+            return fail(ExitCode.INPUT, f"`{path}` is {kind.name}, which is not shown", kind.help)
         return fail(ExitCode.INPUT, f"`{path}` is no bundle, document, key, trust root or log of this program", help)
     if shown["kind"] == "log" and not shown["records"]:
         return fail(ExitCode.EVIDENCE, f"`{path}`: {CUT_AT_FIRST}", slug="genesis/missing")

@@ -15,6 +15,7 @@ from rtshcua.cli.beside import anchors_beside, bundle_beside, raw_frames, with_s
 from rtshcua.cli.faults import distrust, fail, of_each
 from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.cli.pin import Pin, pin
+from rtshcua.cli.recognising import no_log
 from rtshcua.cli.simulation import with_simulated
 from rtshcua.cli.stdout import out_json
 from rtshcua.cli.unconfirmed import UnconfirmedFallbacks
@@ -115,7 +116,7 @@ def _verify(
 ) -> ExitCode:
     path = log_of(given)
     if not is_log(path):
-        return fail(ExitCode.INPUT, f"`{given}` is not a log of this program", NO_LOG_HELP)
+        return fail(ExitCode.INPUT, *no_log(path, given, NO_LOG_HELP))
     asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
     raw = raw_frames(path)
     unconfirmed, revoked = UnconfirmedFallbacks(), RevokedKeys(wanted.roots)

@@ -12,6 +12,7 @@ from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.proof_told import Told, as_object, as_text
 from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.kinds import PROOF, recognised
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import parse, split
 from rtshcua.evidence.proofs.check import Proven, check_proof
@@ -56,6 +57,9 @@ def _verify(path: Path, pinned: Pin, kept: str | None, *, as_json: bool, first: 
     result: Told = check_receipt(data, pinned.key) if data[:1] == TAG_18 else check_proof(data, pinned.key)
     if kept is not None and not isinstance(result, Flaw):
         result = _same(result, kept) or result
+    kind = recognised(data, path.name)
+    if isinstance(result, Flaw) and result.slug == "proof/malformed" and kind is not None and kind is not PROOF:
+        result = result._replace(text=f"it is {kind.name}, and no proof: {kind.help}")
     code = exit_code(result)
     if as_json:
         out_json(json.dumps(as_object(result, path, pinned, code), ensure_ascii=False))

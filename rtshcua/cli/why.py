@@ -13,6 +13,7 @@ from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.faults import fail, refuse
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
+from rtshcua.cli.recognising import no_bundle
 from rtshcua.cli.showing.page import Page, for_terminal
 from rtshcua.cli.showing.why import Case, show_why
 from rtshcua.cli.shown import utc
@@ -101,6 +102,10 @@ def _subject(path: Path, mission: str | None, at_us: int | None, as_json: bool) 
             return findings.finish(exit_code(compiled.diagnostics))
         bound = bind(compiled.mission, policy_digest(policy_payload(compiled.policy)))
         return prepared(compiled.policy, bound)
+    mistaken = no_bundle(path)
+    if mistaken is not None:
+        text = f"{str(mistaken).removesuffix(', and no bundle')}, and neither a source, a bundle nor a log"
+        return fail(ExitCode.INPUT, text, mistaken.help, slug=mistaken.slug)
     return unpacked(read_regular(path, MAX_BUNDLE), f"`{path}`")
 
 

@@ -58,6 +58,7 @@ IMPORT_CYCLE = _code("E0111", "import-cycle", "files import each other in a circ
 NOT_GEOJSON = _code("E0112", "not-geojson", "a file that a zone is read from is not GeoJSON")
 GEOJSON_SHAPE = _code("E0113", "geojson-shape", "a GeoJSON file does not hold the one area that is asked for")
 GEOJSON_UNREAD = _code("E0115", "geojson-unread", "a GeoJSON area has heights, times or radii that no zone takes over")
+NOT_A_SOURCE = _code("E0116", "not-a-source", "a file of another kind stands where a source is asked for")
 HIDDEN_CHARACTER = _code("E0114", "hidden-character", "a text holds a character that hides or reorders what is read")
 
 # E02: names

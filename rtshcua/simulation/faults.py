@@ -6,6 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.diagnostics.suggest import nearest
 from rtshcua.model.faults import KINDS, UNITS, WORD_TYPES, AgentFault, Fault, HostFault, Parameter, parameters
 
 _QUANTITY = re.compile(r"(-?\d+(?:\.\d+)?)(\D*)", re.ASCII)
@@ -20,7 +21,9 @@ def parse_fault(text: str) -> Fault:
     name, *pairs = text.split(",")
     kind = OF_VEHICLE.get(name)
     if kind is None:
-        raise ValueError(f"no such fault: `{name}`; there are {', '.join(OF_VEHICLE)}")
+        near = nearest(name, OF_VEHICLE)
+        meant = f"did you mean `{near}`?" if near else f"there are {', '.join(OF_VEHICLE)}"
+        raise ValueError(f"no such fault: `{name}`; {meant}")
     known = {each.name: each for each in (_AT, *parameters(kind))}
     values: dict[str, Any] = {}
     for pair in pairs:

@@ -10,6 +10,7 @@ from rtshcua.adapters.files.logs import begins_as_log
 from rtshcua.adapters.files.runs import LOG, logs_of
 from rtshcua.cli.faults import fail
 from rtshcua.cli.moments import moment
+from rtshcua.cli.recognising import no_log
 from rtshcua.diagnostics.exits import ExitCode
 
 _EXTRAS = {"duckdb": "archive", "distributed": "cluster"}
@@ -52,7 +53,7 @@ def logs_in(given: Iterable[Path]) -> Given | ExitCode:
             if wrong is None:
                 found.logs.append(Source(log, root))
             elif root is None:
-                return fail(ExitCode.INPUT, f"`{log}` is not a log of this program")
+                return fail(ExitCode.INPUT, *no_log(log, log, "name logs, or folders of runs"))
             else:
                 found.skipped.append(Skipped(log, wrong))
     if not found.logs:

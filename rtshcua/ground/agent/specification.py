@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from rtshcua.diagnostics.codes import HIDDEN_CHARACTER, IMPORT_PATH, NO_SUCH_FILE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import hiding, visible
+from rtshcua.diagnostics.kinds import foreign
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.agent.json_tree import Tree, read_json
 from rtshcua.ground.agent.mission import mission_of
@@ -21,6 +22,7 @@ from rtshcua.ground.agent.pointers import Places, pointer
 from rtshcua.ground.agent.schema import SpecificationShape
 from rtshcua.ground.agent.shape import shape_errors, uncounted
 from rtshcua.ground.compiler.pins import PROPOSED, Pins, claims
+from rtshcua.ground.language.faults import not_a_source
 from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
 from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
 from rtshcua.model.ir.missions import MissionDecl
@@ -55,6 +57,10 @@ class Specification:
 
 def parse_specification(file: str, data: bytes) -> Specification:
     """The specification that `data` is; never raises for what it says."""
+    kind = foreign(data)
+    if kind is not None:
+        source = Source(file, data.decode("utf-8", "replace"))
+        return _specification(source, None, None, (not_a_source(file, kind),))
     source, tree, found = read_json(file, data)
     if tree is None or found:
         return _specification(source, tree, None, found)

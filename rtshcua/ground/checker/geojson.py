@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.kinds import GEOJSON, recognised
 from rtshcua.ground.checker.features import chosen
 from rtshcua.ground.checker.polygons import Corner, contains, crossing, tangled
 from rtshcua.ground.checker.refused import Refused
@@ -58,6 +59,9 @@ def _not_json(message: str) -> Refused:
 
 def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
     """The polygons of the one area in a file, or of the feature with that id or name; raises `Refused`."""
+    kind = recognised(data)
+    if kind is not None and kind is not GEOJSON:
+        raise Refused(codes.NOT_GEOJSON, f"it is {kind.name}, and no GeoJSON", kind.help)
     geometry, pointer = chosen(_json(data), feature)
     return _polygons(geometry, pointer)
 

@@ -2,8 +2,9 @@
 
 import posixpath
 
-from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE
+from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_A_SOURCE, NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
+from rtshcua.diagnostics.kinds import Kind, foreign
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.paths import LIBRARY, is_direct, pack_of
 from rtshcua.ground.language.size import MAX_FILES as MAX_FILES
@@ -96,8 +97,16 @@ def too_many_files(by: Import) -> Diagnostic:
     return Diagnostic(TOO_LARGE, message, by.span, "import only what is used")
 
 
+def not_a_source(file: str, kind: Kind) -> Diagnostic:
+    """A file of another kind."""
+    return Diagnostic(NOT_A_SOURCE, f"this is {kind.name}, and no source", Span(file, 0, 0), kind.help)
+
+
 def not_text(source: Source, data: bytes, start: int) -> Diagnostic:
     """A source that is no UTF-8 from byte `start` on; `source` has what could be made of it."""
+    kind = foreign(data, source.file)
+    if kind is not None:
+        return not_a_source(source.file, kind)
     at = len(data[:start].decode("utf-8", errors="replace"))
     return Diagnostic(
         NOT_TEXT,

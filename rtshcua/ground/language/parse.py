@@ -8,12 +8,13 @@ from typing import TypeVar
 from rtshcua.diagnostics.codes import HIDDEN_CHARACTER, NOT_TEXT, TOO_MANY_FINDINGS
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import hiding, visible
+from rtshcua.diagnostics.kinds import LOOKED_AT, Kind, foreign
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
 from rtshcua.ground.language.build.missions import Builder
 from rtshcua.ground.language.explain import explain
-from rtshcua.ground.language.faults import MAX_SIZE, too_large, too_long
+from rtshcua.ground.language.faults import MAX_SIZE, not_a_source, too_large, too_long
 from rtshcua.ground.language.recovery import file_level, misread, pending, resume
 from rtshcua.ground.language.size import MAX_TOKENS
 from rtshcua.ground.language.table import table
@@ -29,6 +30,8 @@ from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 T = TypeVar("T", bound=Node)
 
+#: what other files begin with that begin with a letter
+_FOREIGN = ("QGC WPL", "ULog", "PK", "c2sp.org/", "rtshcua/", "duty: ")
 _TOKENS = re.compile(
     r"""//[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | \s++
       | (?P<token>"[^"\\\n]*+(?:\\.[^"\\\n]*+){0,999}"? | [A-Za-z0-9_.]++ | .)""",
@@ -78,6 +81,9 @@ def refused(source: Source) -> Diagnostic | None:
     """The finding on a text that is not looked at further."""
     if len(source.text) > MAX_SIZE:
         return too_large(source.file, len(source.text))
+    kind = _foreign(source)
+    if kind is not None:
+        return not_a_source(source.file, kind)
     nul = source.text.find("\0")
     if nul >= 0:
         help = "is this a compiled bundle? sources are plain text in UTF-8"
@@ -91,6 +97,14 @@ def refused(source: Source) -> Diagnostic | None:
     if len(source.text) > MAX_TOKENS and _exceeds(source.text, MAX_TOKENS):
         return too_long(source.file)
     return None
+
+
+def _foreign(source: Source) -> Kind | None:
+    """The kind of a text that is no source; one that begins with a letter, as sources do, is seldom looked at."""
+    text = source.text
+    if text[:1].isalpha() and not text.startswith(_FOREIGN):
+        return None
+    return foreign(text[:LOOKED_AT].encode("utf-8", "replace"), source.file)
 
 
 def _exceeds(text: str, most: int) -> bool:

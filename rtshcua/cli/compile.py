@@ -13,7 +13,7 @@ from rtshcua.cli.bounds import bounds_dict, bounds_told
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.replacing import Replacing, replace_with
-from rtshcua.cli.sources import compile_sources, no_source
+from rtshcua.cli.sources import compile_sources, meant, no_source
 from rtshcua.cli.stdout import out
 from rtshcua.cli.unlock import another_key, check_trusted, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
@@ -102,7 +102,8 @@ def compile(
     compiled, sources = compile_sources(
         sources_given, mission=mission, issued_at_us=issued_at, values=tuple(set_ or ()), pins=pins
     )
-    if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
+    told = meant(compiled.diagnostics, sources, sources_given)
+    if findings.report(told, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())
     if replaces and first is not None and flight is not None:

@@ -11,6 +11,7 @@ from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.folding import folded
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import MOST_SHOWN, most_severe, render
 from rtshcua.diagnostics.serialise import as_json
@@ -36,6 +37,7 @@ class Findings:
         if self._json:
             self._object = as_json(found, sources)
         elif found:
+            found = folded(found)
             text = render(most_severe(found), sources)
             say_rendered((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say_lines(f"\n{_count(found)}")

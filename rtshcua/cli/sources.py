@@ -8,6 +8,7 @@ from typing import NamedTuple
 from rtshcua import library
 from rtshcua.adapters.files.readable import Readable
 from rtshcua.adapters.store.reading import open_regular
+from rtshcua.diagnostics.codes import DUPLICATE_NAME
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
@@ -90,6 +91,24 @@ def examine(reading: Reading, issued_at_us: int = 0) -> Checked:
     """Everything that is wrong with a program, and what its missions take at most."""
     checked = examine_program(reading.program, dialect.load(), issued_at_us)
     return replace(checked, diagnostics=reading.pointed(checked.diagnostics))
+
+
+def meant(found: Iterable[Diagnostic], sources: Mapping[str, Source], given: Sequence[Path]) -> tuple[Diagnostic, ...]:
+    """Findings of a mission with what was handed in beside it: where both declare one name, say which is meant how."""
+    beside = {shown(str(path)): path for path in given[1:]}
+    return tuple(_which(each, sources, beside, given[0]) for each in found)
+
+
+def _which(found: Diagnostic, sources: Mapping[str, Source], beside: Mapping[str, Path], mission: Path) -> Diagnostic:
+    files = [found.span.file if found.span else "", *(label.span.file for label in found.labels)]
+    own = next((each for each in files if each in beside), None)
+    other = next((each for each in files if each not in beside), None)
+    if found.code is not DUPLICATE_NAME or own is None or not other:
+        return found
+    alike = other in sources and own in sources and sources[own].text == sources[other].text
+    what = f"`{own}` is a copy of `{other}`" if alike else f"`{own}` is not what `{mission}` imports"
+    help = f"{what}: leave out `--with {own}` if `{other}` is meant; else take that out of the imports of `{mission}`"
+    return replace(found, help=help)
 
 
 def no_source(path: Path) -> Refusal | None:

@@ -10,6 +10,7 @@ from rtshcua import __version__
 from rtshcua.cli.linting.gathered import Gathered
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.folding import folded
 from rtshcua.diagnostics.render import render
 from rtshcua.diagnostics.serialise import as_json
 
@@ -18,7 +19,7 @@ def written(form: str, told: Gathered, asked: Sequence[str], code: ExitCode, fai
     """The report in one of the forms, for a file or a machine, ending in a newline, unless it is empty."""
     here = str(Path.cwd())
     if form == "human":
-        return render(told.found, told.sources)
+        return render(folded(told.found), told.sources)
     if form == "github":
         from rtshcua.diagnostics.report.github import github
 

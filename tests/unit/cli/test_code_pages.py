@@ -33,6 +33,8 @@ TOLD = {
     codes.IMPORT_CYCLE,
     codes.NOT_GEOJSON,
     codes.GEOJSON_SHAPE,
+    codes.GEOJSON_UNREAD,
+    codes.NOT_A_SOURCE,
     codes.NO_MISSION,
     codes.NOT_IN_POLICY,
     codes.VERSION_NOT_RAISED,

@@ -43,7 +43,7 @@ def test_it_means_what_the_same_mission_in_the_language_means(
     good: dict[str, Any], compile_text: Compile, dumped: Dump
 ) -> None:
     compiled, found = compile_text(dumped(good))
-    assert found == ()
+    assert not has_errors(found)
 
     def read(path: str) -> bytes:
         return SAME_MISSION.encode() if path == "m.rts" else Path(path).read_bytes()
@@ -226,7 +226,7 @@ def test_what_json_writes_is_read_back(value: Any) -> None:
     except UnicodeEncodeError:
         return
     source, tree, found = read_json("a.json", data)
-    assert found == ()
+    assert not has_errors(found)
     assert tree is not None
     assert tree.value == value
     for path, span in tree.spans.items():

@@ -6,7 +6,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.agent.schema import schema
 from rtshcua.ground.compiler.program import Compiled
 
@@ -37,7 +37,7 @@ def test_a_step_may_be_held_to_more(good: dict[str, Any], compile_text: Compile,
     spec = with_overrides(good, ALL)
     jsonschema.validate(spec, schema())
     compiled, found = compile_text(dumped(spec))
-    assert found == ()
+    assert not has_errors(found)
     assert compiled.mission is not None
     assert compiled.policy is not None
     contract = compiled.mission.invocations[2].contract
@@ -63,7 +63,7 @@ def test_none_is_none(good: dict[str, Any], compile_text: Compile, dumped: Dump)
     plain, _ = compile_text(dumped(good))
     for overrides in ({}, None, {"deadline": None, "require": []}):
         compiled, found = compile_text(dumped(with_overrides(good, overrides)))
-        assert found == ()
+        assert not has_errors(found)
         assert compiled.mission is not None
         assert plain.mission is not None
         assert compiled.mission.invocations[2].contract == plain.mission.invocations[2].contract

@@ -124,8 +124,8 @@ uint32_t rt_test_time_of_day(int64_t start, int64_t end, int64_t low, int64_t hi
     return rt_time_of_day(&policy.vehicle, start, end, low, high, error);
 }
 
-/* charge, distance, low, high, asked */
-bool rt_test_home(const int64_t *n) { return rt_brings_home(&policy.vehicle, n[0], n[1], n[2], n[3], n[4]); }
+/* charge, distance, low, high, asked, drain */
+bool rt_test_home(const int64_t *n) { return rt_brings_home(&policy.vehicle, n[0], n[1], n[2], n[3], n[4], n[5]); }
 
 int rt_test_words(const uint8_t *one, uint32_t size, const uint8_t *other, uint32_t other_size) {
     return rt_compare_words((rt_bytes){one, size}, (rt_bytes){other, other_size});

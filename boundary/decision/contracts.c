@@ -37,10 +37,11 @@ int64_t rt_longest(const rt_contract *contract, const rt_vehicle *vehicle, int64
 
 /* Whether the battery holds what is needed to finish, to come home and the reserve. */
 rt_truth rt_charge_suffices(const rt_contract *contract, const rt_vehicle *vehicle, int64_t asked, rt_value battery,
-                            const rt_volume *volume) {
+                            rt_value drain, const rt_volume *volume) {
     bool stays = contract->motion.kind != RT_HOME && contract->motion.kind != RT_LAND;
     if (!battery.known || (stays && (!volume->located || (vehicle->has_speeds && !volume->level)))) return RT_UNKNOWN;
     int64_t left = battery.value - contract->energy - (stays ? vehicle->reserve : 0);
-    bool enough = stays ? rt_brings_home(vehicle, left, rt_farthest(volume), volume->low, volume->high, asked) : left >= 0;
+    int64_t taken = drain.known ? drain.value : 0;
+    bool enough = stays ? rt_brings_home(vehicle, left, rt_farthest(volume), volume->low, volume->high, asked, taken) : left >= 0;
     return enough ? RT_TRUE : RT_FALSE;
 }

@@ -232,8 +232,8 @@ static bool step_safety(rt_case *one, rt_decision *decision) {
         return rt_found(decision, RT_AIRSPACE, airspace);
     rt_environment over = {&one->now, prepared->arguments, prepared->phase, &volume, true, prepared->lasts_us};
     if (!all_hold(one, invocation->contract.maintain, &over, &of, RT_INVARIANT, decision)) return false;
-    rt_truth charge =
-        rt_charge_suffices(&invocation->contract, vehicle, one->invocation->asked, rt_slot(&one->now, vehicle->battery), &volume);
+    rt_truth charge = rt_charge_suffices(&invocation->contract, vehicle, one->invocation->asked, rt_slot(&one->now, vehicle->battery),
+                                         rt_slot(&one->now, vehicle->drain), &volume);
     if (!holds(&of, charge, RT_NO_CLAUSE)) return rt_found(decision, RT_ENERGY, RT_NO_CLAUSE);
     for (uint32_t at = 0; at < prepared->rule_count; at++) {
         const rt_rule *rule = &one->policy->rules[prepared->rules[at]];

@@ -1,13 +1,15 @@
 /* How long flying takes at most, and whether a charge is enough for it. A height may be anything within RT_MAX_VALUE, so times
    are counted in 128 bits: a distance is below 2**54, its time in us below 2**74, and the sum of a few of them times RT_FULL below
    2**91. A quotient rounded up is at most a bound exactly where the dividend is at most the bound times the divisor, so nothing
-   of 128 bits is divided. */
+   of 128 bits is divided. What is measured to be taken in a minute is counted to 60 times RT_FULL, below 2**20. */
 #include "parts.h"
 
 #define RT_BEGINS RT_SECOND
 #define RT_SETTLES (4 * RT_SECOND)
 #define RT_OVER_HOME (5 * RT_SECOND)
 #define RT_LANDED (8 * RT_SECOND)
+#define RT_MINUTE (60 * RT_SECOND)
+#define RT_MOST_DRAIN (60 * RT_FULL)
 
 typedef struct {
     uint64_t high, low;
@@ -90,15 +92,16 @@ static rt_wide home_us(const rt_vehicle *vehicle, int64_t distance, int64_t low,
     return plus(plus(plus(up, way), down), narrow(RT_BEGINS + RT_SETTLES + RT_OVER_HOME));
 }
 
-bool rt_brings_home(const rt_vehicle *vehicle, int64_t charge, int64_t distance, int64_t low, int64_t high, int64_t asked) {
+bool rt_brings_home(const rt_vehicle *vehicle, int64_t charge, int64_t distance, int64_t low, int64_t high, int64_t asked,
+                    int64_t drain) {
     if (charge < 0) return false; /* no way home takes less than nothing */
-    rt_wide needed, held;
+    uint64_t left = (uint64_t)charge, taken = (uint64_t)rt_min(rt_max(drain, 0), RT_MOST_DRAIN); /* below 2**20 */
     if (vehicle->has_speeds) {
-        needed = scaled(home_us(vehicle, distance, low, high, asked), RT_FULL);
-        held = times((uint64_t)charge, (uint64_t)vehicle->speeds.flight_us);
-    } else {
-        needed = times((uint64_t)distance, RT_SECOND * RT_FULL);
-        held = times((uint64_t)charge, (uint64_t)(vehicle->speed * vehicle->endurance_us)); /* below 2**62 */
+        rt_wide home = home_us(vehicle, distance, low, high, asked);
+        return at_most(scaled(home, RT_FULL), times(left, (uint64_t)vehicle->speeds.flight_us)) &&
+               at_most(scaled(home, taken), times(left, RT_MINUTE));
     }
-    return at_most(needed, held);
+    uint64_t speed = (uint64_t)vehicle->speed; /* times an endurance below 2**62, times a minute in us below 2**53 */
+    return at_most(times((uint64_t)distance, RT_SECOND * RT_FULL), times(left, speed * (uint64_t)vehicle->endurance_us)) &&
+           at_most(times((uint64_t)distance, RT_SECOND * taken), times(left, speed * RT_MINUTE));
 }

@@ -56,14 +56,16 @@ int64_t rt_farthest(const rt_volume *volume);
 /* flying.py, contracts.py */
 uint32_t rt_root(uint64_t square); /* rounded down */
 static inline int64_t rt_root_up(int64_t square) { return square > 0 ? (int64_t)rt_root((uint64_t)square - 1) + 1 : 0; }
-/* Whether a charge is enough for the way home from so far and between two heights, rounded up. */
-bool rt_brings_home(const rt_vehicle *vehicle, int64_t charge, int64_t distance, int64_t low, int64_t high, int64_t asked);
+/* Whether a charge is enough for the way home from so far and between two heights, rounded up, by what is declared and by
+   what is measured to be taken in a minute (0: nothing is). */
+bool rt_brings_home(const rt_vehicle *vehicle, int64_t charge, int64_t distance, int64_t low, int64_t high, int64_t asked,
+                    int64_t drain);
 uint32_t rt_cells(const rt_contract *contract);
 bool rt_fits(rt_list arguments, const rt_contract *contract);
 int64_t rt_first_cell(const rt_contract *contract, int64_t kind); /* -1: none */
 int64_t rt_longest(const rt_contract *contract, const rt_vehicle *vehicle, int64_t limit_us);
 rt_truth rt_charge_suffices(const rt_contract *contract, const rt_vehicle *vehicle, int64_t asked, rt_value battery,
-                            const rt_volume *volume);
+                            rt_value drain, const rt_volume *volume);
 
 /* outline.py, zones.py */
 void rt_prepare_zone(rt_prepared_policy *prepared, uint32_t zone, uint32_t *entries, uint32_t *starts);

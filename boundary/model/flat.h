@@ -141,6 +141,7 @@ typedef struct {
     int64_t position, height, battery; /* slots, -1: none */
     int64_t return_altitude, braking, reaction_us;
     int64_t north, east, down; /* slots */
+    int64_t drain;             /* the slot of the signal of that name, -1: none; no field of the artefact */
     rt_list without; /* texts */
     bool has_speeds;
     rt_speeds speeds;

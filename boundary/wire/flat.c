@@ -168,11 +168,24 @@ static bool policy(rt_cursor *cursor, rt_policy *into) {
            INT(into->without_evidence) && INT(into->silence_us) && INT(into->after_silence) && omissions(cursor, &into->left_out);
 }
 
+/* The slot of the number of this name, which tells what is taken of the battery in a minute; the first, of several. */
+static int64_t drain_slot(const rt_policy *policy) {
+    static const uint8_t name[] = "battery.drain";
+    for (uint32_t at = 0; at < policy->signal_count; at++) {
+        const rt_signal *signal = &policy->signals[at];
+        if (signal->kind == RT_NUMBER && rt_same(signal->name, (rt_bytes){name, sizeof name - 1})) return signal->slot;
+    }
+    return -1;
+}
+
 rt_refusal rt_read_policy(rt_bytes payload, rt_policy *into) {
     rt_cursor cursor;
     rt_refusal refusal = rt_unwrap(&RT_POLICY, payload, &cursor);
     into->payload = payload;
-    return refusal != NULL || policy(&cursor, into) ? refusal : "malformed";
+    if (refusal != NULL) return refusal;
+    if (!policy(&cursor, into)) return "malformed";
+    into->vehicle.drain = drain_slot(into);
+    return NULL;
 }
 
 static bool invocation(rt_cursor *cursor, rt_invocation *into) {

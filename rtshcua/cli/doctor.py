@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import msgspec
 import typer
@@ -24,7 +24,7 @@ from rtshcua.adapters.boundary_process import (
     program,
 )
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
@@ -126,7 +126,7 @@ def doctor(
             return refuse(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
-        findings = _boundary(boundary_socket) + agents
+        findings = _boundary(boundary_socket) + agents + _settle(socket, vehicle, clock)
         findings += list(
             diagnose(
                 vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
@@ -197,6 +197,25 @@ def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, T
     root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=utc_us)
     opened = open_bundle(data, root=root, vehicle=None, now_us=utc_us)
     return opened.policy, opened.mission, root
+
+
+#: how long a vehicle that has just been switched on is waited for, longer than was asked for
+_SETTLES_S: Final = 60.0
+
+
+def _settle(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock) -> list[VehicleFinding]:
+    """Wait for what comes by itself, such as a fix, and say so."""
+    what = settling(vehicle)
+    if what is None:
+        return []
+    if sys.stderr is not None:
+        print(f"waiting for {what}, {_SETTLES_S:.0f} s at the most", file=sys.stderr, flush=True)
+    begun = time.monotonic()
+    still: str | None = what
+    while still is not None and time.monotonic() < begun + _SETTLES_S:
+        socket.poll(clock.now().monotonic_us, _POLL_US)
+        still = settling(vehicle)
+    return [settled(what, round(time.monotonic() - begun), still)]
 
 
 def _listen(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock, seconds: float) -> bool:

@@ -2,7 +2,7 @@
 needs.
 """
 
-from rtshcua.decision.flying import SECOND, charge, home_us
+from rtshcua.decision.flying import MINUTE, MOST_DRAIN, SECOND, charge, drained, home_us
 from rtshcua.decision.values import ABSENT, FALSE, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.volume import Volume
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, Parameter
@@ -38,9 +38,25 @@ def longest(contract: Contract, vehicle: Vehicle, limit_us: int = 0) -> int:
     return limit_us or contract.duration_us or vehicle.endurance_us
 
 
+def drains(measured: Value) -> tuple[int, int]:
+    """The least and the most that a minute may take by the signal `battery.drain`, 1/10000; 0 where it tells nothing:
+    then what is declared counts.
+    """
+    low, high, gap, _ = measured
+    least = 0 if gap != PRESENT else min(max(low, 0), MOST_DRAIN)
+    return least, 0 if gap == ABSENT else min(max(high, 0), MOST_DRAIN)
+
+
+#: nothing was measured
+UNMEASURED: Value = (0, 0, ABSENT, None)
+
+
 class Energy:
     """What one contract needs of the charge, in 1/10000 of a full battery: to finish, to come home from the farthest
     planned place, and the vehicle's reserve.
+
+    The way home is counted with what is declared of the battery, or with what was measured (`drain`, taken in a
+    minute) if that is worse.
 
     A skill that ends on the ground needs no way home, and it is what the reserve is kept for; the others are those that
     `stays` is true of. `asked` is the slowest speed that the step and those before it ask for, 0 if none does.
@@ -53,19 +69,23 @@ class Energy:
         self._fixed = contract.energy + (vehicle.reserve if self.stays else 0)
         self._vehicle, self._asked = vehicle, asked
 
-    def way_home(self, distance: int, heights: tuple[int, int]) -> int:
+    def way_home(self, distance: int, heights: tuple[int, int], drain: int = 0) -> int:
         """The charge for the way home from `distance` mm away and anywhere between two heights, rounded up."""
         vehicle, speeds = self._vehicle, self._vehicle.speeds
         if speeds is None:
-            return -(-distance * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
-        return charge(speeds, home_us(vehicle, speeds, distance, heights, self._asked))
+            declared = -(-distance * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
+            return max(declared, -(-distance * SECOND * drain // (vehicle.speed * MINUTE)))
+        time_us = home_us(vehicle, speeds, distance, heights, self._asked)
+        return max(charge(speeds, time_us), drained(time_us, drain))
 
-    def needed(self, distance: int, heights: tuple[int, int] = (0, 0)) -> int:
+    def needed(self, distance: int, heights: tuple[int, int] = (0, 0), drain: int = 0) -> int:
         """The charge needed when the farthest planned place is `distance` mm from home, rounded up."""
-        return self._fixed + self.way_home(distance, heights) if self.stays else self._fixed
+        return self._fixed + self.way_home(distance, heights, drain) if self.stays else self._fixed
 
-    def suffices(self, battery: Value, volume: Volume) -> Truth:
-        """Whether the battery holds what is needed; unknown when the charge is, or the place that counts."""
+    def suffices(self, battery: Value, volume: Volume, drain: Value = UNMEASURED) -> Truth:
+        """Whether the battery holds what is needed; unknown when the charge is, or the place that counts. `drain` is
+        what was measured of it.
+        """
         low, high, gap, _ = battery
         if self.stays:
             gap = max(gap, volume.place.located, volume.height[2] if self._vehicle.speeds else PRESENT)
@@ -73,10 +93,12 @@ class Energy:
             return UNKNOWN
         nearest, farthest = volume.farthest
         lowest, highest = volume.height[0], volume.height[1]
-        most = self.needed(farthest, (lowest, highest))
+        slowest, fastest = drains(drain)
+        most = self.needed(farthest, (lowest, highest), fastest)
         if low >= most:
             truth = TRUE
         else:
-            same = nearest == farthest and lowest == highest
-            truth = FALSE if high < (most if same else self.needed(nearest, (highest, lowest))) else TRUE | FALSE
+            same = nearest == farthest and lowest == highest and slowest == fastest
+            least = most if same else self.needed(nearest, (highest, lowest), slowest)
+            truth = FALSE if high < least else TRUE | FALSE
         return truth | UNKNOWN if gap else truth

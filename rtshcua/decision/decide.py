@@ -434,7 +434,7 @@ def safety(invocation: PreparedInvocation, at: Environment, exact: bool) -> Foun
             truth = condition(over)
             if truth != TRUE and tally.fails(truth, Reason.INVARIANT, clause):
                 return tally.found(failed=True)
-    truth = invocation.energy.suffices(at.slots[known.battery], volume)
+    truth = invocation.energy.suffices(at.slots[known.battery], volume, at.slots[known.drain])
     if truth != TRUE and tally.fails(truth, Reason.ENERGY, None):
         return tally.found(failed=True)
     for rule in invocation.candidates.degrades:

@@ -15,6 +15,9 @@ from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.policy import Speeds, Vehicle
 
 SECOND = 1_000_000  # us
+MINUTE = 60 * SECOND
+#: the most that is counted to be taken of a charge in a minute, 1/10000: all of it in a second
+MOST_DRAIN = 60 * FULL
 #: from a command to the motion that it asks for
 BEGINS = SECOND
 #: from arming to leaving the ground: the motors run up
@@ -76,6 +79,11 @@ def home_us(vehicle: Vehicle, speeds: Speeds, distance: int, heights: tuple[int,
 def charge(speeds: Speeds, time_us: int) -> int:
     """What flying so long takes of a full charge, 1/10000, rounded up."""
     return _over(time_us * FULL, speeds.flight_us)
+
+
+def drained(time_us: int, drain: int) -> int:
+    """What flying so long takes where `drain` is taken in a minute, 1/10000, rounded up."""
+    return _over(time_us * drain, MINUTE)
 
 
 def _over(amount: int, by: int) -> int:

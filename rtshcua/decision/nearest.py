@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
+from rtshcua.decision.contracts import drains
 from rtshcua.decision.evaluate import Environment, Tables, build, total
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.situation import environment, ranging, situation
@@ -315,8 +316,9 @@ def _slower(invocation: PreparedInvocation, policy: PreparedPolicy) -> tuple[Nea
 
 
 def _charged(invocation: PreparedInvocation, policy: PreparedPolicy, at: Environment) -> tuple[Nearest, ...]:
-    volume = invocation.planner.volume(at.slots, policy.tables.known)
-    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
+    known = policy.tables.known
+    volume = invocation.planner.volume(at.slots, known)
+    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2], drains(at.slots[known.drain])[1])
     return tuple(
         Nearest(signal.name, signal.dimension, needed, ())
         for signal in policy.policy.signals

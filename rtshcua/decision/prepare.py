@@ -27,7 +27,7 @@ from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind, Param
 from rtshcua.model.flat.limits import MAX_COMPARED, MAX_DURATION, MAX_GAP, MAX_VALUE
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, Monitor, Policy, Rule, RuleKind
-from rtshcua.model.flat.signal import POSITION
+from rtshcua.model.flat.signal import DRAIN, NUMBER, POSITION
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.step_number import step_words
@@ -205,7 +205,9 @@ def _well_known(policy: Policy) -> WellKnown:
     vehicle, absent = policy.vehicle, policy.slots
     x, y = (absent, absent) if vehicle.position == -1 else (vehicle.position, vehicle.position + 1)
     others = (vehicle.height, vehicle.battery, vehicle.north, vehicle.east, vehicle.down)
-    return WellKnown(x, y, *(absent if slot == -1 else slot for slot in others))
+    measured = next((each.slot for each in policy.signals if each.name == DRAIN and each.kind == NUMBER), absent)
+    height, battery, north, east, down = (absent if slot == -1 else slot for slot in others)
+    return WellKnown(x, y, height, battery, north, east, down, measured)
 
 
 class PreparedAirspace(NamedTuple):

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from math import isqrt
 from typing import NamedTuple
 
+from rtshcua.decision.contracts import drains
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.flying import SECOND
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
@@ -116,7 +117,8 @@ def way_home(at: Environment, volume: Volume, invocation: PreparedInvocation) ->
     charge, _, gap, _ = at.slots[policy.tables.known.battery]
     if gap != PRESENT or volume.place.located != PRESENT or (vehicle.speeds and volume.height[2] != PRESENT):
         return UNKNOWN
-    home = invocation.energy.way_home(volume.farthest[1], volume.height[:2])
+    drain = drains(at.slots[policy.tables.known.drain])[1]
+    home = invocation.energy.way_home(volume.farthest[1], volume.height[:2], drain)
     return TRUE if charge >= vehicle.reserve + home else FALSE
 
 

@@ -253,8 +253,8 @@ NOWHERE = Place(((Sweep((0, 0), NO_BOX), 0, 0),), ABSENT, ABSENT)
 
 
 class WellKnown(NamedTuple):
-    """The state slots of position (x, y), height, battery and velocity. One that no signal owns is the slot after the
-    last, which is missing.
+    """The state slots of position (x, y), height, battery, velocity, and what is measured to be taken of the battery.
+    One that no signal owns is the slot after the last, which is missing.
     """
 
     x: int
@@ -264,6 +264,7 @@ class WellKnown(NamedTuple):
     north: int = -1
     east: int = -1
     down: int = -1
+    drain: int = -1
 
 
 def here(slots: Sequence[Value], known: WellKnown) -> Place:

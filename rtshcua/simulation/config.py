@@ -61,8 +61,8 @@ class Extra(StrEnum):
     """The battery's voltage is measured."""
 
 
-STOCK: frozenset[Extra] = frozenset()
-"""A stock vehicle: GPS, barometer and battery alone."""
+STOCK = frozenset({Extra.VOLTAGE})
+"""A stock vehicle: GPS, barometer and battery alone, of which SYS_STATUS carries the voltage."""
 EQUIPPED = frozenset({Extra.RADIO, Extra.RANGE, Extra.WIND, Extra.VOLTAGE})
 
 

@@ -8,9 +8,8 @@ from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.vehicle.bounds import narrower, reach_of
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.quantity import Dimension
 from rtshcua.simulation.ardupilot.parameters import PARAMETERS
-from rtshcua.simulation.config import HOME, Extra, Kind, SimulationConfig
+from rtshcua.simulation.config import HOME, STOCK, Extra, Kind, SimulationConfig
 from rtshcua.simulation.place import Home
 
 _CRUISE_MM_S = 5_000
@@ -25,10 +24,8 @@ _TOLD_IN = {
 
 def _extras(policy: Policy) -> frozenset[Extra]:
     """What has to be fitted for the signals of a policy to come."""
-    voltage = (signal.dimension == Dimension.VOLTAGE.value for signal in policy.signals)
     messages = {source.message for signal in policy.signals for source in signal.sources}
-    extras = {extra for message, extra in _TOLD_IN.items() if message in messages}
-    return frozenset(extras | {Extra.VOLTAGE} if any(voltage) else extras)
+    return STOCK | {extra for message, extra in _TOLD_IN.items() if message in messages}
 
 
 def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:

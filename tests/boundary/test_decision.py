@@ -18,10 +18,11 @@ from reference import outlines, rich_worlds, worlds
 from reference.asking import STEP
 from reference.flat_case import H, M, S
 from reference.native import Native, Question, expected
-from rtshcua.decision.contracts import Energy
+from rtshcua.decision.contracts import Energy, drains
+from rtshcua.decision.flying import MOST_DRAIN
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.decision.times import Times, daily, local_time, timed
-from rtshcua.decision.values import FALSE, TRUE
+from rtshcua.decision.values import FALSE, TRUE, point
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
@@ -302,14 +303,16 @@ def test_the_way_home_takes_as_much(native: Native) -> None:
             low, high = sorted(
                 of.choice([0, 20 * M, -M, MAX_VALUE, -MAX_VALUE, of.randrange(1 << 30)]) for _ in range(2)
             )
-            needed = energy.way_home(distance, (low, high))
+            drain = of.choice([0, 0, 1, 1_760, MOST_DRAIN, MOST_DRAIN + 1, MAX_VALUE, -1])
+            needed = energy.way_home(distance, (low, high), drains(point(drain))[1])
             for charge in (needed - 1, needed, needed + 1, 0, -1, MAX_VALUE):
                 if -MAX_VALUE <= charge <= MAX_VALUE:
-                    assert native.brings_home(charge, distance, low, high, asked_for) is (charge >= needed), (
+                    assert native.brings_home(charge, distance, low, high, asked_for, drain) is (charge >= needed), (
                         made,
                         distance,
                         low,
                         high,
+                        drain,
                     )
 
 

@@ -114,9 +114,9 @@ class Native:
         """The same of a window of the day."""
         return int(self._library.rt_test_time_of_day(*map(ctypes.c_int64, (start, end, low, high, error))))
 
-    def brings_home(self, charge: int, distance: int, low: int, high: int, asked: int) -> bool:
+    def brings_home(self, charge: int, distance: int, low: int, high: int, asked: int, drain: int = 0) -> bool:
         """Whether a charge is enough for the way home."""
-        numbers = array("q", (charge, distance, low, high, asked))
+        numbers = array("q", (charge, distance, low, high, asked, drain))
         self._library.rt_test_home.restype = ctypes.c_bool
         return bool(self._library.rt_test_home(ctypes.c_void_p(numbers.buffer_info()[0])))
 

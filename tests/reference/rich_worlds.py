@@ -13,6 +13,7 @@ from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.limits import DAY, MAX_SPEED, MAX_VALUE, WEEK
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Airspace, Policy, RuleKind, Speeds, Vehicle
+from rtshcua.model.flat.signal import DRAIN
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Context, Now, State
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
 
@@ -141,10 +142,18 @@ def policy(of: Random) -> Policy:
     patient = of.random() < 0.5  # so that something else ends an admission first
     inside, outside = (tuple(of.sample(range(len(zones)), of.choice([0, 1, 2]))) for _ in range(2))
     airspace = Airspace(inside[:1], outside, "airspace", 0, 0, 1) if of.random() < 0.5 else plain.airspace
+    measured = of.choice(["link.quality", "wind.speed", "", "", ""])  # what one of these tells is taken in a minute
     return replace(
         plain,
         airspace=airspace,
-        signals=tuple(replace(each, stale_us=20 * S if patient else each.stale_us) for each in plain.signals),
+        signals=tuple(
+            replace(
+                each,
+                name=DRAIN if each.name == measured else each.name,
+                stale_us=20 * S if patient else each.stale_us,
+            )
+            for each in plain.signals
+        ),
         contracts=tuple(
             replace(each, timing_class=of.choice([each.timing_class] * 6 + [0, 1, 2])) for each in plain.contracts
         ),

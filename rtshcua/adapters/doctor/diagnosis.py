@@ -16,13 +16,15 @@ from rtshcua.adapters.vehicle.preflight import SAME_MM
 from rtshcua.adapters.vehicle.returns import ONLY_ZERO, Need
 from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
+from rtshcua.adapters.vehicle.telemetry import drained
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_TYPE_GCS as GROUND_STATION
 from rtshcua.mavlink.modes import is_another
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import Signal
+from rtshcua.model.flat.signal import CELL, DRAIN, Signal
 from rtshcua.model.flat.zone import project
+from rtshcua.model.quantity import Dimension
 from rtshcua.onboard.enforcement.frames import OURS
 from rtshcua.onboard.rehearsal import needed
 from rtshcua.wire.qualification import Firmware
@@ -172,8 +174,29 @@ def _signing(vehicle: ExaminingDriver, *, keyed: bool) -> VehicleFinding:
         return VehicleFinding("link/signing", STOP, found, "its key", "give its key with `--signing-key`")
     if talker.signed:
         return VehicleFinding("link/signing", WARN, signed, "", "give its key with `--signing-key`")
-    advice = "whoever reaches this link commands the vehicle: `rtshcua keys link` makes a key for MAVLink 2 signing"
-    return VehicleFinding("link/signing", WARN, "nothing is signed", "", advice)
+    return VehicleFinding("link/signing", WARN, "nothing is signed", "", _for_signing(vehicle))
+
+
+#: the first PX4 that takes a key for MAVLink 2 signing
+_PX4_SIGNS: Final = (1, 17)
+
+
+def _for_signing(vehicle: ExaminingDriver) -> str:
+    """What can be done about a link that is not signed, with the release that this is."""
+    risk = "whoever reaches this link commands the vehicle"
+    make = "`rtshcua keys link` makes a key for MAVLink 2 signing"
+    message, px4 = vehicle.latest("AUTOPILOT_VERSION"), vehicle.flavour is not None and vehicle.flavour.name == "px4"
+    since = ".".join(map(str, _PX4_SIGNS))
+    if not px4:
+        return f"{risk}: {make}"
+    if message is None:
+        return f"{risk}: {make}, which PX4 takes from {since} on"
+    release = tuple(message.flight_sw_version.to_bytes(4)[:2])
+    if release >= _PX4_SIGNS:
+        return f"{risk}: {make}"
+    has = ".".join(map(str, release))
+    wire = "use a wire that nobody else reaches"
+    return f"{risk}, and PX4 {has} takes no key: {wire}, or PX4 {since} and `rtshcua keys link`"
 
 
 def locked(vehicle: ExaminingDriver) -> bool:
@@ -329,6 +352,7 @@ def _readiness(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFind
     found = astray or "its estimator knows place and height"
     yield _graded("sensor/estimator", found, "a place and a height", stops=astray is not None)
     yield _battery(vehicle, policy)
+    yield from _cells(vehicle, policy)
     for text in vehicle.texts:
         yield VehicleFinding("vehicle/said", OK, f"it said, for what that is worth: {text}")
 
@@ -342,6 +366,43 @@ def _fix(vehicle: ExaminingDriver) -> VehicleFinding:
     accuracy = f", to {message.h_acc} mm" if message.h_acc else ""
     found = f"fix type {message.fix_type}, {message.satellites_visible} satellites{accuracy}"
     return _graded("sensor/gps", found, f"to {_ACCURATE_MM} mm", warns=message.h_acc > _ACCURATE_MM)
+
+
+def settling(vehicle: ExaminingDriver) -> str | None:
+    """What of a vehicle that has just been switched on may still come by itself, in words."""
+    fix = vehicle.latest("GPS_RAW_INT")
+    if fix is not None and fix.fix_type < 3:
+        return f"a 3D fix (its receiver has fix type {fix.fix_type})"
+    if fix is not None and fix.h_acc > _ACCURATE_MM:
+        return f"a fix to {_ACCURATE_MM} mm (its receiver says {fix.h_acc})"
+    if fix is None:
+        return None  # nothing tells that there is a receiver
+    return None if vehicle.seen.estimator.missing(vehicle.seen.now_us) is None else "its estimator's place and height"
+
+
+def settled(what: str, seconds: int, still: str | None) -> VehicleFinding:
+    """That it was waited for, and for how long."""
+    if still is None:
+        found = f"it had to settle: {seconds} s were waited for {what}"
+        return VehicleFinding("sensor/settled", OK, found)
+    found = f"{seconds} s were waited for {still}, which did not come"
+    return VehicleFinding("sensor/settled", WARN, found, "a settled vehicle", "give it a clear sky, and ask again")
+
+
+#: a cell of a lithium battery, at rest or nearly so, mV
+_CELL_MV: Final = range(3_000, 4_400)
+
+
+def _cells(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFinding]:
+    """Whether the battery has as many cells as the policy's vehicle says, by what one of them would give."""
+    for signal in policy.signals:
+        value = vehicle.values.get(signal.slot) if signal.name == CELL else None
+        if value is None:
+            continue
+        found = f"{value / 1_000:.2f} V a cell, by the `cells` that the policy's vehicle declares"
+        advice = "compare `cells` with the battery: by another number its rule on the voltage says nothing"
+        wrong = value not in _CELL_MV
+        yield _graded("sensor/cells", found, "3 V to 4.4 V at rest", advice, stops=wrong)
 
 
 def _battery(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
@@ -381,11 +442,11 @@ def _signals(
     for signal in policy.signals:
         slots = signal.slots
         bad = WARN if wanted.isdisjoint(slots) else STOP
-        yield _signal(vehicle, signal, slots, bad, signed=unheard.isdisjoint(slots))
+        yield _signal(vehicle, policy, signal, slots, bad, signed=unheard.isdisjoint(slots))
 
 
 def _signal(
-    vehicle: ExaminingDriver, signal: Signal, slots: Sequence[int], bad: MissionVerdict, *, signed: bool
+    vehicle: ExaminingDriver, policy: Policy, signal: Signal, slots: Sequence[int], bad: MissionVerdict, *, signed: bool
 ) -> VehicleFinding:
     slug, sources = f"signal/{signal.name}", [source.message for source in signal.sources]
     names = " or ".join(sources)
@@ -394,6 +455,10 @@ def _signal(
         return VehicleFinding(slug, bad, found, names, "`--unsigned-radio`, here and for `run`")
     heard = next((name for name in sources if name in vehicle.streams), None)
     unknown = any(vehicle.values.get(slot) is None for slot in slots)
+    if unknown and signal.name == DRAIN and not vehicle.seen.airborne:
+        declared = f"{drained(policy.vehicle) / 100:.1f} % a minute"
+        found = f"`{signal.name}` is measured in the air only; until it is, the declared {declared} counts"
+        return VehicleFinding(slug, UNKNOWN, found, "", "nothing waits for it")
     if unknown and IN_THE_AIR.issuperset(sources) and not vehicle.seen.airborne:
         found = f"`{signal.name}` is known in the air only, so nothing is known of it yet"
         return VehicleFinding(slug, UNKNOWN, found, "a step that takes off does not ask for it")
@@ -472,7 +537,8 @@ def settings_told(
     for setting in told:
         name = setting.parameter
         other = meant.get(setting.otherwise, values.get(setting.otherwise))
-        yield _setting(setting, values[name], setting.needs(policy, reach), meant.get(name), other)
+        alone = setting.battery and not _sees_voltage(policy)
+        yield _setting(setting, values[name], setting.needs(policy, reach), meant.get(name), other, alone=alone)
     for name in meant:
         if name not in values:
             found = f"it does not tell `{name}`, which `--set` names: a run would be refused"
@@ -482,16 +548,28 @@ def settings_told(
         yield VehicleFinding("settings/unread", UNKNOWN, absent, "what the autopilot does by itself")
 
 
+def _sees_voltage(policy: Policy) -> bool:
+    """Whether something of the policy counts on a voltage: the charge may be counted wrongly."""
+    return any(signal.dimension == Dimension.VOLTAGE.value for signal in policy.signals)
+
+
 def _words(setting: Setting, value: float) -> str:
     return f"{value * setting.mm / 1_000:g}{setting.unit}" if setting.mm else setting.words.get(value, f"{value:g}")
 
 
 def _setting(
-    setting: Setting, value: float, need: Need | None, meant: float | None, otherwise: float | None
+    setting: Setting,
+    value: float,
+    need: Need | None,
+    meant: float | None,
+    otherwise: float | None,
+    *,
+    alone: bool = False,
 ) -> VehicleFinding:
     """What it is, what is needed, and how to change it. What a mission cannot fly with is said as `mission/unready`.
 
     `meant` is what a run with the same `--set` would set it to; then that is judged. `otherwise` counts if it is 0.
+    `alone`: nothing else sees that the battery fails, so what it warns of stops a mission.
     """
     slug, name = f"settings/{setting.parameter.lower()}", setting.parameter
     found = f"{setting.about}: {_words(setting, value)} ({name} = {value:g})"
@@ -507,7 +585,10 @@ def _setting(
     if why:
         better = setting.better
         how = f"; set `{name}` to {better:g}" if better is not None else ""
-        return _graded(slug, found, setting.words.get(better, "") if better is not None else "", why + how, warns=True)
+        needed = setting.words.get(better, "") if better is not None else ""
+        if alone:
+            why += ", and no condition of the policy reads a voltage: nothing would see a battery that fails"
+        return _graded(slug, found, needed, why + how, warns=True, stops=alone)
     if value == 0 and otherwise is not None:
         value = otherwise
     if need is None or setting.mm == 0 or (value == 0 and "(0: " in setting.about):

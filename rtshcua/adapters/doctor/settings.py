@@ -32,6 +32,7 @@ class Setting(NamedTuple):
     needs: Callable[[Policy, Reach], Need | None] = lambda _policy, _reach: None
     otherwise: str = ""
     limit: returns.ReturnLimit | None = None
+    battery: bool = False  # about a low battery
 
     @property
     def unit(self) -> str:
@@ -135,7 +136,7 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting("NAV_RCL_ACT", "when the remote control is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
         Setting(
             "COM_LOW_BAT_ACT", "when the battery is low", {0: "warns only", 2: "land", 3: "return, then land"},
-            {0: "the autopilot does nothing of its own about a battery that runs out"}, 3,
+            {0: "the autopilot does nothing of its own about a battery that runs out"}, 3, battery=True,
         ),
         Setting(
             "GF_ACTION", "at the fence",
@@ -192,6 +193,7 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
             "BATT_FS_LOW_ACT", "when the battery is low",
             {0: "warns only", 1: "land", 2: "return", 3: "SmartRTL or return", 4: "SmartRTL or land", 5: "terminate"},
             {0: "the autopilot does nothing of its own about a battery that runs out", 5: _MOTORS_OFF}, 2,
+            battery=True,
         ),
         Setting(
             "BATT_FS_CRT_ACT", "when the battery is critical",

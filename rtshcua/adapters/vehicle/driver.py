@@ -264,7 +264,7 @@ class Driver:
             self._judge_fitness(now_us, events)
         if self._gate_may_be_lost:
             self._renew_ahead(now_us, events, begins=False)
-        if seen.notes or self.stream_requests.notes or self.preflight.notes or self._telemetry.batteries.notes:
+        if seen.notes or self.stream_requests.notes or self.preflight.notes or self._telemetry.notes:
             self._tell_notes(now_us, events)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
@@ -434,7 +434,9 @@ class Driver:
             return self._acknowledge(frame, now_us) or self._asks
         self.stream_requests.heard(name, now_us, len(octets))
         if name in self._telemetry.rates:
-            values = self._telemetry.read(name, message, component, seen.estimator.doubtful(name, now_us), now_us)
+            values = self._telemetry.read(
+                name, message, component, seen.estimator.doubtful(name, now_us), now_us if at_us is None else at_us
+            )
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
         if component == AUTOPILOT and self.asks is not None:
@@ -576,8 +578,7 @@ class Driver:
             send += self._ask(now_us)
 
     def _tell_notes(self, now_us: int, events: list[Event]) -> None:
-        several = self._telemetry.batteries.notes
-        for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes, several):
+        for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes, self._telemetry.notes):
             events += [ports.Noted(now_us, text) for text in notes]
             notes.clear()
 

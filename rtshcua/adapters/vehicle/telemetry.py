@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final, NamedTuple, TypeAlias
 
+from rtshcua.adapters.vehicle.drain import DrainMeter
+from rtshcua.decision.flying import MINUTE
 from rtshcua.decision.rates import Rate, rates
 from rtshcua.decision.tree import where
 from rtshcua.mavlink import dialect
@@ -12,9 +14,9 @@ from rtshcua.mavlink.enums import MAV_BATTERY_FUNCTION_AVIONICS, MAV_BATTERY_FUN
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.contract import Contract
-from rtshcua.model.flat.limits import MAX_VALUE
-from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import POSITION, Signal, SignalSource
+from rtshcua.model.flat.limits import FULL, MAX_VALUE
+from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.signal import DRAIN, NUMBER, POSITION, Signal, SignalSource
 from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, Projection, project
 
 _Read: TypeAlias = Callable[[Any], int | None]  # a field of a message
@@ -52,6 +54,14 @@ class Telemetry:
         self._by_message: dict[str, list[_Carried]] = {}
         #: the batteries of which the worst counts
         self.batteries = Batteries(_battery_stale_us(policy))
+        measured = next((each for each in policy.signals if each.name == DRAIN and each.kind == NUMBER), None)
+        self._drain = -1 if measured is None else measured.slot
+        self._drain_from = frozenset(() if measured is None else (source.message for source in measured.sources))
+        self._meter = DrainMeter()
+        self._declared = drained(vehicle)
+        self._drain_told = self._declared
+        #: what an operator should know, to be taken
+        self.notes: list[str] = self.batteries.notes
         #: of these the autopilot's own carry all that such a message may carry, each time; where there are several
         #: instances, those of this one
         self._whole: dict[str, int | None] = {}
@@ -78,6 +88,18 @@ class Telemetry:
         When it was measured is not said
         here: see `source_time`.
         """
+        values = self._read(name, message, component, doubtful, now_us)
+        if name not in self._drain_from:
+            return values
+        meter = self._meter
+        return tuple(
+            (slot, self._tell_drain(meter.take(value, now_us)) if slot == self._drain else value)
+            for slot, value in values
+        )
+
+    def _read(
+        self, name: str, message: Any, component: int, doubtful: frozenset[str], now_us: int
+    ) -> tuple[tuple[int, int | None], ...]:
         carried = self._by_message.get(name)
         if carried is None:
             return ()
@@ -113,11 +135,31 @@ class Telemetry:
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
 
+    def _tell_drain(self, drain: int | None) -> int | None:
+        if drain is not None and drain * 10 > self._drain_told * 11:
+            self._drain_told = drain
+            self.notes.append(
+                f"the battery gives {_percent(drain)} of its charge a minute, and the policy's vehicle says "
+                f"{_percent(self._declared)} at the worst: the way home is counted with what was measured"
+            )
+        return drain
+
     def _is_first(self, name: str, instance: int, component: int, where: Where) -> bool:
         """Whether this is the lowest instance that the component was heard to have of a selected sensor."""
         key = component, name, where
         first = self._first[key] = min(instance, self._first.get(key, instance))
         return bool(instance == first)
+
+
+def drained(vehicle: Vehicle) -> int:
+    """What the vehicle of a policy takes of a full charge in a minute, as declared at the worst, 1/10000, rounded."""
+    flight_us = vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us
+    return (MINUTE * FULL + flight_us // 2) // flight_us
+
+
+def _percent(part: int) -> str:
+    """A part of a full charge, 1/10000, in words."""
+    return f"{part / 100:.1f} %"
 
 
 #: the message that tells of each battery, and by which field what it holds

@@ -13,7 +13,7 @@ from rtshcua.ground.checker.checks.vehicles import deceleration
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import Type
-from rtshcua.ground.checker.well_known import WELL_KNOWN, read_by_all
+from rtshcua.ground.checker.well_known import MEASURED, PER_CELL, VELOCITY, WELL_KNOWN, read_by_all
 from rtshcua.ground.compiler import lacking
 from rtshcua.ground.compiler.belonging import belongs
 from rtshcua.ground.compiler.conditions import Conditions
@@ -26,6 +26,7 @@ from rtshcua.ground.compiler.slots import Slots
 from rtshcua.ground.compiler.speeds import speeds_of
 from rtshcua.ground.compiler.zones import ZoneTable
 from rtshcua.model.flat.policy import SILENCE_US, AfterSilence, Airspace, Policy, Rule, Vehicle, WithoutEvidence
+from rtshcua.model.flat.signal import CELL
 from rtshcua.model.ir.places import GeoJson, VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.policies import Rule as RuleDecl
@@ -68,7 +69,7 @@ def lower_policy(
     declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
     lacking.check_policy(context, policy, vehicle, skills, declared)
     table = Files(context.report, names)
-    slots = Slots(context)
+    slots = Slots(context, 1 if vehicle.cells is None else vehicle.cells.value)
     well_known = [slots.of(name) for name in read]
     sizes = [context.symbols.sizes[each.name.text] for each in skills if each.name.text in context.symbols.sizes]
     for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in read), *skills, *sizes):
@@ -89,6 +90,18 @@ def lower_policy(
     contingency = contracts.chain(policy.contingency)
     airspace = _airspace(policy, zones, table)
     silence = policy.without_link
+    if vehicle.cells is None and any(each.name == CELL for each in slots.signals):
+        context.report.add(
+            codes.WELL_KNOWN_SIGNAL,
+            vehicle.name.span,
+            f"`{vehicle.name.text}` does not say how many cells its battery has, and a condition reads `{CELL}`",
+            help="write `cells 4` into the vehicle, or `without battery.cell` where nothing measures the voltage",
+        )
+    fitted = MEASURED.keys() - {name.text for name in vehicle.without}
+    for name in sorted(fitted):  # last, so that the others keep their slots
+        if _is_declared(context, name, files):
+            table.index(context.symbols.signals[name].span.file)
+            slots.of(name)
     if len(context.report.found) > before:
         return None
     flat = Policy(
@@ -161,8 +174,9 @@ def _roles(policy: PolicyDecl) -> tuple[str, ...]:
 def _well_known(context: Context, policy: PolicyDecl, read: Mapping[str, Type], files: frozenset[str]) -> bool:
     """Whether the signals are declared that every decision reads, or all supervision."""
     good = True
-    for name, type in read.items():
-        every = "every decision reads it" if name in WELL_KNOWN else "what brakes is watched by it"
+    declared = {name: type for name, type in {**MEASURED, **PER_CELL}.items() if _is_declared(context, name, files)}
+    for name, type in (*read.items(), *declared.items()):
+        every = "every decision reads it" if name not in VELOCITY else "what brakes is watched by it"
         needs = "every flight needs it" if name in WELL_KNOWN else "a vehicle that `brakes` is watched by it"
         signal = context.symbols.signals.get(name)
         if signal is None or signal.span.file not in files:
@@ -182,6 +196,11 @@ def _well_known(context: Context, policy: PolicyDecl, read: Mapping[str, Type], 
                 help="give the signal another name, or read it from a fitting field",
             )
     return good
+
+
+def _is_declared(context: Context, name: str, files: frozenset[str]) -> bool:
+    signal = context.symbols.signals.get(name)
+    return signal is not None and signal.span.file in files
 
 
 def _airspace(policy: PolicyDecl, zones: ZoneTable, files: Files) -> Airspace | None:

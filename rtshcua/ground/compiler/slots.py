@@ -8,17 +8,18 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import Kind, Type
 from rtshcua.mavlink.quantise import UNITS
-from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, Signal, SignalSource
+from rtshcua.model.flat.signal import CELL, ENUMERATION, NUMBER, POSITION, Signal, SignalSource
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.signals import SignalSource as SourceDecl
 from rtshcua.model.quantity import Dimension
 
 
 class Slots:
-    """Slots in the order in which signals are first asked for; a position has two."""
+    """Slots in the order in which signals are first asked for; a position has two. `cells` are those of the battery."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, cells: int = 1) -> None:
         self._context = context
+        self._cells = cells
         self._slots: dict[str, int] = {}
         self.signals: list[Signal] = []
         self.count = 0
@@ -67,6 +68,8 @@ class Slots:
             dimension = Dimension.LENGTH if type.dimension is Dimension.ALTITUDE else type.dimension
             field = self._context.dialect.messages[source.message.text].fields[source.fields[0].text]
             numerator, denominator = UNITS[dimension][field.unit]
+            if declared.name.text == CELL:
+                denominator *= self._cells
         common = gcd(numerator, denominator)
         marks = (sentinel(name.text, members) for name in declared.unknown_at)
         return SignalSource(

@@ -8,7 +8,7 @@ from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.symbols import WORDS
-from rtshcua.ground.checker.well_known import VELOCITY, WELL_KNOWN
+from rtshcua.ground.checker.well_known import MEASURED, PER_CELL, VELOCITY, WELL_KNOWN
 from rtshcua.ground.editor.consequences import Judged, Renamed, consequence, judged
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.navigation import declared_at, references, targets
@@ -25,8 +25,10 @@ RENAMED = (Sort.DECLARED, Sort.PARAMETER, Sort.MEMBER, Sort.CHOICE)
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 _TAKEN = ("phase", "local")
 """Names that would be read as words where values stand."""
-_READ = dict.fromkeys(WELL_KNOWN, "every decision needs it") | dict.fromkeys(
-    VELOCITY, "what watches a vehicle that brakes needs it"
+_READ = (
+    dict.fromkeys(WELL_KNOWN, "every decision needs it")
+    | dict.fromkeys(VELOCITY, "what watches a vehicle that brakes needs it")
+    | dict.fromkeys((*MEASURED, *PER_CELL), "what it tells is worked out by its name")
 )
 """Signals that are found by their names, and by nothing that a source says."""
 

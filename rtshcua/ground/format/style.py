@@ -78,6 +78,7 @@ ITEMS = {
     "position_error": _PART,
     "endurance": _PART,
     "reserve": _PART,
+    "cells": _PART,
     "clock": _PART,
     "time_zone": _PART,
     "elevation": _PART,

@@ -11,7 +11,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.checker.context import Parametric
 from rtshcua.ground.checker.symbols import WORDS, Declaration
-from rtshcua.ground.checker.well_known import WELL_KNOWN
+from rtshcua.ground.checker.well_known import MEASURED, WELL_KNOWN
 from rtshcua.ground.lint.mentions import mentions
 from rtshcua.ground.lint.subject import Subject
 from rtshcua.model.ir.program import Unit
@@ -44,7 +44,7 @@ def check(subject: Subject) -> Iterator[Diagnostic]:
 def _declared(subject: Subject, unit: Unit) -> Iterator[Declaration]:
     """What a file declares for itself alone."""
     yield from unit.enums
-    yield from (signal for signal in unit.signals if signal.name.text not in WELL_KNOWN)
+    yield from (signal for signal in unit.signals if signal.name.text not in WELL_KNOWN.keys() | MEASURED.keys())
     yield from unit.templates
     if not subject.permits_any():
         yield from unit.skills

@@ -10,11 +10,14 @@ from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import ENUMERATION, POSITION
+from rtshcua.model.flat.signal import CELL, ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Now, State
 
 #: one clause may undo what another was content with, so they are gone through again, a few times
 _ROUNDS = 4
+
+#: what a full cell of a lithium battery gives, mV
+_FULL_CELL = 4_200
 
 
 def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: PreparedPolicy, now: Now) -> State:
@@ -25,6 +28,9 @@ def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: Prepar
     for slot, value in ((flat.vehicle.position, x), (flat.vehicle.position + 1, y), (flat.vehicle.height, height)):
         values[slot] = value
     values[flat.vehicle.battery] = FULL
+    for signal in flat.signals:
+        if signal.name == CELL:
+            values[signal.slot] = _FULL_CELL
     fixed = {flat.vehicle.position, flat.vehicle.position + 1, flat.vehicle.height}
     for _ in range(_ROUNDS):
         for clause in _clauses(invocation):

@@ -110,6 +110,7 @@ def _safety(invocation: PreparedInvocation, at: Environment) -> Iterator[Check]:
     if policy.airspace is not None:
         yield Check("airspace", policy.airspace.airspace, EVERYWHERE[policy.airspace.keeps(volume.place, at, through)])
     yield from _clauses("maintain", invocation.maintain, ranging(at, volume, known.height, through))
-    yield Check("energy", None, EVERYWHERE[invocation.energy.suffices(at.slots[known.battery], volume)])
+    enough = invocation.energy.suffices(at.slots[known.battery], volume, at.slots[known.drain])
+    yield Check("energy", None, EVERYWHERE[enough])
     for rule in invocation.candidates.degrades:
         yield Check("degrade", rule.rule, rule.condition(at))

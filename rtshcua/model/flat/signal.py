@@ -4,6 +4,11 @@ from rtshcua.model.flat.struct import Flat
 
 NUMBER, ENUMERATION, POSITION = 0, 1, 2
 
+#: The name of the signal whose value is not what its field holds, but what is taken of that in a minute, as measured.
+DRAIN = "battery.drain"
+#: The name of the signal that is its field's value divided by the cells that the vehicle declares.
+CELL = "battery.cell"
+
 
 class SignalSource(Flat, frozen=True):
     """One message and its field or fields; a raw value `v` is `v * numerator / denominator` in the canonical unit.

@@ -144,3 +144,4 @@ class VehicleDecl(Node):
     wind: Quantity | None = None  # the most that it is flown in
     flight: Quantity | None = None  # how long a full battery flies, whatever it flies
     time_zone: Name | None = None  # `clock "Europe/Berlin"`
+    cells: Quantity | None = None  # `cells 4`: so many in series, by which `battery.cell` is counted

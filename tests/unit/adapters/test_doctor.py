@@ -1,5 +1,6 @@
 """The doctor, beside the simulated vehicle in explicit time: what is well, and each thing that would stop a mission."""
 
+import dataclasses
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -8,16 +9,17 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, told_apart
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.mavlink.signing import SignedLink, State
 from rtshcua.model.faults import GpsLoss, LinkLoss, MessageSilence
 from rtshcua.model.flat.policy import Policy, Speeds
+from rtshcua.model.flat.signal import CELL, DRAIN, NUMBER, Signal, SignalSource
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.rehearsal import unheard
-from rtshcua.simulation.config import EQUIPPED, Extra, OtherBattery, Purpose, SimulationConfig
+from rtshcua.simulation.config import EQUIPPED, Boot, Extra, Kind, OtherBattery, Purpose, SimulationConfig
 from rtshcua.simulation.place import Home
 from rtshcua.virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 from virtual import case
@@ -38,7 +40,11 @@ def examine(
     utc_error_us: int | None = 1_000,
     meant: dict[str, int] | None = None,
 ) -> dict[str, VehicleFinding]:
-    """The findings after so many seconds, by slug; of several with one slug, the worst."""
+    """The findings after so many seconds, by slug; of several with one slug, the worst. An ArduCopter acts on a low
+    battery, as its owner set it, unless `config` says otherwise.
+    """
+    if config.flavour is Kind.ARDUPILOT and "BATT_FS_LOW_ACT" not in dict(config.parameters):
+        config = dataclasses.replace(config, parameters=(*config.parameters, ("BATT_FS_LOW_ACT", 2.0)))
     policy = policy or case.policy()
     clock = VirtualClock()
     vehicle = VirtualVehicle(policy, config, clock, fence=False)
@@ -251,6 +257,77 @@ def test_what_lowers_or_lifts_the_way_home_stops_a_mission(
     assert (stops(well), well[f"settings/{parameter[0].lower()}"].verdict) == (set(), MissionVerdict.OK)
 
 
+@rows(("flavour", "release", "says"), [
+    ("px4", None, "PX4 1.16 takes no key: use a wire"),
+    ("px4", (1, 17), "`rtshcua keys link` makes a key"),
+    ("ardupilot", None, "`rtshcua keys link` makes a key"),
+])  # fmt: skip
+def test_it_advises_a_key_only_where_the_release_takes_one(
+    flavour: str, release: tuple[int, int] | None, says: str
+) -> None:
+    assert says in examine(case.simulated(flavour, release=release))["link/signing"].advice
+
+
+@FLAVOURS
+def test_a_low_battery_that_nobody_sees_stops_a_mission(flavour: str) -> None:
+    """Where the autopilot does nothing about it, and the policy goes by the charge alone."""
+    name = "COM_LOW_BAT_ACT" if flavour == "px4" else "BATT_FS_LOW_ACT"
+    config = case.simulated(flavour, parameters=((name, 0.0),))
+    slug, by_charge = f"settings/{name.lower()}", case.policy()
+    assert not any(each.dimension == "voltage" for each in by_charge.signals)
+    assert examine(config, by_charge)[slug].verdict is MissionVerdict.STOP
+    by_voltage = with_cells(by_charge, 4)
+    assert examine(config, by_voltage)[slug].verdict is MissionVerdict.WARN
+    set_up = case.simulated(flavour, parameters=((name, 2.0),))
+    assert examine(set_up, by_charge)[slug].verdict is MissionVerdict.OK
+
+
+def with_cells(policy: Policy, cells: int) -> Policy:
+    source = SignalSource("SYS_STATUS", ("voltage_battery",), 1, cells, (0, 65_535))
+    signal = Signal(CELL, policy.slots, NUMBER, "voltage", 5_000_000, (), (source,))
+    return replace(policy, signals=(*policy.signals, signal), slots=policy.slots + 1)
+
+
+@FLAVOURS
+def test_another_number_of_cells_than_the_battery_has_stops_a_mission(flavour: str) -> None:
+    config = case.simulated(flavour)
+    right = examine(config, with_cells(case.policy(), 4))["sensor/cells"]
+    assert (right.verdict, right.found[:3]) == (MissionVerdict.OK, "4.2")
+    for cells in (3, 6):
+        assert examine(config, with_cells(case.policy(), cells))["sensor/cells"].verdict is MissionVerdict.STOP
+
+
+def test_a_drain_is_not_missed_on_the_ground() -> None:
+    plain = case.policy()
+    source = SignalSource("BATTERY_STATUS", ("battery_remaining",), 100, 1, (-1,))
+    signal = Signal(DRAIN, plain.slots, NUMBER, "ratio", 5_000_000, (), (source,))
+    found = examine(case.simulated("px4"), replace(plain, signals=(*plain.signals, signal), slots=plain.slots + 1))
+    assert found["signal/battery.drain"].verdict is MissionVerdict.UNKNOWN
+    assert "measured in the air only" in found["signal/battery.drain"].found
+
+
+def test_what_settles_by_itself_is_named_until_it_has() -> None:
+    seen: list[str | None] = []
+
+    def watched(vehicle: VirtualVehicle) -> None:
+        driver = vehicle.driver
+        assert isinstance(driver, ExaminingDriver)
+        plain = driver.tick
+
+        def tick(now_us: int) -> Any:
+            if driver.flavour is not None:
+                seen.append(settling(driver))
+            return plain(now_us)
+
+        vehicle.driver.tick = tick  # type: ignore[method-assign]
+
+    examine(case.simulated("ardupilot", boot=Boot.RECORDED), prepare=watched, seconds=60)
+    assert any(each is not None and "fix" in each for each in seen)
+    assert seen[-1] is None
+    assert settled("a 3D fix", 12, None).found == "it had to settle: 12 s were waited for a 3D fix"
+    assert settled("a 3D fix", 60, "a 3D fix").verdict is MissionVerdict.WARN
+
+
 def test_of_several_batteries_it_says_the_one_that_a_run_would_use() -> None:
     others = (OtherBattery(Purpose.PAYLOAD, 500), OtherBattery(Purpose.PROPULSION, 6_000))
     found = examine(case.simulated("px4", other_batteries=others))["sensor/battery"]
@@ -337,6 +414,12 @@ def test_another_one_that_mediates_and_a_ground_station() -> None:
     assert found["link/ground-station"].found == "1 ground station(s) heard"
 
 
+def signs(flavour: str, utc_us: int) -> SimulationConfig:
+    """A vehicle with the key, of which an ArduCopter acts on a low battery."""
+    acts = (("BATT_FS_LOW_ACT", 2.0),) if flavour == "ardupilot" else ()
+    return case.simulated(flavour, signing_key=KEY, utc_us=utc_us, parameters=acts)
+
+
 def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, VehicleFinding]:
     """The same on a link with a key."""
     now = VirtualClock().now()
@@ -344,7 +427,7 @@ def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, VehicleFi
     frames = FrameSession()
     frames.sign_with(link)
     policy, clock = case.policy(), VirtualClock()
-    vehicle = VirtualVehicle(policy, case.simulated(flavour, signing_key=KEY, utc_us=now.utc_us), clock, frames)
+    vehicle = VirtualVehicle(policy, signs(flavour, now.utc_us), clock, frames)
     vehicle.driver = ExaminingDriver(policy, clock, frames, link)
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)

@@ -80,9 +80,7 @@ def test_missions_of_one_name_in_unrelated_files_do_not_clash(here: Path, capsys
     missions = ["look (a/one.rts)", "look (b/two.rts)"]
     told = [line for line in lines[1:] if not line.startswith("  ")]  # what the steps take is indented
     assert [line.split(":")[0] for line in told] == [*missions, "meadow_flight on quad"]
-    assert lines[-1].endswith(
-        "`where fitted` left out, without battery.voltage, link.quality, obstacle.distance, wind.speed"
-    )
+    assert lines[-1].endswith("`where fitted` left out, without link.quality, obstacle.distance, wind.speed")
 
 
 def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,8 +23,9 @@ from reference.flat_case import (
     M,
     clause,
 )
-from rtshcua.decision.contracts import Energy
+from rtshcua.decision.contracts import Energy, drains
 from rtshcua.decision.decide import decide
+from rtshcua.decision.flying import MOST_DRAIN
 from rtshcua.decision.values import MISSING, interval, maybe, point
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Planner, Volume
 from rtshcua.decision.zones import Place, WellKnown
@@ -228,6 +229,37 @@ ENERGY = Energy(flat.CONTRACTS[GOTO], flat.POLICY.vehicle)
 
 def volume(near: int, far: int, gap: int = 0) -> Volume:
     return Volume(Place(UNKNOWN_VOLUME.place.parts, gap), MISSING, (near, far))
+
+
+@rows(("drain", "least", "most"), [
+    (MISSING, 0, 0),
+    (point(1_760), 1_760, 1_760),
+    (point(-5), 0, 0),
+    (point(MOST_DRAIN + 1), MOST_DRAIN, MOST_DRAIN),
+    (interval(600, 900), 600, 900),
+    (maybe(interval(600, 900)), 0, 900),
+])  # fmt: skip
+def test_what_is_taken_in_a_minute_counts_where_it_is_known(drain: Any, least: int, most: int) -> None:
+    assert drains(drain) == (least, most)
+
+
+def test_the_way_home_is_counted_with_the_measured_drain_where_that_is_worse() -> None:
+    """600 m at 12 m/s are 50 s: 463 of 18 min, 1,467 at 17.6 % a minute."""
+    assert ENERGY.way_home(600 * M, (0, 0)) == ENERGY.way_home(600 * M, (0, 0), 555) == 463
+    assert ENERGY.way_home(600 * M, (0, 0), 1_760) == 1_467
+
+
+@rows(("battery", "drain", "truth"), [
+    (point(500 + 1_000 + 463), MISSING, T),
+    (point(500 + 1_000 + 463), point(1_760), F),
+    (point(500 + 1_000 + 1_467), point(1_760), T),
+    (point(500 + 1_000 + 1_466), point(1_760), F),
+    (point(500 + 1_000 + 1_466), interval(100, 1_760), T | F),
+    (point(500 + 1_000 + 1_466), maybe(point(1_760)), T | F),
+    (point(500 + 1_000 + 462), maybe(point(1_760)), F),
+])  # fmt: skip
+def test_energy_over_sets_of_drains(battery: Any, drain: Any, truth: int) -> None:
+    assert ENERGY.suffices(battery, volume(600 * M, 600 * M), drain) == truth
 
 
 @rows(

@@ -123,6 +123,8 @@ def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     flight = "" if vehicle.flight is None else f", {quantity(vehicle.flight)} of flight at the worst"
     yield "Full charge", f"{quantity(vehicle.endurance)} of hovering{flight}"
     yield "Reserve", f"{quantity(vehicle.reserve)} of a full charge must be left after landing at home"
+    if vehicle.cells is not None:
+        yield "Battery", f"{vehicle.cells.value} cells in series"
     if vehicle.braking is not None:
         braking = vehicle.braking
         reaction, time = (display(each.value, Dimension.DURATION) for each in (braking.reaction, braking.time))

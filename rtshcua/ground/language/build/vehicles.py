@@ -12,6 +12,9 @@ from rtshcua.model.quantity import UNITS, Dimension
 
 FULL = 100 * UNITS["%"].numerator
 
+#: The most cells in series that a battery of a multirotor may have.
+MOST_CELLS = 48
+
 VEHICLE_PARTS = ("identity", "home", "speed", "climb", "position error", "energy", "reserve")
 
 
@@ -56,6 +59,13 @@ class Vehicles(Zones):
     def reserve(self, span: Span, charge: Quantity) -> Part:
         """`reserve 15 %`."""
         return Part("reserve", span, charge)
+
+    def cells(self, span: Span, count: Quantity) -> Part:
+        """`cells 4`."""
+        if not 1 <= count.value <= MOST_CELLS:
+            found = f"`{self._source.slice(count.span)}` cells in series, where 1 to {MOST_CELLS} are possible"
+            self.report(SYNTAX, found, count.span, "write it as in `cells 4`")
+        return Part("cells", span, count)
 
     def clock(self, span: Span, sign: str, offset: TimeOfDay) -> Part:
         """`clock utc +02:00`."""
@@ -135,6 +145,7 @@ class Vehicles(Zones):
                 acceleration=found["accelerates"].value if "accelerates" in found else None,
                 wind=found["wind"].value if "wind" in found else None,
                 flight=flight,
+                cells=found["cells"].value if "cells" in found else None,
             ),
             name,
         )

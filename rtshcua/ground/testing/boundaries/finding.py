@@ -9,6 +9,7 @@ from itertools import chain
 from typing import NamedTuple
 
 from rtshcua.decision import tree
+from rtshcua.decision.contracts import drains
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.testing.boundaries.limits import Limit, shows, tried, turns, with_made
 from rtshcua.ground.testing.boundaries.moments import in_time, moments
@@ -213,8 +214,9 @@ def _members(atom: tree.Member, part: Part, scene: Scene) -> Iterator[tuple[str,
 def _charge(part: Part, scene: Scene) -> Iterator[Limit]:
     """The charge that is needed from where the vehicle is."""
     invocation, slot = scene.invocation, scene.invocation.policy.policy.vehicle.battery
-    volume = invocation.planner.volume(scene.environment().slots, invocation.policy.tables.known)
-    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
+    slots, known = scene.environment().slots, invocation.policy.tables.known
+    volume = invocation.planner.volume(slots, known)
+    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2], drains(slots[known.drain])[1])
     found = None if slot == -1 else tried(part, scene, Variable(False, slot), needed - 1, needed)
     if found is not None:
         yield found

@@ -112,4 +112,4 @@ def truth(part: Part, scene: Scene) -> Truth:
         return EVERYWHERE[part.condition(ranging(at, volume, known.height, invocation.lasts_us))]
     if part.airspace is not None:
         return EVERYWHERE[part.airspace.keeps(volume.place, at, invocation.lasts_us)]
-    return EVERYWHERE[invocation.energy.suffices(at.slots[known.battery], volume)]
+    return EVERYWHERE[invocation.energy.suffices(at.slots[known.battery], volume, at.slots[known.drain])]

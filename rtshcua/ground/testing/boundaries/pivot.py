@@ -17,6 +17,8 @@ from rtshcua.ground.testing.boundaries.parts import Part
 from rtshcua.ground.testing.boundaries.scene import Made, Scene, Variable
 from rtshcua.model.flat.contract import PLACE
 from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.signal import Signal
+from rtshcua.model.quantity import Dimension
 
 #: conditions that are always, and never, true
 ALWAYS, NEVER = tree.AtMost((), 0), tree.AtMost((), -1)
@@ -24,6 +26,8 @@ ALWAYS, NEVER = tree.AtMost((), 0), tree.AtMost((), -1)
 _BUDGET = 400
 #: 100 m, 100 m/s: the largest number of a signal that is written without need
 _LARGEST = 100_000
+#: the largest raw value of a voltage, whose field holds 16 bits
+_MOST_RAW = 60_000
 #: the truth that a part must have for the steps after it to be reached
 _PASSED = {"forbid": FALSE, "permit": TRUE, "confirm": FALSE, "degrade": FALSE}
 
@@ -118,7 +122,7 @@ def settled(goals: Sequence[Goal], space: Space, scene: Scene) -> Made | None:
     preferred = dict(_present(scene))
     kept: dict[Variable, Value | tuple[Value, Value]] = {}
     space = space._replace(phases=frozenset({invocation.phase}), monitors=scene.state.monitors or space.monitors)
-    plain = _plain(space)
+    plain = _plain(space, scene.invocation.policy.policy.signals)
     answer = satisfiable(goals, plain, _BUDGET)
     if isinstance(answer, Yes):
         space = plain
@@ -139,12 +143,18 @@ def settled(goals: Sequence[Goal], space: Space, scene: Scene) -> Made | None:
     }
 
 
-def _plain(space: Space) -> Space:
+def _plain(space: Space, signals: Sequence[Signal]) -> Space:
     """The same without numbers that no vehicle reports."""
+    most = {
+        each.slot: min(_MOST_RAW * source.numerator // source.denominator for source in each.sources)
+        for each in signals
+        if each.dimension == Dimension.VOLTAGE.value and each.sources
+    }
     slots = (
-        (max(low, -_LARGEST), min(high, _LARGEST), gap, members) if members is None and high > _LARGEST else value
-        for value in space.slots
+        (max(low, -largest), min(high, largest), gap, members) if members is None and high > largest else value
+        for slot, value in enumerate(space.slots)
         for low, high, gap, members in (value,)
+        for largest in (most.get(slot, _LARGEST),)
     )
     where = {space.tables.known.x, space.tables.known.y}
     return space._replace(

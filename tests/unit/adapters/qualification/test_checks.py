@@ -185,6 +185,22 @@ def climbed(climb: int, mean: int) -> ObservedSortie:
     return ObservedSortie("climb", samples, [command], ending="completed", down=True)
 
 
+def test_a_climb_is_judged_by_the_speed_that_it_comes_to() -> None:
+    """A stock PX4 takes off at MPC_TKO_SPEED, 1.5 m/s, to which it comes slowly; over 3 m its mean is 0.9 m/s."""
+    tenth, height, samples = S // 10, 0, []
+    for at in range(50):
+        climb = min(1_500, 30 * at)
+        height += climb // 10
+        samples.append(Sample(at * tenth, 0, 0, height, 0, climb))
+    rising = [each for each in samples if each.climb >= 300]
+    passed = rising[-1].at_us - rising[0].at_us
+    assert (rising[-1].height - rising[0].height) * S // passed < 990
+    command = ObservedCommand(MotionKind.CLIMB, "takeoff", 0, 0, False, 0, 5 * S, "succeeded")
+    flown = ObservedSortie("climb", samples, [command], ending="completed", down=True)
+    found = checks(BRAKED, flown)["climb/speed"]
+    assert (found.outcome, found.measured) == (HELD, "1.2 m/s over 2 s, 1.5 m/s at the most")
+
+
 @pytest.mark.parametrize(
     ("climb", "mean", "outcome"),
     [(3_600, 990, HELD), (3_601, 2_000, FAILED), (1_000, 989, FAILED)],

@@ -24,7 +24,7 @@ CHECKOUT = Path(__file__).resolve().parents[4]
 MISSIONS = sorted(path.stem for path in (CHECKOUT / "missions").glob("*.rts"))
 AT = 1_700_000_000_000_000
 GOOD = {"battery": 9_500, "wind.speed": 1_000, "link.quality": 9_000, "obstacle.distance": 50_000, "gps.fix": 3}
-GOOD |= {"velocity.north": 0, "velocity.east": 0}
+GOOD |= {"battery.cell": 3_900, "velocity.north": 0, "velocity.east": 0}
 
 
 def flat(name: str) -> tuple[Policy, Mission]:

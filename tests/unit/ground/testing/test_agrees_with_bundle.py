@@ -29,6 +29,8 @@ PHASES = ("departure", "inspection", "recovery")
 #: of each signal the values that are worth a try: as they are written, and as they are kept
 VALUES: dict[str, list[tuple[str, int | tuple[int, int] | None]]] = {
     "battery": [(f"{n} %", n * 100) for n in (80, 80, 80, 41, 36, 35, 26, 24, 12)] + [("unknown", None)],
+    "battery.cell": [("3.9 V", 3_900), ("3.9 V", 3_900), ("3.5 V", 3_500), ("3.49 V", 3_490), ("unknown", None)],
+    "battery.drain": [("6 %", 600), ("17.6 %", 1_760), ("60 %", 6_000), ("unknown", None)],
     "gps.fix": [("fix_3d", 3), ("fix_3d", 3), ("dgps", 4), ("fix_2d", None)],
     "wind.speed": [(f"{n} m/s", n * 1000) for n in (2, 2, 3, 6, 7, 10, 12)],
     "link.quality": [(f"{n} %", n * 100) for n in (90, 90, 40, 39)],

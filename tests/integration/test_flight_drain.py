@@ -1,0 +1,86 @@
+"""A battery that is emptied much faster than its policy says: what is left on landing, by what really was."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.evidence.report import Verdict
+from virtual import case
+from virtual.flight import Flight, Flown
+from virtual.shipped import sealed, simulated
+
+SOURCE = """
+import "lib:skills/takeoff.rts"
+import "lib:skills/goto.rts"
+import "lib:skills/hover.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+
+vehicle quad {
+  identity "quad-07"  home 47.39774 N, 8.54559 E within 5 m
+  speed at most 12 m/s  climb at most 3 m/s  position error 3 m
+  energy 100 % = 18 min hover, 16 min flight  reserve 15 %
+  return at 30 m
+  without obstacle.distance, link.quality, wind.speed, battery.voltage WITHOUT
+}
+
+skill wait(duration: duration in 1 s .. 2 min) {
+  motion   hold for duration
+  class    tactical
+  deadline 5 s
+  valid    for 20 min
+  lasts    at most 140 s
+  fallback return_home, emergency_land
+  energy   at most 14 %
+}
+
+zone far = circle(47.39900 N, 8.54559 E, 40 m)  entry 47.39900 N, 8.54559 E
+
+policy patient version 1 {
+  permit  takeoff, goto, hover, wait, return_home, emergency_land by any
+  contingency return_home, emergency_land
+}
+
+mission flight under patient@1 on quad {
+  proposed by agent openclaw for role operator
+  phase departure { takeoff(altitude = 15 m) }
+  phase inspection {
+    goto(far.entry, altitude = 15 m)
+    wait(duration = 2 min)
+    wait(duration = 2 min)
+    return_home()
+  }
+}
+"""
+RESERVE = 1_500
+#: 17.6 % a minute, recorded from ArduCopter's simulation, where the policy says 6.3
+FAST_US = 60 * 10_000 * case.S // 1_760
+
+
+def flown(folder: Path, flavour: str, without: str, hover_us: int) -> Flown:
+    source = folder / f"{flavour}.rts"
+    source.write_text(SOURCE.replace("WITHOUT", without), encoding="utf-8")
+    found = Flight(sealed(source), simulated(flavour, battery=10_000, hover_us=hover_us)).fly()
+    assert found.audit().report.verdict is Verdict.VERIFIED, "its audit derives each decision from what is recorded"
+    assert not found.vehicle.simulation.truth().in_air
+    return found
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp_path: Path, flavour: str) -> None:
+    found = flown(tmp_path, flavour, "", FAST_US)
+    assert found.vehicle.simulation.truth().battery >= RESERVE
+    told = [str(each) for each in found.records if "the way home is counted with what was measured" in str(each)]
+    assert told, "the log says so"
+    assert any("the charge to come home" in str(each) or "way home" in str(each) for each in found.records)
+
+
+def test_without_the_measurement_it_is_not(tmp_path: Path) -> None:
+    """The same flight by what is declared alone: the vehicle without the signal, as a policy may say."""
+    assert flown(tmp_path, "ardupilot", ", battery.drain", FAST_US).vehicle.simulation.truth().battery < RESERVE
+
+
+def test_a_battery_that_is_as_declared_finishes_its_mission(tmp_path: Path) -> None:
+    found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S)
+    assert found.ending.name == "COMPLETED"
+    assert not any("counted with what was measured" in str(each) for each in found.records)

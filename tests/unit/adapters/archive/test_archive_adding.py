@@ -400,3 +400,24 @@ def test_an_archive_of_another_version_is_left_alone(folder: Folder) -> None:
 def test_an_archive_that_nothing_was_added_to_has_no_answer(folder: Folder) -> None:
     with pytest.raises(Untrusted, match="nothing was ever added"):
         Asker(folder)
+
+
+def test_a_witness_holds_both_flights_of_a_bundle_that_flew_twice(
+    take: Add, fleet: Path, folder: Folder, tmp_path: Path
+) -> None:
+    """What keeps used bundles was put back, which nobody aboard can tell. Each flight's log is sound and cosigned: side
+    by side they tell, and whoever has every key of the vehicle cannot write the first one anew without that flight.
+    """
+    logs = [tmp_path / str(number) / "log.jsonl" for number in range(2)]
+    for number, log in enumerate(logs):
+        log.parent.mkdir()
+        log.write_bytes((fleet / f"quad-07-{number}.jsonl").read_bytes())
+        log.with_name("ground.anchors").write_text(anchored(log, case.KEYS[Duty.WITNESS]) + "\n")
+    first, second = take(logs)
+    assert {first.entry.status, second.entry.status} == {"verified"}
+    assert question(folder, "unanchored") == []
+    ((vehicle, _, digest, *_),) = question(folder, "twice")
+    assert (vehicle, digest) == ("quad-07", first.entry.bundle_digest)
+    generated_logs.write(logs[0], "quad-07", 0, records=2)  # of the same boot, and nothing was sent
+    (anew,) = take([logs[0]])
+    assert (anew.entry.status, anew.entry.finding) == ("failed", "anchor/beyond")

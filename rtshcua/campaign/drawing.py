@@ -55,7 +55,13 @@ GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
     (11, (faults.GpsLoss, faults.GpsJump, faults.GpsDrift, faults.GpsGlitch)),
     (11, (faults.WindStep, faults.BatteryLevel, faults.BatteryCell, faults.BatteryVoltage)),
     (7, (faults.Obstacle, faults.Pillar)),
-    (12, (faults.PilotMode, faults.PilotPause, faults.PilotGoto, faults.PilotSticks, faults.Kill)),
+    (
+        12,
+        (
+            faults.PilotMode, faults.PilotPause, faults.PilotGoto, faults.PilotVelocity, faults.PilotSpeed,
+            faults.PilotSticks, faults.Kill,
+        ),
+    ),
     (
         12,
         (
@@ -117,6 +123,9 @@ RANGES: Final[Mapping[tuple[type[Fault] | None, str], Range]] = {
     (faults.GpsJump, "east_mm"): Range(-15_000, 15_000, 500),
     (faults.GpsGlitch, "north_mm"): Range(-40_000, 40_000, 1_000),
     (faults.GpsGlitch, "east_mm"): Range(-40_000, 40_000, 1_000),
+    (faults.PilotVelocity, "north_mm_s"): Range(-4_000, 4_000, 500),
+    (faults.PilotVelocity, "east_mm_s"): Range(-4_000, 4_000, 500),
+    (faults.PilotSpeed, "speed_mm_s"): Range(500, 10_000, 500),
     (faults.Pillar, "speed_mm_s"): Range(0, 2_000, 500),
     (faults.RuntimeKilled, "for_us"): Range(500_000, 20 * S, 500_000, by_ratio=True),
     (faults.HostStall, "for_us"): Range(100_000, 8 * S, 100_000, by_ratio=True),

@@ -339,6 +339,25 @@ class PilotGoto(PilotFault):
 
 
 @dataclass(frozen=True, slots=True)
+class PilotVelocity(PilotFault):
+    """The pilot steers it from a ground station, by velocities ten times a second for a while; the mode stays.
+
+    ArduCopter obeys in GUIDED, and names no target from then on; PX4 would in OFFBOARD only, and does not mind.
+    """
+
+    north_mm_s: int
+    east_mm_s: int
+    for_us: int = 4_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class PilotSpeed(PilotFault):
+    """The pilot has it fly at another speed from a ground station (DO_CHANGE_SPEED): it goes where it goes."""
+
+    speed_mm_s: int
+
+
+@dataclass(frozen=True, slots=True)
 class PilotSticks(PilotFault):
     """The pilot moves the sticks of the remote control for a while, to steer it east.
 
@@ -457,6 +476,8 @@ KINDS: Mapping[str, type[Fault]] = {
     "pilot-mode": PilotMode,
     "pilot-pause": PilotPause,
     "pilot-goto": PilotGoto,
+    "pilot-velocity": PilotVelocity,
+    "pilot-speed": PilotSpeed,
     "pilot-sticks": PilotSticks,
     "kill": Kill,
     "reboot": Reboot,

@@ -9,7 +9,7 @@ from functools import partial
 from math import sin
 from random import Random
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -33,7 +33,7 @@ from rtshcua.simulation.signing import VehicleSigning
 from rtshcua.simulation.streams import Reports, Streams
 from rtshcua.simulation.surroundings import Air, Surroundings
 from rtshcua.simulation.transfer import Transfer, TransferRules
-from rtshcua.simulation.vehicle import Event, Vehicle
+from rtshcua.simulation.vehicle import Event, Landed, Vehicle
 
 if TYPE_CHECKING:
     from rtshcua.simulation.voices import SecondVoice
@@ -64,6 +64,14 @@ class Taker(StrEnum):
 
     PILOT = "pilot"
     FAILSAFE = "failsafe"
+
+
+class Status(NamedTuple):
+    """What an autopilot's reports tell of what it is about."""
+
+    mode: Mode
+    landed: Landed
+    destination: Point | None
 
 
 class Flavour(ABC):
@@ -103,6 +111,8 @@ class Flavour(ABC):
     """How a text begins that says what stands against arming, when only asked."""
     falls_back: bool
     """Whether a switch that asks for Position without a position gets Altitude, and is not refused."""
+    status_lag_us: tuple[int, int] = (0, 0)
+    """How long after it entered a mode its reports go on telling of the one before: from, to."""
     beats_on_mode: bool
     """Whether another mode is told by a heartbeat at once."""
     reminds: bool
@@ -160,6 +170,12 @@ class Flavour(ABC):
     def on_data_stream(self, a: "Autopilot", stream: int, rate_hz: int) -> None:  # noqa: B027
         """Obeys REQUEST_DATA_STREAM: (stream, rate in Hz, 0 to stop). PX4 does not know it; its streams run unasked."""
 
+    def on_local_target(self, a: "Autopilot", message: Message) -> None:  # noqa: B027
+        """Obeys SET_POSITION_TARGET_LOCAL_NED, or does not; PX4, in OFFBOARD only, is not simulated to."""
+
+    def on_entered(self, a: "Autopilot") -> None:  # noqa: B027
+        """Another mode than before, whoever chose it."""
+
     def on_plan(self, a: "Autopilot", kind: int) -> None:  # noqa: B027
         """Tells of a plan of this kind (MAV_MISSION_TYPE) that was stored."""
 
@@ -213,6 +229,8 @@ class Autopilot:
             late=config.estimate is Estimate.REAL, strays=config.noise and config.estimate is Estimate.REAL,
         )  # fmt: skip
         self._phases = Random(f"{config.seed} phases") if config.answers is Answers.RECORDED else None
+        self._lags = Random(f"{config.seed} lags") if config.answers is Answers.RECORDED else None
+        self._lag_us = flavour.status_lag_us if config.mode_lag_us is None else (config.mode_lag_us,) * 2
         self.surroundings = Surroundings()
         handling = replace(
             flavour.handling, cruise=config.cruise_mm_s / 1000, max_speed=config.max_speed_mm_s / 1000,
@@ -241,6 +259,8 @@ class Autopilot:
         self.ground_station_seen = False
         self._wind: tuple[float, float] | None = None
         self.last_target_us: int | None = None
+        #: what a DO_REPOSITION named that changes no mode, and until when whoever enters Hold flies to it (PX4)
+        self.kept: tuple[int, Command] | None = None
         self._boot_texts = deque(() if self._fast else flavour.boot.texts)
         self.failsafes = Failsafes(
             flavour.failsafes, self.vehicle, self.sensors, self.battery, self.parameters.value, self.say,
@@ -257,6 +277,8 @@ class Autopilot:
         #: when it acts on what made it hold, and how; nothing if somebody enters another mode before
         self.delayed: tuple[int, Mode] | None = None
         self._told_mode = self.vehicle.mode
+        self._status = self._present
+        self._published: deque[tuple[int, Status]] = deque()  # until when its reports still tell of what was so
         self._remind_us = _REMIND_US
         self._text_id = 0
 
@@ -268,6 +290,8 @@ class Autopilot:
             self._stay_off()
             return
         self.now_us += TICK_US
+        self.since_us = 0
+        self.follow_mode()
         air, sensors, vehicle, battery = self.air, self.sensors, self.vehicle, self.battery
         if air.gusts:
             air.step(_TICK_S)
@@ -285,6 +309,7 @@ class Autopilot:
         self._follow_plans()
         if self._boot_texts:
             self._tell_of_boot()
+        self.follow_mode()
         if vehicle.events or vehicle.mode is not self._told_mode:
             self._tell()
         if self.flavour.reminds:
@@ -431,6 +456,32 @@ class Autopilot:
         self.take_over(Taker.FAILSAFE, partial(self.vehicle.set_mode, mode))
 
     # ---------------------------------------------------------------------------------------------- state
+
+    @property
+    def _present(self) -> Status:
+        vehicle = self.vehicle
+        return Status(vehicle.mode, vehicle.landed, vehicle.destination)
+
+    def follow_mode(self) -> None:
+        """Notices another mode: what it is in shows in its reports some time after it entered it, as recorded."""
+        vehicle, before = self.vehicle, self._status
+        if vehicle.mode is not before.mode:
+            shortest_us, longest_us = self._lag_us
+            if longest_us:
+                lag_us = longest_us if self._lags is None else self._lags.randint(shortest_us, longest_us)
+                self._published.append((self.now_us + self.since_us + lag_us, before))
+            self.flavour.on_entered(self)
+        is_new = vehicle.mode is not before.mode or vehicle.landed is not before.landed
+        if is_new or vehicle.destination is not before.destination:
+            self._status = self._present
+
+    @property
+    def shown(self) -> Status:
+        """What its reports tell now."""
+        published, now_us = self._published, self.now_us + self.since_us
+        while published and now_us >= published[0][0]:
+            published.popleft()
+        return published[0][1] if published else self._present
 
     @property
     def ready(self) -> bool:

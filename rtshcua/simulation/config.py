@@ -111,6 +111,8 @@ class SimulationConfig:
     """Whether sensors have any; without it what is believed does not stray either."""
     estimate: Estimate = Estimate.CLOSE
     answers: Answers = Answers.AT_ONCE
+    mode_lag_us: int | None = None
+    """How long after it entered a mode its reports tell of the one before; None: as recorded of the flavour."""
     boot: Boot = Boot.FAST
     parameters: tuple[tuple[str, float], ...] = ()
     """What its owner has set: names of parameters that the flavour has, and their values."""

@@ -25,6 +25,10 @@ Effect = tuple[int, Callable[[], object]]
 _STATION = (255, 190)
 _EVERY_US = 100_000
 """How often the position of the sticks is looked at."""
+_STEERED_US = 100_000
+"""How often a ground station commands a velocity that it steers by, as recorded;"""
+_VELOCITY_ALONE = 0x0DC7
+"""and its `type_mask`."""
 SHUFFLED_US = 200_000
 """How long after a stall messages wait to be shuffled."""
 
@@ -175,6 +179,11 @@ def _pilots(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
             yield at_us, partial(_pause, a)
         case faults.PilotGoto(at_us, north_mm, east_mm, up_mm):
             yield at_us, partial(_send_to, a, north_mm, east_mm, up_mm)
+        case faults.PilotVelocity(at_us, north_mm_s, east_mm_s, for_us):
+            for after_us in range(0, for_us, _STEERED_US):
+                yield at_us + after_us, partial(_steer, a, north_mm_s / 1000, east_mm_s / 1000)
+        case faults.PilotSpeed(at_us, speed_mm_s):
+            yield at_us, partial(_change_speed, a, speed_mm_s / 1000)
         case faults.PilotSticks(at_us, for_us):
             for after_us in range(0, for_us, _EVERY_US):
                 yield at_us + after_us, partial(a.flavour.on_sticks, a, _EVERY_US)
@@ -204,6 +213,19 @@ def _send_to(a: Autopilot, north_mm: int, east_mm: int, up_mm: int) -> None:
     latitude, longitude = a.home.globe(north_mm / 1000, east_mm / 1000)
     amsl = (a.home.amsl_mm + up_mm) / 1000
     _command(a, mavlink.MAV_CMD_DO_REPOSITION, -1.0, float(latitude), float(longitude), amsl)
+
+
+def _steer(a: Autopilot, north_m_s: float, east_m_s: float) -> None:
+    message = mavlink.MAVLink_set_position_target_local_ned_message(
+        0, a.system, 1, mavlink.MAV_FRAME_LOCAL_NED, _VELOCITY_ALONE, 0, 0, 0, north_m_s, east_m_s, 0, 0, 0, 0, 0, 0
+    )
+    a.flavour.on_local_target(a, message)
+
+
+def _change_speed(a: Autopilot, speed_m_s: float) -> None:
+    a.flavour.commands[mavlink.MAV_CMD_DO_CHANGE_SPEED](
+        a, Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed_m_s, -1.0, 0.0, None, None, 0.0, None, _STATION)
+    )
 
 
 def _command(

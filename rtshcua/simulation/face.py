@@ -56,6 +56,7 @@ class Face:
         if self._autopilot.off_us:
             return []
         _HANDLERS[received.name](self._autopilot, received)
+        self._autopilot.follow_mode()
         self._autopilot.tell_mode()
         return self._collect()
 
@@ -122,6 +123,10 @@ def _acknowledge(a: Autopilot, received: Received, command: int, results: tuple[
 
 def _position_target(a: Autopilot, received: Received) -> None:
     a.flavour.on_position_target(a, received.message)
+
+
+def _local_target(a: Autopilot, received: Received) -> None:
+    a.flavour.on_local_target(a, received.message)
 
 
 def _data_stream(a: Autopilot, received: Received) -> None:
@@ -202,6 +207,7 @@ _HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
     "COMMAND_INT": _command,
     "SET_MODE": _set_mode,
     "SET_POSITION_TARGET_GLOBAL_INT": _position_target,
+    "SET_POSITION_TARGET_LOCAL_NED": _local_target,
     "REQUEST_DATA_STREAM": _data_stream,
     "PARAM_REQUEST_READ": _param_read,
     "PARAM_REQUEST_LIST": _param_list,

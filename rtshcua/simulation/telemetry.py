@@ -53,9 +53,9 @@ _CAPABILITIES = (
 
 def heartbeat(a: Autopilot) -> Message:
     """HEARTBEAT: mode, armed or not, and state."""
-    vehicle, modes = a.vehicle, a.flavour.modes
-    base = modes.base[vehicle.mode] | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0)
-    if vehicle.blind and vehicle.mode is Mode.LAND:
+    vehicle, modes, mode = a.vehicle, a.flavour.modes, a.shown.mode
+    base = modes.base[mode] | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0)
+    if vehicle.blind and mode is Mode.LAND:
         base &= ~modes.blind
     active = vehicle.armed and (vehicle.in_air or not modes.stands_by)
     booting = a.sensors.booting
@@ -65,7 +65,7 @@ def heartbeat(a: Autopilot) -> Message:
         status = mavlink.MAV_STATE_CRITICAL
     else:
         status = mavlink.MAV_STATE_ACTIVE if active else mavlink.MAV_STATE_STANDBY
-    return _HEARTBEAT(mavlink.MAV_TYPE_QUADROTOR, a.flavour.autopilot, base, modes.numbers[vehicle.mode], status, 3)
+    return _HEARTBEAT(mavlink.MAV_TYPE_QUADROTOR, a.flavour.autopilot, base, modes.numbers[mode], status, 3)
 
 
 def _in_danger(a: Autopilot) -> bool:
@@ -266,7 +266,7 @@ def radio_status(a: Autopilot) -> Message:
 
 def extended_sys_state(vtol: int) -> Builder:
     """EXTENDED_SYS_STATE; `vtol` is its `vtol_state`."""
-    return lambda a: _EXTENDED_SYS_STATE(vtol, a.vehicle.landed)
+    return lambda a: _EXTENDED_SYS_STATE(vtol, a.shown.landed)
 
 
 def autopilot_version(capabilities: int, kind: int, numbered: int) -> Builder:
@@ -341,7 +341,7 @@ def available_modes(a: Autopilot, number: int) -> bool:
 
 def current_mode(a: Autopilot) -> Message:
     """CURRENT_MODE."""
-    mode = a.vehicle.mode
+    mode = a.shown.mode
     number = a.flavour.modes.numbers[mode]
     payload = _CURRENT_MODE_LAYOUT.pack(number, number, _STANDARD.get(mode, 0))
     return _CurrentMode(payload)

@@ -41,7 +41,9 @@ class Event(Enum):
 
 
 class Activity(Enum):
-    """What it does at present; `REST` is to stand on the ground, `TOUCHED` not to know it yet, `WRECK` to lie there."""
+    """What it does at present; `REST` is to stand on the ground, `TOUCHED` not to know it yet, `WRECK` to lie there,
+    `CRUISE` to fly at a velocity that somebody commands.
+    """
 
     REST = auto()
     CLIMB = auto()
@@ -54,19 +56,22 @@ class Activity(Enum):
     TOUCHED = auto()
     FALL = auto()
     WRECK = auto()
+    CRUISE = auto()
 
 
 # bound once, for an enumeration's attributes are slow to find and a step looks at many
 _REST, _CLIMB, _TRACK, _RETURN_CLIMB, _RETURN_CROSS, _RETURN_WAIT = tuple(Activity)[:6]
-_CIRCLE, _DESCEND, _TOUCHED, _FALL, _WRECK = tuple(Activity)[6:]
+_CIRCLE, _DESCEND, _TOUCHED, _FALL, _WRECK, _CRUISE = tuple(Activity)[6:]
 
 _RETURN = Mode.RETURN
 
 _FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
 
 _DOWN = (_REST, _TOUCHED, _WRECK)
-_STEADY = (_TRACK, _DESCEND, _CIRCLE)
+_STEADY = (_TRACK, _DESCEND, _CIRCLE, _CRUISE)
 """Activities that go on until something else is asked for, or the ground comes."""
+_VELOCITY_S = 3.0
+"""A velocity that is not commanded again holds for so long (GUID_TIMEOUT); then it stands."""
 _HARD_M_S = 4.0
 """Who comes down faster than this breaks."""
 
@@ -106,6 +111,7 @@ class Vehicle:
         self._waiting_s = 0.0
         self._nose: float | None = None
         self._radius = 0.0
+        self._velocity = (0.0, 0.0, 0.0)
         self._past: guidance.Past | None = None
         self._comes_back = False  # from behind its target
         self._steer_to_target()
@@ -253,9 +259,8 @@ class Vehicle:
     def pause(self) -> None:
         """Stops on its way; the target stays what it is, and so does one that comes meanwhile, until `go_on`."""
         if self.flies and not self.paused:
-            destination, sent = self.destination, self.sent
-            self._hold()
-            self.destination, self.sent, self.paused = destination, sent, True
+            self._cruise(0.0, 0.0, 0.0)
+            self.paused = True
 
     def go_on(self) -> None:
         """Goes on to the target after a pause."""
@@ -317,6 +322,20 @@ class Vehicle:
             self.landed = Landed.IN_AIR
         elif self.armed and not self.in_air and self.handling.lifts_to_targets and target.up > self.body.up:
             self._lift(target)
+
+    def fly_at(self, north: float, east: float, up: float) -> None:
+        """Flies at a velocity, for a while after it was last told to, and then stands; it names no target."""
+        if self.flies:
+            self.destination, self.sent, self._nose = None, False, None
+            if self.paused:
+                return
+            self._cruise(north, east, up)
+
+    def _cruise(self, north: float, east: float, up: float) -> None:
+        self._past, self._comes_back = None, False
+        self._hardest = self.handling.acceleration
+        self._activity, self._velocity, self._waiting_s = _CRUISE, (north, east, up), _VELOCITY_S
+        self.landed = Landed.IN_AIR
 
     def shift_east(self, metres: float) -> None:
         """Moves the place that it holds, or lands at."""
@@ -412,7 +431,9 @@ class Vehicle:
             else:
                 north, east = north + past.north, east + past.east
         speed = self.speed
-        if activity is _CIRCLE:
+        if activity is _CRUISE:
+            want = self._velocity[:2] if self._waiting_s > 0 else (0.0, 0.0)
+        elif activity is _CIRCLE:
             want = guidance.around(body, north, east, self._radius, speed)
         else:
             if self._comes_back:
@@ -456,6 +477,8 @@ class Vehicle:
     def _climb_rate(self, north: float, east: float) -> float:
         """Upwards; (north, east) is the target as it is steered to."""
         activity, body = self._activity, self.body
+        if activity is _CRUISE:
+            return self._velocity[2] if self._waiting_s > 0 else 0.0
         if activity is _DESCEND:
             return 0.0 if self._waiting_s > 0 else guidance.landing_rate(body, self.handling)
         up = self.target.up

@@ -98,6 +98,10 @@ def _may_enter(items: tuple[Item, ...], vehicle: Vehicle) -> bool:
     return not on_ground or next((item.command for item in items[1:] if item.command in _NAMES), None) == plans.TAKEOFF
 
 
+_PLACE, _VELOCITY = 0b111, 0b111_000
+"""Bits of `type_mask` that say that a place, or a velocity, does not count."""
+
+
 class ArduCopter(Flavour):
     """ArduCopter."""
 
@@ -256,15 +260,28 @@ class ArduCopter(Flavour):
         return enter_number(a, number)
 
     def on_position_target(self, a: Autopilot, message: Message) -> None:
-        """Flown to in GUIDED and in the air, ignored in silence else.
-
-        Targets of velocity alone are ignored too: this vehicle does not fly them.
-        """
+        """Flown to in GUIDED and in the air, ignored in silence else; so is a velocity without a place."""
+        self._fly_at(a, message)
         up = above_home(a, message.coordinate_frame, message.alt)
         if a.vehicle.mode is Mode.GUIDED and up is not None and not message.type_mask & 0b111:
             target = Point(*a.home.local(message.lat_int, message.lon_int), up)
             if a.fence.allows(target):
                 a.vehicle.go_to(target)
+
+    def on_local_target(self, a: Autopilot, message: Message) -> None:
+        """The same, from home in metres, north, east and down."""
+        self._fly_at(a, message)
+        if message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED and not message.type_mask & 0b111:
+            target = Point(message.x, message.y, -message.z)
+            if a.vehicle.mode is Mode.GUIDED and a.fence.allows(target):
+                a.vehicle.go_to(target)
+
+    @staticmethod
+    def _fly_at(a: Autopilot, message: Message) -> None:
+        """At a velocity, where it names no place (ArduCopter: `handle_message_set_position_target_local_ned`)."""
+        mask = message.type_mask
+        if a.vehicle.mode is Mode.GUIDED and mask & _PLACE == _PLACE and not mask & _VELOCITY:
+            a.vehicle.fly_at(message.vx, message.vy, -message.vz)
 
     def on_data_stream(self, a: Autopilot, stream: int, rate_hz: int) -> None:
         """Sets every message of the group, whatever SET_MESSAGE_INTERVAL said before."""

@@ -17,6 +17,10 @@ _STREAM_US = 500_000
 _AUTO, _ = Px4Mode.HOLD.parameters
 _ORBIT_M = 10.0
 """The radius of an orbit that names none."""
+_ANSWERS_BY_MODE = 1, 18
+"""The first release that answers a DO_REPOSITION without its flag for what it does."""
+_KEPT_US = 500_000
+"""How long what it named is good for, for whoever enters Hold (`Loiter::on_activation`)."""
 
 
 def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
@@ -48,24 +52,44 @@ def _target(a: Autopilot, command: Command) -> Point:
 def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
     """As `Navigator::run` and `Commander::handle_command` of v1.16 do it. The ACK is for the mode alone.
 
-    Without a place it keeps the target it has, at the height that is given, or here; without a place, a height and a
-    heading it stops ("pause").
+    Without the flag that changes the mode the commander does not know it, but the navigator keeps what it named for
+    half a second, and Hold flies to it (`Loiter::on_active`; recorded: answered 3, target and motion follow). From 1.18
+    it is answered for what it does (PX4-Autopilot pull request 27563).
     """
-    if whole(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE == 0:
-        return (UNSUPPORTED,)
+    vehicle, changes = a.vehicle, bool(whole(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+    if not changes and vehicle.mode is not Mode.LOITER:
+        if vehicle.armed and a.release < _ANSWERS_BY_MODE:
+            a.kept = a.now_us + a.since_us + _KEPT_US, command
+        return (UNSUPPORTED if a.release < _ANSWERS_BY_MODE else TEMPORARILY_REJECTED,)
     if not a.can_enter(Mode.LOITER):
         return (TEMPORARILY_REJECTED,)
-    vehicle = a.vehicle
     kept, taking_off = vehicle.destination, vehicle.mode is Mode.TAKEOFF
     vehicle.set_mode(Mode.LOITER)
+    result = (ACCEPTED if changes or a.release >= _ANSWERS_BY_MODE else UNSUPPORTED,)
     if not vehicle.in_air:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Reposition ignored: not flying")
-        return (ACCEPTED,)
+        return result
+    _fly(a, command, kept, taking_off=taking_off)
+    return result
+
+
+def fly_kept(a: Autopilot) -> None:
+    """In Hold now: to what was named without the flag that changes the mode, if that is not too long ago."""
+    kept, a.kept = a.kept, None
+    if kept is not None and a.vehicle.mode is Mode.LOITER and a.now_us + a.since_us < kept[0]:
+        _fly(a, kept[1], a.vehicle.destination, taking_off=False)
+
+
+def _fly(a: Autopilot, command: Command, kept: Point | None, *, taking_off: bool) -> None:
+    """Fly to what the command names. Without a place, keep the target it has (`kept`), at the height that is given, or
+    here; without a place, a height and a heading, stop ("pause").
+    """
+    vehicle = a.vehicle
     target = _target(a, command)  # without a place, the fence is asked about its own
     placed, raised = None not in (command.latitude, command.longitude), isfinite(command.altitude)
     if not a.fence.allows(target):
         a.say(mavlink.MAV_SEVERITY_CRITICAL, "Reposition is outside geofence\t")
-        return (ACCEPTED,)
+        return
     if command.p1 > 0:
         vehicle.speed = command.p1
     if not placed and not raised and not isfinite(command.p4):
@@ -73,13 +97,12 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
             vehicle.go_to(target)
         else:
             vehicle.hold()
-        return (ACCEPTED,)
+        return
     if not placed and kept is not None:
         target = Point(kept.north, kept.east, target.up)
     vehicle.go_to(target)
     if isfinite(command.p4):
         vehicle.turn_to(command.p4)
-    return (ACCEPTED,)
 
 
 def _change_altitude(a: Autopilot, command: Command) -> tuple[int, ...]:

@@ -22,7 +22,7 @@ from rtshcua.simulation.mission import MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.place import Home, Point
 from rtshcua.simulation.plans import AMSL_FRAMES, FENCE_ITEMS, NAVIGATION, RELATIVE_FRAMES, RETURN_POINT, Item
-from rtshcua.simulation.px4.commands import COMMANDS, enter_number
+from rtshcua.simulation.px4.commands import COMMANDS, enter_number, fly_kept
 from rtshcua.simulation.px4.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.px4.telemetry import BUILDERS, CONSTANT, DEFAULT, LEAST_US, ONLY_STREAMED
 from rtshcua.simulation.sensors import BootPlan
@@ -155,6 +155,7 @@ class Px4(Flavour):
     texts_need_ground_station = True
     check_text = "Preflight Fail"
     falls_back = True
+    status_lag_us = 10_000, 15_000
     beats_on_mode = reminds = tells_fence = False
     fix = mavlink.GPS_FIX_TYPE_3D_FIX
     coast_s = 5.0
@@ -225,6 +226,10 @@ class Px4(Flavour):
             a.say(_CRITICAL, "MAVLink signing: rejected while armed\t")
         else:
             a.signing.set_up(message, a.now_us)
+
+    def on_entered(self, a: Autopilot) -> None:
+        """Hold flies to what a DO_REPOSITION named within the half second before."""
+        fly_kept(a)
 
     def on_set_mode(self, a: Autopilot, number: int) -> tuple[int, ...]:
         """Obeyed, if it can be, and never acknowledged."""

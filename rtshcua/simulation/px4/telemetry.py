@@ -31,12 +31,11 @@ def _position_target(a: Autopilot) -> Message | None:
 
     As recorded from v1.16: altitude above the sea, and 0 in Land; all fields of the mask are valid.
     """
-    vehicle = a.vehicle
-    target = vehicle.destination
-    if target is None or vehicle.mode not in _NAVIGATED or not vehicle.armed:
+    vehicle, (mode, _, target) = a.vehicle, a.shown
+    if target is None or mode not in _NAVIGATED or not vehicle.armed:
         return None
     latitude, longitude = a.home.globe(target.north, target.east)
-    amsl = 0.0 if vehicle.mode is Mode.LAND else a.home.amsl_mm / 1000 + target.up
+    amsl = 0.0 if mode is Mode.LAND else a.home.amsl_mm / 1000 + target.up
     body = vehicle.body
     velocity = (body.v_north, body.v_east, -body.v_up)
     return _POSITION_TARGET_GLOBAL_INT(

@@ -250,7 +250,7 @@ REFUSED: list[tuple[str, int, MotionKind, Any]] = [
     ("and where a heading is", PX4, K.HOLD, reposition(**NOWHERE | {"param4": 1.0})),
     ("one coordinate is a place", PX4, K.HOLD, reposition(**NOWHERE | {"x": GEO[0]})),
     ("a stop has no speed", PX4, K.HOLD, reposition(**NOWHERE | {"param1": 4.0})),
-    ("a stop stops in Hold", PX4, K.HOLD, reposition(**NOWHERE | {"param2": 0})),
+    ("a stop has no other flag", PX4, K.HOLD, reposition(**NOWHERE | {"param2": 2})),
     ("a place is no stop", PX4, K.HOLD, reposition()),
     ("nor is the mode, to PX4", PX4, K.HOLD, long(176, 1, 4, 3)),
     ("a stop is no leg", PX4, K.FLY, reposition(**NOWHERE)),

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from recorded.trace import SECOND, Trace
 from rtshcua.model.faults import Mode
 
 
@@ -171,6 +172,67 @@ def test_a_pause_keeps_mode_and_target_and_what_comes_meanwhile(flying: Any) -> 
     assert flying.long(193, 1) == [0]
     flying.wait(5)
     assert flying.truth.east_mm > 5_000
+
+
+def speeds(name: str) -> dict[float, int]:
+    """Recorded speeds to the north, in cm/s, by the seconds after the fastest one, which the pilot ended."""
+    reports = [h for h in Trace(name, wall=True).of_vehicle if h.name == "GLOBAL_POSITION_INT"]
+    since_us = max(reports, key=lambda each: int(each.message.vx)).at_us
+    return {(h.at_us - since_us) / SECOND: h.message.vx for h in reports}
+
+
+def steer(pilot: Any, north_m_s: float) -> list[Any]:
+    velocity = (0, 1, 1, 1, 0x0DC7, 0, 0, 0, north_m_s, 0, 0, 0, 0, 0, 0, 0)
+    received: list[Any] = pilot.send(mavlink.MAVLink_set_position_target_local_ned_message(*velocity))
+    return received
+
+
+def leg_at_5_6_m_s(flying: Any) -> None:
+    for message in (33, 87):
+        flying.long(511, message, 100_000)
+    flying.go_to(250, 0, 10)
+    flying.wait(1)
+    flying.long(178, 1, 5.6, -1)
+    flying.wait(5)
+    assert flying.truth.speed_mm_s == pytest.approx(5_600, abs=200)
+
+
+@pytest.mark.parametrize("name", ["arducopter-velocity-takeover", "arducopter-pause-takeover"])
+def test_a_velocity_or_a_pause_in_a_leg_does_what_was_recorded(flying: Any, name: str) -> None:
+    """From 5.6 m/s. The mode stays; on a velocity no target is told any more, on a pause the same one is."""
+    leg_at_5_6_m_s(flying)
+    real, told, velocity = speeds(name), [], "velocity" in name
+    for tenth in range(70):
+        if velocity and tenth < 40:
+            steer(flying, -3)
+        elif not velocity and tenth == 0:
+            assert flying.long(193, 0) == [0]
+        told += [f for f in flying.wait(0.1) if f.name == "POSITION_TARGET_GLOBAL_INT"]
+        seconds = (tenth + 1) / 10
+        then = real[min(real, key=lambda at, seconds=seconds: abs(at - seconds))]
+        assert flying.last("GLOBAL_POSITION_INT").vx == pytest.approx(then, abs=120 if velocity else 75), seconds
+    assert flying.last("HEARTBEAT").custom_mode == 4
+    assert len(told) == (0 if velocity else 70)
+
+
+def test_a_velocity_that_is_not_commanded_again_ends_in_standing(flying: Any) -> None:
+    """GUID_TIMEOUT: 3 s after the last. In another mode than GUIDED nobody minds it."""
+    flying.mode(Mode.BRAKE)
+    steer(flying, 3)
+    flying.wait(2)
+    assert flying.truth.speed_mm_s < 100
+    flying.mode(Mode.GUIDED)
+    steer(flying, 3)
+    flying.wait(2.5)
+    assert flying.truth.speed_mm_s > 2_500
+    flying.wait(4)
+    assert flying.truth.speed_mm_s < 150
+
+
+def test_a_place_from_home_is_flown_to(flying: Any) -> None:
+    flying.send(mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x0DF8, 20, 5, -12, *[0.0] * 8))
+    flying.wait(15)
+    assert (flying.truth.north_mm, flying.truth.east_mm) == pytest.approx((20_000, 5_000), abs=500)
 
 
 def test_targets_are_told_where_the_mode_has_one(copter: Any) -> None:

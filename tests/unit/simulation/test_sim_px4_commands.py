@@ -138,11 +138,54 @@ def test_in_the_air(flying: Any) -> None:
     assert flying.truth.armed
 
 
-def test_reposition_needs_its_flag(flying: Any) -> None:
+def unflagged(flying: Any) -> list[int]:
+    """Sent 20 m north by DO_REPOSITION without the flag that changes the mode."""
     latitude, longitude = flying.config.home.globe(20, 0)
-    assert flying.int(192, 5, [-1, 0, 0, nan], latitude, longitude, AMSL + 10) == [3]
-    flying.wait(5)
-    assert abs(flying.truth.north_mm) < 500
+    answers: list[int] = flying.int(192, 5, [-1, 0, 0, nan], latitude, longitude, AMSL + 10)
+    return answers
+
+
+def test_reposition_without_its_flag_is_not_known_and_flown_in_hold(flying: Any) -> None:
+    """Recorded: answered 3, the target follows at once, and then the vehicle does."""
+    assert unflagged(flying) == [3]
+    flying.wait(0.3)
+    assert targets(flying.wait(0.3))[-1].lat_int == pytest.approx(flying.config.home.globe(20, 0)[0], abs=2)
+    flying.wait(8)
+    assert flying.truth.north_mm == pytest.approx(20_000, abs=1_000)
+
+
+@pytest.mark.parametrize("mode", [Mode.LAND, Mode.RETURN, Mode.POSITION, Mode.TAKEOFF])
+def test_reposition_without_its_flag_changes_no_mode(flying: Any, mode: Mode) -> None:
+    """`Loiter::on_active` alone looks at it, and for half a second at most."""
+    if mode is Mode.TAKEOFF:
+        flying.long(22, 0, 0, 0, nan, nan, nan, AMSL + 30)
+    else:
+        flying.mode(mode)
+    assert unflagged(flying) == [3]
+    flying.wait(1)
+    assert flying.truth.mode is mode
+    flying.mode(Mode.LOITER)
+    flying.wait(8)
+    assert abs(flying.truth.north_mm) < 1_000
+
+
+def test_hold_within_half_a_second_flies_to_what_was_named_before(flying: Any) -> None:
+    flying.mode(Mode.LAND)
+    unflagged(flying)
+    flying.wait(0.3)
+    flying.mode(Mode.LOITER)
+    flying.wait(8)
+    assert flying.truth.north_mm == pytest.approx(20_000, abs=1_000)
+
+
+def test_a_later_release_answers_a_reposition_without_its_flag_for_what_it_does(pilot: Callable[..., Any]) -> None:
+    flying = pilot("px4", release=(1, 18)).ready()
+    flying.take_off(10)
+    assert unflagged(flying) == [0]
+    flying.mode(Mode.LAND)
+    assert unflagged(flying) == [1]
+    flying.wait(0.2)
+    assert flying.truth.mode is Mode.LAND
 
 
 @pytest.mark.parametrize("frame", [0, 3, 5, 6, 10])
@@ -220,12 +263,27 @@ def test_the_heartbeat_keeps_its_second_whatever_happens(flying: Any) -> None:
     assert {after - before for before, after in pairwise(times)} == {1_000_000}
 
 
-def test_asked_for_the_heartbeat_tells_the_new_mode_at_once(flying: Any) -> None:
-    flying.mode(Mode.LAND)
+def test_asked_for_the_heartbeat_tells_the_new_mode_15_ms_late(flying: Any) -> None:
+    """Recorded: Land was acknowledged at 2 ms, and a heartbeat that was asked for told of Hold at 7 ms."""
     asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 0, 0, 0, 0, 0, 0, 0)
-    answers = flying.send(asked)
-    assert [f.name for f in answers] == ["HEARTBEAT", "COMMAND_ACK"]
-    assert answers[0].message.custom_mode == LAND
+    flying.mode(Mode.LAND)
+    for wait, mode in ((0.005, LOITER), (0.009, LOITER), (0.001, LAND)):
+        flying.wait(wait)
+        answers = flying.send(asked)
+        assert [f.name for f in answers] == ["HEARTBEAT", "COMMAND_ACK"]
+        assert answers[0].message.custom_mode == mode
+
+
+def test_a_land_that_is_taken_back_within_the_lag_hardly_shows(flying: Any) -> None:
+    """Recorded: by no heartbeat, no landed state and no target."""
+    latitude, longitude = flying.config.home.globe(20, 0)
+    flying.wait(0.001)
+    flying.mode(Mode.LAND)
+    flying.wait(0.009)
+    flying.int(192, 5, [-1, 1, 0, nan], latitude, longitude, AMSL + 10)
+    told = flying.wait(5)
+    assert {f.message.landed_state for f in told if f.name == "EXTENDED_SYS_STATE"} == {2}
+    assert {f.message.custom_mode for f in told if f.name == "HEARTBEAT"} == {LOITER}
 
 
 def test_the_current_mode_comes_slower_than_asked(px4: Any) -> None:

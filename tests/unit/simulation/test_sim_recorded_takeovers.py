@@ -70,7 +70,6 @@ KEPT: Mapping[str, Mapping[str, str]] = {
     "px4-takeover-race": {"place from 38 s": AIR, "place from 62 s": AIR},
     "px4-pilot-pause": {},
     "px4-pilot-goto": {
-        "mode (50593792, True), time 1": "between arming and the takeoff came a heartbeat, by chance",
         "place from 27 s": AIR,
         "place from 50 s": AIR,
     },

@@ -181,10 +181,12 @@ static bool is_long(const rt_frame *frame, const rt_command *command, uint8_t au
     }
 }
 
+/* To Hold, or in Hold alone, where nothing is taken from a pilot who chose another mode. */
 static bool is_reposition(const rt_frame *frame) {
+    uint32_t flags = rt_u32(frame, RT_COMMAND_INT_PARAM2);
     return rt_u16(frame, RT_COMMAND_INT_COMMAND) == RT_MAV_CMD_DO_REPOSITION &&
            frame->payload[RT_COMMAND_INT_FRAME] == RT_MAV_FRAME_GLOBAL &&
-           rt_is_whole(rt_u32(frame, RT_COMMAND_INT_PARAM2), RT_MAV_DO_REPOSITION_FLAGS_CHANGE_MODE);
+           (rt_is_whole(flags, RT_MAV_DO_REPOSITION_FLAGS_CHANGE_MODE) || rt_is_zero(flags));
 }
 
 /* DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand. */

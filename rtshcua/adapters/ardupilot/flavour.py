@@ -114,6 +114,7 @@ ARDUPILOT = AutopilotFlavour(
         MotionKind.LAND: frozenset({CopterMode.LAND}),
     },
     aims=_GUIDED,
+    lag_us=0,
     mode_within_us=200_000,  # HEARTBEAT is streamed at twice that rate
     returns=(ReturnAltitude("RTL_ALT", 10), ReturnAltitude("RTL_ALT_M", 1_000)),  # cm before 4.7, metres from then on
     limits=(

@@ -32,7 +32,8 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
             legs: list[Stage] = []
             for place in zip(command.geo[::2], command.geo[1::2], strict=True):
                 message = messages.reposition_amsl(system, *place, amsl / 1_000, command.speed)
-                legs.append(flavour.leg(message, messages.REPOSITION, _HOLD, place, height, amsl))
+                settled = messages.in_hold(message)
+                legs.append(flavour.leg(message, messages.REPOSITION, _HOLD, place, height, amsl, settled=settled))
             return legs
         case _:
             return [_stop(seen, system), Stage(None, None, effects.still, _HOLD, powered=True, stops=True)]
@@ -66,7 +67,10 @@ def _climb(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
 def _stop(seen: ObservedVehicle, system: int) -> Stage:
     """Not DO_SET_MODE: in Hold already, flying to a place, PX4 acknowledges that and flies on (vehicles.md 5)."""
     stop, here = messages.stop_here(system), flavour.stopping(seen)
-    return Stage(stop, messages.REPOSITION, None, _HOLD, flavour.MODE_US, powered=True, target=here, stops=True)
+    return Stage(
+        stop, messages.REPOSITION, None, _HOLD, flavour.MODE_US, powered=True, target=here, stops=True,
+        settled=messages.in_hold(stop),
+    )  # fmt: skip
 
 
 PX4 = AutopilotFlavour(
@@ -86,6 +90,7 @@ PX4 = AutopilotFlavour(
         MotionKind.LAND: frozenset({Px4Mode.LAND}),
     },
     aims=frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD}),
+    lag_us=20_000,  # 10 to 15 ms, recorded
     mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
     limits=(

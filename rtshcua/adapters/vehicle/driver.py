@@ -349,7 +349,8 @@ class Driver:
             stages = self._stages(self.flavour, command)
         except Exception:  # noqa: BLE001  see `begin`
             return ()
-        return [each for stage in stages if stage.message is not None for each in sendings(stage.message)]
+        sent = [each for stage in stages for each in (stage.message, stage.settled) if each is not None]
+        return [each for message in sent for each in sendings(message)]
 
     def release(self) -> None:
         """Stand down: nothing that moves the vehicle is sent any more."""

@@ -87,7 +87,9 @@ class Stage(NamedTuple):
     `modes` are the flight modes that belong to this stage; another one means that somebody took over. `timeout_us` 0:
     only progress and the skill's own time limit end the wait. `powered`: it cannot go on once the motors are off on the
     ground. `target`: where the autopilot must say that it flies to. `progress`: what must get less meanwhile.
-    `stops`: the vehicle must brake as its policy declares. `spare`: what is done already is not sent.
+    `stops`: the vehicle must brake as its policy declares. `spare`: what is done already is not sent. `settled` leaves
+    in place of `message` where the vehicle is in a mode of the stage already: it asks for none, so it takes none from a
+    pilot who chose another one meanwhile. What it is answered says little: its target tells.
     """
 
     message: Message | None
@@ -101,6 +103,7 @@ class Stage(NamedTuple):
     progress: ExpectedProgress | None = None
     stops: bool = False
     spare: bool = False
+    settled: Message | None = None
 
 
 Stages: TypeAlias = Callable[[Command, ObservedVehicle, int], list[Stage]]
@@ -134,7 +137,7 @@ class AutopilotFlavour:
     in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay, `shows`
     those that it is in, armed, that was told to do a kind of motion and nothing since, however far it came; `aims` are
     those in which it names the target that it was given.
-    `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
+    `lag_us`: so long after it was entered a mode shows in what it tells. `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
     top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
     there, `limits` groups of such that lower or lift a return. `critical_acts`: a critical state in the air says that a
     failsafe of its own acts, also where it stays in the mode that it is in; else it may tell only. `bytewise`: integer
@@ -151,6 +154,7 @@ class AutopilotFlavour:
     shows: Mapping[int, frozenset[int]]
     aims: frozenset[int]
     mode_within_us: int
+    lag_us: int
     returns: tuple[ReturnAltitude, ...]
     limits: tuple[tuple[ReturnLimit, ...], ...]
     critical_acts: bool
@@ -191,13 +195,13 @@ def climbing(height: int) -> ExpectedProgress:
 
 def leg(
     message: Message, command: int | None, modes: frozenset[int], place: tuple[int, int], height: int, amsl: int | None,
-    repeat_us: int = 0,
+    repeat_us: int = 0, settled: Message | None = None,
 ) -> Stage:  # fmt: skip
     """To a place (1e-7 degree) at a height above home, in a straight line: it gets a metre nearer in good time."""
     nearer = ExpectedProgress(effects.to_place(*place, height), 8_000_000)
     return Stage(
         message, command, effects.arrived(*place, height), modes, repeat_us=repeat_us, powered=True,
-        target=ExpectedTarget(*place, amsl), progress=nearer,
+        target=ExpectedTarget(*place, amsl), progress=nearer, settled=settled,
     )  # fmt: skip
 
 

@@ -22,10 +22,12 @@ from rtshcua.onboard.ports import Command, Event, Failed, Obeyed, Succeeded, Tak
 
 RETRY_US = 1_000_000
 RETRIES = 5
+#: what asks for no mode is repeated so often, where it may have been lost, before it asks for one
+SETTLED_TRIES: Final = 1
 #: An answer may come this late; within it, a refusal may belong to an earlier sending of the same command.
 LATE_US = 5_000_000
 
-_ACCEPTED, _IN_PROGRESS = 0, 5
+_ACCEPTED, _UNSUPPORTED, _IN_PROGRESS = 0, 3, 5
 #: MAV_RESULT as slugs
 RESULTS = {
     1: "temporarily", 2: "denied", 3: "unsupported", 4: "failed", 6: "cancelled", 7: "only-as-command-long",
@@ -62,18 +64,21 @@ class Commander:
         self.accepted = False
         self.refused: int | None = None
         self.busy_us: int | None = None
+        #: what left last asks for no mode (`Stage.settled`)
+        self.settled = False
 
-    def start(self, stage: Stage | None, now_us: int) -> list[Message]:
-        """Begin another stage (None: none)."""
+    def start(self, stage: Stage | None, now_us: int, *, settled: bool = False) -> list[Message]:
+        """Begin another stage (None: none); `settled`: the vehicle is in its mode already."""
         self._stage, self._sent_us, self._tries = stage, now_us, 0
         self.accepted, self.refused, self.busy_us = False, None, None
+        self.settled = settled and stage is not None and stage.settled is not None
         if stage is None or stage.message is None:
             return []
         self._doubtful = False
         if stage.command is not None:
             self._doubtful = now_us - self._last_us.get(stage.command, -LATE_US) < LATE_US
             self._last_us[stage.command] = now_us
-        return [stage.message]
+        return [stage.settled if self.settled else stage.message]
 
     @property
     def waits(self) -> bool:
@@ -89,7 +94,8 @@ class Commander:
             return NEVER
         if stage.command is None:
             return self._sent_us + stage.repeat_us if stage.repeat_us else NEVER
-        return NEVER if self.accepted or self._tries >= RETRIES else self._sent_us + RETRY_US * self.slack
+        is_over = self.accepted and not (self.settled and stage.target is not None)  # it may not have been obeyed
+        return NEVER if is_over or self._tries >= RETRIES else self._sent_us + RETRY_US * self.slack
 
     def acknowledge(self, command: int, result: int, now_us: int) -> bool:
         """Take in one COMMAND_ACK of the vehicle; whether it belongs to the present stage. PX4 answers some twice:
@@ -99,8 +105,10 @@ class Commander:
             return False
         if result == _IN_PROGRESS:
             self._sent_us = self.busy_us = now_us  # it is at it: wait on
-        elif result == _ACCEPTED:
+        elif result == _ACCEPTED or (self.settled and result == _UNSUPPORTED):
             self.accepted = True
+        elif self.settled:
+            pass  # it is in another mode now: its heartbeat tells in which
         elif not self._doubtful:
             self.refused = result
         return True
@@ -117,6 +125,8 @@ class Commander:
                 message.confirmation = self._tries + 1
             self._doubtful = True
             self._last_us[stage.command] = now_us
+            self.settled = self.settled and self._tries < SETTLED_TRIES
+            message = stage.settled if self.settled else message
         self._tries += 1
         self._sent_us = now_us
         return [message]
@@ -393,7 +403,8 @@ class Manoeuvre:
             return []  # the next one may leave at once
         self._aids.query.sent()
         self._aids.sent_us = seen.up_us
-        return self._commander.start(self._left[0], seen.up_us)
+        stage = self._left[0]
+        return self._commander.start(stage, seen.up_us, settled=seen.mode in stage.modes)
 
     def _again(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
         """The message once more, where it needs to be: never of a target that the autopilot flies to."""
@@ -416,7 +427,7 @@ class Manoeuvre:
         it does.
         """
         if self._left[0].command is not None:
-            return False
+            return self._commander.settled and self._aids.targets.shown
         return self._aids.targets.shown or (self._progress is not None and self._progress.shown)
 
     def _due_us(self, seen: ObservedVehicle, now_us: int) -> int:

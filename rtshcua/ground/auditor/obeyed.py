@@ -36,8 +36,9 @@ _MODES: Final = {
 }
 _ROUNDING: Final = 2  # mm, mm/s: what a 32-bit float loses
 _DATUM: Final = 2_000  # mm: by how much home's height above sea may have moved since it was last reported
-#: a DO_REPOSITION: its number, heights above the sea, and in Hold
-_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+#: a DO_REPOSITION: its number, heights above the sea; and its flags: to Hold, or where it is in Hold
+_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
+_FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
 
 
 class Target(NamedTuple):
@@ -84,14 +85,14 @@ def obeyed(frame: Frame, target: Target, autopilot: int, home: Home | None) -> b
     if frame.message == COMMAND_INT and autopilot == PX4 and target.kind == MotionKind.HOLD:
         speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
         nowhere = x == y == enums.NO_PLACE and isnan(z) and isnan(yaw)
-        return nowhere and (number, reference, flags, radius, speed) == (*_REPOSITION, 0, -1)
+        return nowhere and (number, reference, radius, speed) == (*_REPOSITION, 0, -1) and flags in _FLAGS
     if target.kind not in _TRAVELS:
         return False
     if frame.message == COMMAND_INT and autopilot == PX4:
         speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
         asked = _near(speed, target.speed) if target.speed else speed == -1
         plain = radius == 0 and isnan(yaw)  # without a circle or a heading of its own
-        there = (number, reference, flags) == _REPOSITION and (x, y) in target.points
+        there = (number, reference) == _REPOSITION and flags in _FLAGS and (x, y) in target.points
         return there and asked and plain and _above_sea(z, target, home)
     if frame.message == SET_POSITION_TARGET_GLOBAL_INT and autopilot == ARDUPILOT:
         x, y, z, mask, reference = layouts.of_position_target(fields)

@@ -185,8 +185,10 @@ _ROUNDING: Final = 2  # mm, mm/s
 #: the next; the adapters count it as arrived within 2 m
 NEAR: Final = 449
 
-#: command, frame of reference (heights above mean sea level) and flags of a DO_REPOSITION
-_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL, enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+#: command and frame of reference (heights above mean sea level) of a DO_REPOSITION,
+_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
+#: and its flags: to Hold, or in Hold alone, where nothing is taken from a pilot who chose another mode
+_FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
 _NOWHERE: Final = (enums.NO_PLACE, enums.NO_PLACE)
 
 _places: Final = {
@@ -292,7 +294,8 @@ def _reposition(fields: _Fields, command: Command, home_amsl: int | None) -> boo
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     there = _is_point(x, y, command) and _is_above_sea(z, command, home_amsl) and isnan(yaw)
     as_fast = radius == 0 and (_is_speed(speed, command) if command.speed else speed == -1)
-    return (number, reference, flags) == _REPOSITION and command.kind in _TRAVELS and there and as_fast
+    repositions = (number, reference) == _REPOSITION and flags in _FLAGS
+    return repositions and command.kind in _TRAVELS and there and as_fast
 
 
 def _stop(fields: _Fields) -> bool:
@@ -302,7 +305,8 @@ def _stop(fields: _Fields) -> bool:
     """
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     nowhere = (x, y) == _NOWHERE and isnan(z) and isnan(yaw)
-    return (number, reference, flags) == _REPOSITION and nowhere and (speed, radius) == (-1, 0)
+    repositions = (number, reference) == _REPOSITION and flags in _FLAGS
+    return repositions and nowhere and (speed, radius) == (-1, 0)
 
 
 def _position_target(fields: _Fields, command: Command) -> bool:

@@ -6,6 +6,7 @@ from copy import deepcopy
 from hashlib import sha256
 from itertools import count
 from struct import Struct
+from types import MappingProxyType
 from typing import Any, TypeVar
 from unittest.mock import patch
 
@@ -18,6 +19,7 @@ T = TypeVar("T")
 _KEY = Ed25519PrivateKey.from_private_bytes(bytes(32))
 #: What a flight holds and Python does not copy by itself. Of a counter only its text tells where it is.
 _WAYS: dict[type, Callable[[Any], Any]] = {
+    MappingProxyType: lambda made: (MappingProxyType, (dict(made),)),
     Struct: lambda made: (Struct, (made.format,)),
     count: lambda made: (count, (int(repr(made)[len("count(") : -1]),)),
     type(sha256()): lambda made: (made.copy, ()),

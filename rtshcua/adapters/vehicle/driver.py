@@ -349,8 +349,7 @@ class Driver:
             stages = self._stages(self.flavour, command)
         except Exception:  # noqa: BLE001  see `begin`
             return ()
-        sent = [each for stage in stages for each in (stage.message, stage.settled) if each is not None]
-        return [each for message in sent for each in sendings(message)]
+        return [each for stage in stages for each in sendings(stage)]
 
     def release(self) -> None:
         """Stand down: nothing that moves the vehicle is sent any more."""

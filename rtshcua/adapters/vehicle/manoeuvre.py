@@ -35,7 +35,13 @@ RESULTS = {
 }  # fmt: skip
 
 
-def sendings(message: Message) -> list[Message]:
+def sendings(stage: Stage) -> list[Message]:
+    """The messages of a stage in the order in which they may leave, each as often as it may have to be sent."""
+    settled = [] if stage.settled is None else [stage.settled] * (1 + SETTLED_TRIES)
+    return settled + ([] if stage.message is None else _retried(stage.message))
+
+
+def _retried(message: Message) -> list[Message]:
     """A message as often as it may have to be sent, with `confirmation` raised on each retry."""
     made = [copy(message) for _ in range(1 + RETRIES)]
     for tries, each in enumerate(made):

@@ -115,8 +115,10 @@ CARRIED: list[tuple[int, Any, tuple[MotionKind, ...]]] = [
     (PX4, long(22, nan, 0, 0, *TAKEOFF), (K.CLIMB,)),
     (PX4, long(400, 1), (K.CLIMB,)),
     (PX4, reposition(), TRAVELS),
+    (PX4, reposition(param2=0), TRAVELS),
     (PX4, long(176, 1, 4, 3), (K.CLIMB,)),  # it is armed in Hold; it does not stop it
     (PX4, reposition(**NOWHERE), (K.HOLD,)),
+    (PX4, reposition(**NOWHERE | {"param2": 0}), (K.HOLD,)),
     (PX4, long(176, 1, 4, 5), (K.HOME,)),
     (PX4, long(176, 1, 4, 6), (K.LAND,)),
     (ARDUPILOT, long(176, 1, 4), (K.CLIMB, *TRAVELS)),

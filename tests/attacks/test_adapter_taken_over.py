@@ -30,8 +30,9 @@ def test_what_it_changed_does_not_leave_and_it_comes_home(change: Change, reason
     def changed(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         stages = px4.stages(command, seen, system)
         for stage in stages:
-            if stage.message is not None:
-                change(stage.message)
+            for message in (stage.message, stage.settled):
+                if message is not None:
+                    change(message)
         return stages
 
     flight = Flight(case.seal(case.mission(case.short_steps())), case.simulated("px4"))

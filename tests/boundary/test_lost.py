@@ -164,7 +164,8 @@ def test_where_a_link_fails_the_next_one_flies(flavour: str, apart: Make) -> Non
     flown = of.fly(flies(1))
     came_down(flown)
     assert [(kind, link) for kind, _, link in after_loss(flown)] == [(FALLBACK_LINK, 0), (FALLBACK_LINK, 1)]
-    assert moving.count("hover") == 6
+    # nothing can be asked any more: each leaves once a heartbeat has come, by the second on PX4, and for 5 s
+    assert moving.count("hover") in (5, 6)
     failed = [record["detail"] for record in flown.records if record.get("event") == "failed"]
     assert failed, "what did not arrive had no effect"
 

@@ -75,7 +75,7 @@ def check(lag_us: int, last: MotionKind, name: str, begun_ms: int) -> str:
     assert one.truth.mode is TAKEN[name], (lag_us, last, name, begun_ms)
     taken = [event for event in one.events if isinstance(event, TakenOver)]
     assert taken, (lag_us, last, name, begun_ms)
-    told = any(isinstance(event, Noted) and "left" in event.text for event in one.events)
+    told = any(isinstance(event, Noted) and "a frame of ours left" in event.text for event in one.events)
     return "told" if told else "seen before"
 
 

@@ -8,6 +8,7 @@ from functools import cache
 
 from rtshcua.adapters.vehicle import effects, flavour, messages, returns
 from rtshcua.adapters.vehicle.bounds import OwnFence
+from rtshcua.adapters.vehicle.effects import Effect
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, FenceHabits, ReturnAltitude, Stage
 from rtshcua.adapters.vehicle.messages import NAN
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
@@ -60,8 +61,14 @@ def _climb(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         flavour.entering(system, Px4Mode.HOLD),
         flavour.arming(system, _HOLD),
         Stage(takeoff, messages.TAKEOFF, begun, own, flavour.MODE_US, powered=True, target=above),
-        Stage(None, None, effects.climbed(height), own, powered=True, target=above, progress=rises),
+        Stage(None, None, _is_above(height), own, powered=True, target=above, progress=rises),
     ]
+
+
+def _is_above(height: int) -> Effect:
+    """Climbed, and in Hold, which follows by itself: the next leg then asks for no mode, so it takes none."""
+    climbed = effects.climbed(height)
+    return lambda seen: seen.mode == Px4Mode.HOLD and climbed(seen)
 
 
 def _stop(seen: ObservedVehicle, system: int) -> Stage:

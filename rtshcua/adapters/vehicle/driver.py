@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
-from rtshcua.adapters.vehicle import messages, observed, preflight
+from rtshcua.adapters.vehicle import messages, observed, others, preflight
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
 from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink, is_radio, two_speak
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendings
@@ -136,6 +136,7 @@ class Driver:
         self._left_mode: int | None = None  # one report says that it left this mode, by nobody of ours
         self._others: str | None = None  # what showed that somebody else flies it: nothing of ours is begun any more
         self._unsent: int | None = None  # the token of a command of which no frame left yet
+        self._steered_us: int | None = None  # when a frame that moves the vehicle last left, and nothing was said of it
         self._moving = False  # a frame that moves the vehicle is among those to be packed
         self._watch = LinkWatch(slack)
         self._was_mute = False
@@ -431,7 +432,7 @@ class Driver:
         elif name in self._spoken:
             return False  # what the autopilot itself tells is not taken from anybody else
         if name == "COMMAND_ACK":
-            return self._acknowledge(frame, now_us) or self._asks
+            return self._acknowledge(frame, now_us, events) or self._asks
         self.stream_requests.heard(name, now_us, len(octets))
         if name in self._telemetry.rates:
             values = self._telemetry.read(
@@ -479,16 +480,38 @@ class Driver:
         """Whether a frame waits until it is known who flies, which it may be time to ask."""
         return self._aids.query.waits
 
-    def _acknowledge(self, frame: Received, now_us: int) -> bool:
+    def _acknowledge(self, frame: Received, now_us: int, events: list[Event]) -> bool:
         """Take in a COMMAND_ACK; whether it is of the command under way."""
         message = frame.message
-        if frame.component != AUTOPILOT or not self._is_for_us(message):
+        if frame.component != AUTOPILOT:
+            return False
+        if not self._is_for_us(message):
+            self._overhear_answer(message, now_us, events)
             return False
         self._watch.answered()
         if message.command == messages.SET_INTERVAL:
             self.stream_requests.answered(message.result == 0, now_us)
             return False
         return self._commander.acknowledge(message.command, message.result, self.seen.up_us)
+
+    def _overhear_answer(self, message: Message, now_us: int, events: list[Event]) -> None:
+        """Somebody else was told that it obeys: what leaves from now on waits for reports that are of after that. Where
+        a frame of ours left just before, nobody knows which of the two counts.
+        """
+        what = others.STEERS.get(message.command)
+        if what is None or message.result not in others.GRANTED:
+            return
+        self._aids.query.commanded(now_us)
+        self._tell_crossed(f"{message.target_system}/{message.target_component} was granted {what}", now_us, events)
+
+    def _tell_crossed(self, what: str, now_us: int, events: list[Event]) -> None:
+        """Say, once for each frame of ours, that it left within W of what shows now."""
+        steered_us, flavour = self._steered_us, self.flavour
+        if steered_us is None or flavour is None or now_us - steered_us > flavour.mode_within_us:
+            return
+        self._steered_us = None
+        events.append(ports.Noted(now_us, others.crossed(what, now_us - steered_us)))
+        self._announcer.add(others.WARNING, others.CROSSED)
 
     def _is_for_us(self, message: Message) -> bool:
         """Whether a message that names whom it is for is for us, or for everybody. We are of the vehicle's system."""
@@ -513,6 +536,7 @@ class Driver:
                 self._left_mode = before
                 return
             self._others = flavour.mode_name(mode)
+            self._tell_crossed(self._others, now_us, events)
             events.append(ports.TakenOver(now_us, self._others, self.seen.critical))
 
     def _look(self, now_us: int, events: list[Event]) -> None:
@@ -556,6 +580,7 @@ class Driver:
         for event in happened:
             if isinstance(event, ports.TakenOver):
                 self._others = event.how
+                self._tell_crossed(event.how, now_us, events)
                 event = replace(event, failsafe=self.seen.critical)
             events.append(event)
         self._doubt(now_us, send)
@@ -650,6 +675,8 @@ class Driver:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""
         frames, refused = self.link.pack(send, now_us)
         moving, self._moving = self._moving, False
+        if moving and frames:
+            self._steered_us = now_us
         if refused:
             self._fail(refused[0].slug, "", now_us, events)
         elif moving and self._unsent is not None:

@@ -137,11 +137,12 @@ class AutopilotFlavour:
     in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay, `shows`
     those that it is in, armed, that was told to do a kind of motion and nothing since, however far it came; `aims` are
     those in which it names the target that it was given.
-    `lag_us`: so long after it was entered a mode shows in what it tells. `mode_within_us`: no frame that moves the vehicle leaves on a mode report that is older (the link's delay comes on
-    top): what the fastest report of the mode that it really gives allows. `returns` are parameters of which one is
-    there, `limits` groups of such that lower or lift a return. `critical_acts`: a critical state in the air says that a
-    failsafe of its own acts, also where it stays in the mode that it is in; else it may tell only. `bytewise`: integer
-    parameters travel as their bytes. `fence` says how it takes a geofence, `own_fence` what bounds it has besides.
+    `lag_us`: so long after it was entered a mode shows in what it tells. `mode_within_us`: no frame that moves the
+    vehicle leaves on a mode report that is older (the link's delay comes on top): what the fastest report of the mode
+    that it really gives allows. `returns` are parameters of which one is there, `limits` groups of such that lower or
+    lift a return. `critical_acts`: a critical state in the air says that a failsafe of its own acts, also where it
+    stays in the mode that it is in; else it may tell only. `bytewise`: integer parameters travel as their bytes.
+    `fence` says how it takes a geofence, `own_fence` what bounds it has besides.
     """
 
     name: str

@@ -67,6 +67,7 @@ class Commander:
         self._tries = 0
         self._doubtful = False
         self._last_us: dict[int, int] = {}
+        self._moded_us: int | None = None  # when a frame left that asks for a mode, or may change it
         self.accepted = False
         self.refused: int | None = None
         self.busy_us: int | None = None
@@ -74,12 +75,18 @@ class Commander:
         self.settled = False
 
     def start(self, stage: Stage | None, now_us: int, *, settled: bool = False) -> list[Message]:
-        """Begin another stage (None: none); `settled`: the vehicle is in its mode already."""
+        """Begin another stage (None: none); `settled`: the vehicle is in its mode already. It may yet get to what asked
+        for another one shortly before.
+        """
         self._stage, self._sent_us, self._tries = stage, now_us, 0
         self.accepted, self.refused, self.busy_us = False, None, None
-        self.settled = settled and stage is not None and stage.settled is not None
+        self.settled = False
         if stage is None or stage.message is None:
             return []
+        pends = self._moded_us is not None and now_us - self._moded_us < LATE_US
+        self.settled = settled and stage.settled is not None and not pends
+        if not self.settled:
+            self._moded_us = now_us
         self._doubtful = False
         if stage.command is not None:
             self._doubtful = now_us - self._last_us.get(stage.command, -LATE_US) < LATE_US
@@ -133,6 +140,8 @@ class Commander:
             self._last_us[stage.command] = now_us
             self.settled = self.settled and self._tries < SETTLED_TRIES
             message = stage.settled if self.settled else message
+        if not self.settled:
+            self._moded_us = now_us
         self._tries += 1
         self._sent_us = now_us
         return [message]
@@ -148,6 +157,8 @@ IDLE_US: Final = 1_000_000
 STREAMED_US: Final = 300_000
 #: What one report shows is asked after so often, until another confirms it.
 CONFIRM_US: Final = 20_000
+#: by how much more than `lag_us` two questions are put apart, so that their answers come that far apart
+APART_US: Final = 5_000
 #: So long after the mode a target may be told that was asked for with it. One that has none to tell of tells nothing:
 #: ArduCopter accepts the question then, PX4 denies it.
 TARGET_US: Final = 100_000
@@ -161,16 +172,24 @@ class WhoFliesQuery:
     again and again while something of ours flies, and once more right before a frame that begins a motion. Where the
     vehicle has a target of ours, a pilot may have given it another without any change of mode: then
     POSITION_TARGET_GLOBAL_INT is asked for in the same round trip (docs/adr/0034).
+
+    An answer tells what was so `lag_us` before: a frame that begins a motion waits for two that came so far apart, and
+    one that somebody was seen to command before waits for an answer that came so much later.
     """
 
-    def __init__(self, within_us: int, slack: int = 1) -> None:
+    def __init__(self, within_us: int, lag_us: int = 0, slack: int = 1) -> None:
         self._within_us = within_us * slack
+        self._lag_us = lag_us
         self._target_us = TARGET_US * slack
         self._asked_us: int | None = None
         #: before then `due` gives nothing, so nobody need call it
         self.due_us = 0
         self._came: tuple[int, int] | None = None  # how many reports of mode and target had, when a frame began to wait
-        self._target = False  # the frame waits for a target, too
+        self._target = False  # the frame waits for a target, too,
+        self._twice = False  # and for two answers,
+        self._first_us: int | None = None  # of which this is when the first came
+        self._asked = 0  # how often it was asked for the frame
+        self._commanded_us: int | None = None  # when somebody else was last seen to be obeyed
         self._doubts = False  # what was reported is to be confirmed
         #: when the frame waits no longer for a target; None while it waits for the mode, or for nothing
         self.ends_us: int | None = None
@@ -182,19 +201,26 @@ class WhoFliesQuery:
 
     def is_young(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down."""
-        return seen.heartbeat_us is not None and now_us - seen.heartbeat_us <= self._within_us
+        if seen.heartbeat_us is None or now_us - seen.heartbeat_us > self._within_us:
+            return False
+        return self._tells_of_commanded(seen.heartbeat_us)
 
-    def is_newer(self, seen: ObservedVehicle, now_us: int, *, target: bool) -> bool:
+    def is_newer(self, seen: ObservedVehicle, now_us: int, *, target: bool, twice: bool = False) -> bool:
         """Whether a mode report came since this was first asked for one frame, and with `target` a report of that too,
-        or none in good time: it will do for any frame.
+        or none in good time: it will do for any frame. `twice`: two mode reports, so far apart as one may lag.
         """
         if self._came is None:
-            self._came = seen.beats, seen.targets
+            self._came, self._first_us, self._asked = (seen.beats, seen.targets), None, 0
             self._asked_us, self.due_us = None, 0  # ask at once
-        self._target = target
+        self._target, self._twice = target, twice and self._lag_us > 0
         beats, targets = self._came
-        if seen.beats == beats:
+        if seen.beats == beats or seen.heartbeat_us is None or not self._tells_of_commanded(seen.heartbeat_us):
             return False
+        if self._twice:
+            if self._first_us is None:
+                self._first_us = seen.heartbeat_us
+            if seen.heartbeat_us - self._first_us < self._lag_us:
+                return False
         if not target or (seen.targets > targets and now_us - seen.target_us <= self._within_us):
             return True
         if self.ends_us is None:
@@ -207,6 +233,16 @@ class WhoFliesQuery:
             self.due_us = 0
         self._doubts = doubts
 
+    def commanded(self, now_us: int) -> None:
+        """Somebody else was seen to be obeyed: what was reported before says nothing of that. Whoever only says so
+        again and again holds up nothing for longer than once a second.
+        """
+        if self._commanded_us is None or now_us - self._commanded_us > IDLE_US:
+            self._commanded_us = now_us
+
+    def _tells_of_commanded(self, told_us: int) -> bool:
+        return self._commanded_us is None or told_us >= self._commanded_us + self._lag_us
+
     def sent(self) -> None:
         """The frame left, or is not wanted any more: the next one asks anew."""
         self._came, self._target, self.ends_us = None, False, None
@@ -217,7 +253,7 @@ class WhoFliesQuery:
         if self._doubts:
             every_us = CONFIRM_US
         elif self._came is not None:
-            every_us = AGAIN_US
+            every_us = self._again_us(now_us)
         elif not flies:
             every_us = IDLE_US
         elif seen.heartbeat_us is not None and now_us - seen.heartbeat_us < half_us:
@@ -232,8 +268,17 @@ class WhoFliesQuery:
             return []
         self._asked_us = now_us
         self.due_us = now_us + min(half_us, CONFIRM_US if self._doubts else AGAIN_US)
+        if self._came is not None:
+            self._asked += 1
+            self.due_us = min(self.due_us, now_us + self._again_us(now_us))
         names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if self._target or self._doubts else ("HEARTBEAT",)
         return [messages.request(system, name) for name in names]
+
+    def _again_us(self, now_us: int) -> int:
+        """So long after the last question for a frame the next one is put."""
+        commanded_us = self._commanded_us
+        hurries = commanded_us is not None and now_us - commanded_us <= 2 * (self._lag_us + APART_US)
+        return self._lag_us + APART_US if hurries or (self._twice and self._asked == 1) else AGAIN_US
 
 
 # ---------------------------------------------------------------- a manoeuvre
@@ -261,7 +306,7 @@ class Aids:
         self.flavour = flavour
         self.brakes = brakes
         self.commander = commander
-        self.query = WhoFliesQuery(flavour.mode_within_us, commander.slack)
+        self.query = WhoFliesQuery(flavour.mode_within_us, flavour.lag_us, commander.slack)
         self.targets = TargetWatch()
         self.suspicion = Suspicion()
         #: of its mode and its motors
@@ -396,7 +441,7 @@ class Manoeuvre:
             return False
         if urgent and query.is_young(seen, now_us):
             return True
-        return query.is_newer(seen, now_us, target=self._aids.targets.compares and not urgent)
+        return query.is_newer(seen, now_us, target=self._aids.targets.compares and not urgent, twice=not urgent)
 
     def _send(self, seen: ObservedVehicle) -> list[Message]:
         """The message of the stage; none where it would ask for what is so already."""

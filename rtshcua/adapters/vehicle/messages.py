@@ -56,7 +56,7 @@ def arm(system: int) -> Message:
 
 
 def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, speed_mm_s: int) -> Message:
-    """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode (`in_hold` does not)."""
+    """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode (not `in_hold`)."""
     return _reposition(system, speed_mm_s / 1_000 if speed_mm_s else -1.0, latitude, longitude, amsl_m)
 
 

@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from reference.flat_case import MISSION, POLICY
 from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.adapters.vehicle.manoeuvre import RETRIES, sendings
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
@@ -57,7 +58,8 @@ MODES = {"hover": Px4Mode.HOLD, "return_home": Px4Mode.RETURN, "emergency_land":
 
 
 def encode(command: Command) -> list[bytes]:
-    return [pack(each) for each in sendings(messages.set_mode(1, MODES[command.skill]))]
+    stage = Stage(messages.set_mode(1, MODES[command.skill]), messages.DO_SET_MODE, None, frozenset())
+    return [pack(each) for each in sendings(stage)]
 
 
 def frame(skill: str, confirmation: int = 0, height: float = 0.0) -> Frame:

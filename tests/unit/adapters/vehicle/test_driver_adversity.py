@@ -347,7 +347,7 @@ def test_silence_is_noticed_and_so_is_its_end(aloft: Make) -> None:
     assert 900_000 < lost.at_us - begun < 1_200_000
     assert lost.why == "silent"
     assert not any(isinstance(event, LinkLost) for event in one.wait(10))
-    one.until(LinkBack, 3)
+    one.until(LinkBack, 4)
 
 
 @OTHER_FLAVOUR

@@ -99,6 +99,13 @@ class Failed(Event, frozen=True):
     text: str = ""
 
 
+class Hindered(Event, frozen=True):
+    """What keeps command `token` from getting on as it was told, in words; it decides nothing, but names a cause."""
+
+    token: int
+    text: str
+
+
 class TakenOver(Event, frozen=True):
     """Someone else flies the vehicle now: the pilot, a ground station, or the autopilot's own failsafe. They win.
 

@@ -132,4 +132,5 @@ ARDUPILOT = AutopilotFlavour(
     own_fence=OwnFence(
         "FENCE_RADIUS", "FENCE_ALT_MAX", "FENCE_ALT_MIN", "FENCE_MARGIN", "FENCE_TYPE", ("FENCE_ENABLE",)
     ),
+    names_targets=True,  # `ModeGuided::get_wp`, until a velocity or another mode comes; a pause keeps it (recorded)
 )

@@ -428,6 +428,7 @@ class Driver:
         if source.stepped:
             seen.made_us.clear()
         if component == AUTOPILOT:
+            seen.count(source.place)
             self._spoken.add(name)
         elif name in self._spoken:
             return False  # what the autopilot itself tells is not taken from anybody else
@@ -489,6 +490,8 @@ class Driver:
             self._overhear_answer(message, now_us, events)
             return False
         self._watch.answered()
+        if message.command == messages.REQUEST_MESSAGE:
+            self.seen.answers += 1
         if message.command == messages.SET_INTERVAL:
             self.stream_requests.answered(message.result == 0, now_us)
             return False

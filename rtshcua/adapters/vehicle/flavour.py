@@ -142,7 +142,9 @@ class AutopilotFlavour:
     that it really gives allows. `returns` are parameters of which one is there, `limits` groups of such that lower or
     lift a return. `critical_acts`: a critical state in the air says that a failsafe of its own acts, also where it
     stays in the mode that it is in; else it may tell only. `bytewise`: integer parameters travel as their bytes.
-    `fence` says how it takes a geofence, `own_fence` what bounds it has besides.
+    `fence` says how it takes a geofence, `own_fence` what bounds it has besides. `names_targets`: flying to a target
+    that it was given, it goes on naming it, so that one that it names no more is somebody else's doing; and one that it
+    names while it stands far from it is somebody's pause.
     """
 
     name: str
@@ -162,6 +164,7 @@ class AutopilotFlavour:
     bytewise: bool
     fence: FenceHabits
     own_fence: OwnFence
+    names_targets: bool = False
 
     def mode_name(self, number: int) -> str:
         """The autopilot's name of a `custom_mode`, or the number itself."""

@@ -15,10 +15,23 @@ from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ExpectedTarget, S
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.source_time import VehicleClock
-from rtshcua.adapters.vehicle.supervision import MODE_BEATS, NEVER, Brakes, BrakingWatch, StageProgress, TargetWatch
+from rtshcua.adapters.vehicle.supervision import (
+    FAR,
+    FAR_BELOW,
+    MODE_BEATS,
+    NEVER,
+    Brakes,
+    BrakingWatch,
+    NamedTargetWatch,
+    PauseWatch,
+    SpeedWatch,
+    StageProgress,
+    TargetWatch,
+    stands_idly,
+)
 from rtshcua.adapters.vehicle.suspicion import CROSSED_US, Contradictions, Suspicion
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Command, Event, Failed, Obeyed, Succeeded, TakenOver
+from rtshcua.onboard.ports import Command, Event, Failed, Hindered, Obeyed, Succeeded, TakenOver
 
 RETRY_US = 1_000_000
 RETRIES = 5
@@ -191,13 +204,17 @@ class WhoFliesQuery:
         self._asked = 0  # how often it was asked for the frame
         self._commanded_us: int | None = None  # when somebody else was last seen to be obeyed
         self._doubts = False  # what was reported is to be confirmed
+        #: how many questions for messages were put
+        self.asked = 0
+        #: the target is to be asked for, whatever waits
+        self.wants_target = False
         #: when the frame waits no longer for a target; None while it waits for the mode, or for nothing
         self.ends_us: int | None = None
 
     @property
     def waits(self) -> bool:
-        """Whether a frame waits for the answer."""
-        return self._came is not None
+        """Whether a frame waits for the answer, or something else does."""
+        return self._came is not None or self.wants_target
 
     def is_young(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down."""
@@ -250,7 +267,10 @@ class WhoFliesQuery:
     def due(self, system: int, seen: ObservedVehicle, now_us: int, *, flies: bool) -> list[Message]:
         """The question to put now, if one is due. `flies`: something of ours does, or the vehicle is in the air."""
         half_us = self._within_us // 2
-        if self._doubts:
+        wants, self.wants_target = self.wants_target, False
+        if wants:
+            every_us = 0
+        elif self._doubts:
             every_us = CONFIRM_US
         elif self._came is not None:
             every_us = self._again_us(now_us)
@@ -271,7 +291,9 @@ class WhoFliesQuery:
         if self._came is not None:
             self._asked += 1
             self.due_us = min(self.due_us, now_us + self._again_us(now_us))
-        names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if self._target or self._doubts else ("HEARTBEAT",)
+        with_target = self._target or self._doubts or wants
+        names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if with_target else ("HEARTBEAT",)
+        self.asked += len(names)
         return [messages.request(system, name) for name in names]
 
     def _again_us(self, now_us: int) -> int:
@@ -285,6 +307,8 @@ class WhoFliesQuery:
 
 #: Never answered, and no effect seen: it may have been executed, or be executed yet.
 UNKNOWN: Final = "unknown/no-answer"
+#: It stands still, and is not where it was sent.
+STOPPED_SHORT: Final = "stopped-short"
 #: The mode that a frame waits for was not told in this time.
 MODE_UNKNOWN_US: Final = 5_000_000
 #: mm: a vehicle that holds, and is further than this from where it came to stand, does not hold
@@ -294,6 +318,10 @@ TAKEN_BACK_US: Final = 1_500_000
 #: these stop the vehicle, or bring it home or down: they leave on the last mode report, while it is young
 _URGENT: Final = (MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
+_LEGS: Final = (MotionKind.FLY, MotionKind.COVER)
+#: a frame that stops the vehicle, or brings it home or down, waits no longer than this to know whether its target is
+#: its own still, in us
+UNNAMED_MOST_US: Final = 1_000_000
 
 
 class Aids:
@@ -308,6 +336,7 @@ class Aids:
         self.commander = commander
         self.query = WhoFliesQuery(flavour.mode_within_us, flavour.lag_us, commander.slack)
         self.targets = TargetWatch()
+        self.named = NamedTargetWatch(commander.slack)
         self.suspicion = Suspicion()
         #: of its mode and its motors
         self.contradictions = Contradictions()
@@ -353,6 +382,7 @@ class Manoeuvre:
         self._progress: StageProgress | None = None
         self._stop: BrakingWatch | None = None
         self._held_us: int | None = None
+        self._unnamed_us: int | None = None  # since when a frame waits to know whether the target is ours
         self._stands: tuple[int, int] | None = None
         self._before = before if seen.mode is None else before | {seen.mode}
         self._began_in = seen.mode
@@ -362,6 +392,8 @@ class Manoeuvre:
         self._aimed = False  # the frame is out that says where to go, or to go nowhere,
         self._named: ExpectedTarget | None = None  # and it was seen to be obeyed, by this target of ours that it named
         self._shown = False  # or by its mode
+        self._pause: PauseWatch | None = None  # of a leg
+        self._pace: SpeedWatch | None = None
         self._accepted: tuple[int, int] | None = None  # when the present stage was, and after how many heartbeats
         self._changed = False  # something was sent, or another stage begun: what that does is still to be looked at
         self.over = False
@@ -373,7 +405,11 @@ class Manoeuvre:
 
     @property
     def waits(self) -> bool:
-        """Whether a frame waits until it is known who flies."""
+        """Whether a frame waits until it is known who flies, or that is to be asked."""
+        named = self._aids.named
+        if named.asks and not self._taken:
+            named.asks, self._aids.query.wants_target = False, True
+            return True
         return self._waits and not self.over
 
     @property
@@ -392,7 +428,7 @@ class Manoeuvre:
         return send, events
 
     def _advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
-        how = self._aids.sure(self._taken_over(seen), seen)
+        how = self._aids.sure(self._taken_over(seen), seen) or self._flown_otherwise(seen, now_us)
         if how is not None:
             self.over = self._taken = True
             return [], [TakenOver(now_us, how)]
@@ -410,12 +446,24 @@ class Manoeuvre:
             self._left.pop(0)
             self._enter(seen)
         reason = self._failure(seen) if self._left else self._left_its_place(seen)
+        if reason == STOPPED_SHORT and self._names_target(seen) and stands_idly(seen, self._way_left(seen), now_us):
+            self.over = self._taken = True  # it never set off, though it says that it flies there
+            return [], [TakenOver(now_us, "paused")]
         if reason is None and self._left:
-            return self._again(seen, now_us), ()
+            told = self._hindered(seen, now_us)
+            return self._again(seen, now_us), told
         if reason is None and not self._has_held(seen):
             return [], ()
         self.over = True
         return [], [Succeeded(now_us, self.token) if reason is None else Failed(now_us, self.token, reason, seen.text)]
+
+    def _hindered(self, seen: ObservedVehicle, now_us: int) -> Sequence[Event]:
+        """That it is flown slower than it was told, once."""
+        pace = self._pace
+        if pace is None or not self._aids.targets.shown or not pace.look(seen, self._way_left(seen)):
+            return ()
+        told = f"it flies at {(pace.slow or 0) / 1_000:.1f} m/s where {self._command.speed / 1_000:.1f} m/s were told"
+        return [Hindered(now_us, self.token, f"{told}: somebody else may have set its speed")]
 
     # -------------------------------------------------------- what is sent
 
@@ -428,6 +476,11 @@ class Manoeuvre:
         stage = self._left[0]
         self._before, self._modes = self.modes, stage.modes
         self._progress = None if stage.progress is None else StageProgress(stage.progress)
+        leg = self._command.kind in _LEGS and stage.progress is not None
+        climb = self._command.kind == MotionKind.CLIMB and stage.progress is not None
+        watches = (leg or climb) and self._flavour.names_targets
+        self._pause = PauseWatch(FAR if leg else FAR_BELOW) if watches else None
+        self._pace = SpeedWatch(self._command.speed) if leg else None
         if stage.stops and self._stop is None:
             self._stop = BrakingWatch(self._aids.brakes, seen)
         self._waits = stage.message is not None
@@ -439,9 +492,24 @@ class Manoeuvre:
         query, urgent = self._aids.query, self._command.kind in _URGENT
         if self._aids.suspicion.stands:
             return False
+        if self._is_unnamed(seen, now_us):
+            self._unnamed_us = now_us if self._unnamed_us is None else self._unnamed_us
+            if now_us - self._unnamed_us <= UNNAMED_MOST_US:
+                query.is_newer(seen, now_us, target=True)  # it is asked for
+                return False
         if urgent and query.is_young(seen, now_us):
             return True
         return query.is_newer(seen, now_us, target=self._aids.targets.compares and not urgent, twice=not urgent)
+
+    def _is_unnamed(self, seen: ObservedVehicle, now_us: int) -> bool:
+        """Whether it goes on naming a target of ours as a rule, and did not for as long as a mode report may be old."""
+        if not self._names_target(seen):
+            return False
+        return now_us - seen.target_us > self._flavour.mode_within_us * self._commander.slack
+
+    def _names_target(self, seen: ObservedVehicle) -> bool:
+        flavour, targets = self._flavour, self._aids.targets
+        return flavour.names_targets and targets.compares and targets.shown and seen.mode in flavour.aims
 
     def _send(self, seen: ObservedVehicle) -> list[Message]:
         """The message of the stage; none where it would ask for what is so already."""
@@ -502,6 +570,8 @@ class Manoeuvre:
         at_us = self._shows_us if self._is_followed else min(self._commander.due_us, self._shows_us)
         if self._progress is not None:
             at_us = min(at_us, self._progress.due_us)
+        if self._pause is not None:
+            at_us = min(at_us, self._pause.due_us)
         return at_us if self._stop is None else min(at_us, self._stop.due_us)
 
     @property
@@ -565,6 +635,24 @@ class Manoeuvre:
             return "target", "another target", seen.targets
         return None
 
+    def _flown_otherwise(self, seen: ObservedVehicle, now_us: int) -> str | None:
+        """What shows over a while that somebody else flies, in our mode and without another target."""
+        if self._taken or self._aids.suspicion.stands or seen.mode not in self._modes:
+            return None
+        if not self._names_target(seen):  # in a climb it names none
+            paused = self._command.kind == MotionKind.CLIMB and self._is_paused(seen, now_us)
+            return "paused" if paused else None
+        if self._aids.named.is_gone(seen, now_us, self._aids.query.asked):
+            return "no target"
+        return "paused" if self._is_paused(seen, now_us) else None
+
+    def _is_paused(self, seen: ObservedVehicle, now_us: int) -> bool:
+        return self._pause is not None and self._pause.is_paused(seen, self._way_left(seen), now_us)
+
+    def _way_left(self, seen: ObservedVehicle) -> tuple[int, ...] | None:
+        progress = self._left[0].progress if self._left else None
+        return None if progress is None else progress.measure(seen)
+
     def _was_taken_back(self, seen: ObservedVehicle) -> bool:
         """Whether our mode was accepted, and another shows in several reports since: somebody chose it again."""
         if not self._commander.accepted or self._commander.refused is not None or self._waits:
@@ -608,5 +696,5 @@ class Manoeuvre:
         if self._progress is not None and self._progress.has_stalled(seen):
             if commander.waits:
                 return UNKNOWN
-            return "stopped-short" if still(seen) else "no-progress"
+            return STOPPED_SHORT if still(seen) else "no-progress"
         return None

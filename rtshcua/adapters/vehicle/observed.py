@@ -138,8 +138,9 @@ _ABOVE_SEA = (enums.MAV_FRAME_GLOBAL, enums.MAV_FRAME_GLOBAL_INT)
 #: the messages that `ObservedVehicle.take` looks at, beside the report of the estimator
 HEEDED: Final = (
     "HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "POSITION_TARGET_GLOBAL_INT", "GPS_RAW_INT", "SYS_STATUS",
-    "ATTITUDE",
+    "ATTITUDE", "DISTANCE_SENSOR",
 )  # fmt: skip
+_FORWARD: Final = 0  # MAV_SENSOR_ROTATION_NONE
 _OF_DOWN: Final = ("HEARTBEAT", "EXTENDED_SYS_STATE")
 _REASONS = ("PreArm:", "Arm:", "Preflight Fail:", "Arming denied")
 _PREARM: Final = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
@@ -168,6 +169,8 @@ class ObservedVehicle:
     so now, of a position that is not old. `target` is where the autopilot says that it flies to. `descent` is how fast
     it sinks and `tilt` how many degrees it leans (`tilt_us`: told then), whoever vouches for that. `beats` counts
     heartbeats and `targets` reports of a target (`target_us`: told last); `up_us` is link time, see `LinkWatch`.
+    `heard` counts frames of the autopilot, `numbered` those that it sent by then, as their numbers tell, and `answers`
+    its answers to questions for messages. `ahead` is what its range finder last saw in front, at `ahead_us`.
     `notes` collects what an operator should know. `disarms`: one heartbeat says that the motors are off; they count as
     off when the next one says so, too, or, while two speak under its ids (`disputed`), when nothing else is said for a
     while. `landings` counts reports of `landed_state`.
@@ -201,6 +204,11 @@ class ObservedVehicle:
     unwell: tuple[str, ...] = ()
     heartbeat_us: int | None = None
     beats: int = 0
+    heard: int = 0
+    numbered: int = 0
+    answers: int = 0
+    ahead: int | None = None
+    ahead_us: int = 0
     made_us: dict[str, int] = field(default_factory=dict)  # when the last of each message was made
     places: dict[str, int] = field(default_factory=dict)  # and its place in the order of sending
     now_us: int = 0
@@ -258,6 +266,9 @@ class ObservedVehicle:
                     self.target_us = now_us
                     self.targets += 1
                 return before != self.target
+            case "DISTANCE_SENSOR":
+                if message.orientation == _FORWARD:
+                    self.ahead, self.ahead_us = 10 * message.current_distance, now_us
             case "GPS_RAW_INT":
                 fix, self.fix = self.fix, message.fix_type
                 return bool(fix != self.fix)
@@ -271,6 +282,11 @@ class ObservedVehicle:
                 self.estimator.take(message.flags, at_us)
                 return self._doubt(now_us)
         return False
+
+    def count(self, place: int) -> None:
+        """A frame came that the autopilot sent in this place."""
+        self.heard += 1
+        self.numbered = max(self.numbered, place)
 
     def pass_time(self, now_us: int) -> bool:
         """Time goes by: where it was, and what the estimator last said, grows old. Whether something grew too old."""

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
-from rtshcua.adapters.vehicle.effects import STILL, apart
+from rtshcua.adapters.vehicle.effects import STILL, apart, still
 from rtshcua.adapters.vehicle.flavour import KEPT, KEPT_LEVEL, ExpectedProgress, ExpectedTarget
 from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STOPPED, ObservedVehicle, Reported
 from rtshcua.model.flat.policy import Vehicle
@@ -242,6 +242,143 @@ class TargetWatch:
 
 def _same(one: Reported, other: Reported) -> bool:
     return abs(one[2] - other[2]) <= KEPT_LEVEL and apart(*one[:2], *other[:2]) <= KEPT
+
+
+#: A target that was not named for this long is asked for; it is streamed at twice that rate.
+UNNAMED_US: Final = 150_000
+#: So long after the last answer to such a question, or to the one before, it would have come;
+NAMED_WITHIN_US: Final = 100_000
+#: and after this long, unless something was lost meanwhile, the question is put anew.
+ASKED_ANEW_US: Final = 400_000
+#: So many heartbeats without a target: on a link that loses more than half of all, one in 10**7 of such rows is chance.
+MANY_BEATS: Final = 25
+
+
+class NamedTargetWatch:
+    """Whether an autopilot that goes on naming its target stopped doing so: somebody commands a velocity, say.
+
+    That nothing came proves nothing, for frames are lost. It was asked, it answered, and the numbers of its frames show
+    that none is missing: then it names none.
+    """
+
+    def __init__(self, slack: int = 1) -> None:
+        self._slack = slack
+        self._targets = -1
+        self._beats = 0  # how many heartbeats had come when it last named its target
+        self._asked: tuple[int, int, int, int] | None = None  # when, and what was missing, answered and heard before
+        self._answered: tuple[int, int] | None = None  # when the last answer came, and how many had
+        #: it is to be asked for its target now
+        self.asks = False
+
+    def is_gone(self, seen: ObservedVehicle, now_us: int, asked: int) -> bool:
+        """Whether it names no target any more; `asked` counts the questions that were put so far."""
+        if seen.targets != self._targets or now_us - seen.target_us <= UNNAMED_US * self._slack:
+            self._targets, self._beats, self._asked, self.asks = seen.targets, seen.beats, None, False
+            return False
+        if seen.beats - self._beats >= MANY_BEATS:
+            return True
+        missing, asked_us = seen.numbered - seen.heard, now_us if self._asked is None else self._asked[0]
+        is_lost = self._asked is not None and missing > self._asked[1]
+        again_us = (NAMED_WITHIN_US if is_lost else ASKED_ANEW_US) * self._slack
+        if self._asked is None or now_us - asked_us >= again_us:
+            self._asked, self._answered = (now_us, missing, seen.answers - asked, seen.beats), None
+            self.asks = True
+            return False
+        if is_lost:
+            return False
+        if seen.answers - asked < self._asked[2] or seen.beats == self._asked[3] or self.asks:
+            return False  # not all that was asked is answered
+        if self._answered is None or self._answered[1] != seen.answers:
+            self._answered = now_us, seen.answers
+        return now_us - self._answered[0] >= NAMED_WITHIN_US * self._slack
+
+
+#: us of link time that it must stand, after it moved, before that is somebody's pause;
+STANDS_US: Final = 1_500_000
+#: mm/s: it moved, if it was as fast as this,
+MOVED: Final = 1_500
+#: mm: and it is far from its target, where it would not slow down by itself;
+FAR: Final = 10_000
+#: mm: or from the height of its climb;
+FAR_BELOW: Final = 2_000
+#: degrees: what leans more fights the wind;
+LEANS: Final = 15
+#: mm, us: what is as near ahead may be why it stands
+BLOCKED: Final = 10_000
+BLOCKED_US: Final = 2_000_000
+
+
+class PauseWatch:
+    """Whether a vehicle on its way to its target was stopped by somebody, who changed neither mode nor target.
+
+    ArduCopter's DO_PAUSE_CONTINUE takes 3 s from 5.6 m/s (recorded). Wind makes it lean, an obstacle is seen ahead, at
+    the end of a leg it is near its target, and without a position nothing is known.
+    """
+
+    def __init__(self, far: int = FAR) -> None:
+        self._far = far
+        self._moved = False
+        self._since_us: int | None = None
+
+    @property
+    def due_us(self) -> int:
+        """When it will have stood for long enough, in link time, unless something is seen before."""
+        return NEVER if self._since_us is None else self._since_us + STANDS_US
+
+    def is_paused(self, seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int) -> bool:
+        """Whether it stands so since it moved; `left` is how far its target is."""
+        self._moved = self._moved or (seen.speed is not None and seen.speed >= MOVED)
+        if not self._moved or not stands_idly(seen, left, now_us, self._far):
+            self._since_us = None
+            return False
+        if self._since_us is None:
+            self._since_us = seen.up_us
+        return seen.up_us - self._since_us >= STANDS_US
+
+
+def stands_idly(seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int, far: int = FAR) -> bool:
+    """Whether it stands still far from its target, and nothing that is seen keeps it there."""
+    if left is None or min(left) < far or not still(seen):
+        return False
+    blocked = seen.ahead is not None and seen.ahead < BLOCKED and now_us - seen.ahead_us <= BLOCKED_US
+    return seen.tilt < LEANS and not blocked
+
+
+#: us of link time that a leg must be flown steadily at less than `SLOWER` % of the speed that it was told
+SLOW_US: Final = 4_000_000
+SLOWER: Final = 60
+#: mm/s by which a steady speed goes up and down at most
+STEADY: Final = 600
+
+
+class SpeedWatch:
+    """Whether a leg is flown steadily slower than it was told: somebody set another speed (DO_CHANGE_SPEED)."""
+
+    def __init__(self, told: int) -> None:
+        self._told = told
+        self._since_us: int | None = None
+        self._low = self._high = 0
+        #: how fast it flies instead, in mm/s, once that is known
+        self.slow: int | None = None
+
+    def look(self, seen: ObservedVehicle, left: tuple[int, ...] | None) -> bool:
+        """Take in what is seen; whether it is found to be slow now, and was not before."""
+        speed = seen.speed
+        if not self._told or self.slow is not None:
+            return False
+        steadily = speed is not None and max(self._high, speed) - min(self._low, speed) <= STEADY
+        slow = speed is not None and not still(seen) and 100 * speed < SLOWER * self._told
+        if speed is None or not slow or left is None or min(left) < FAR or seen.tilt >= LEANS:
+            self._since_us = None
+            return False
+        if self._since_us is None or not steadily:
+            self._since_us, self._low, self._high = seen.up_us, speed, speed
+            return False
+        self._low, self._high = min(self._low, speed), max(self._high, speed)
+        if seen.up_us - self._since_us < SLOW_US:
+            return False
+        self.slow = speed
+        return True
 
 
 # ---------------------------------------------------------------- crashes

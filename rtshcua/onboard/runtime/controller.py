@@ -246,7 +246,8 @@ class MissionController:
         supervisor, at_us = self._supervisor, now.monotonic_us
         violated = None
         if supervisor is not None:
-            violated = supervisor.violated(self.monitor.state(at_us), now, self.link.away_us(at_us))
+            away_us = self.link.away_us(at_us)
+            violated = supervisor.violated(self.monitor.state(at_us), now, away_us, self.dispatcher.hindrance)
         return violated is not None and self._violated(now, violated)
 
     def _violated(self, now: Now, what: Detail) -> bool:

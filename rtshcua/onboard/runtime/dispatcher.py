@@ -8,7 +8,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.isolated import IsolatedExecutor
-from rtshcua.onboard.ports import Command, Frozen, Obeyed, Release
+from rtshcua.onboard.ports import Command, Frozen, Hindered, Obeyed, Release
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
@@ -69,6 +69,7 @@ class Dispatcher:
         self.dispatched = False  # something was sent in this flight,
         self.done = False  # and was seen to be obeyed,
         self.used = False  # and in this run, as its log tells: it stays after a landing
+        self.hindrance = ""  # what is known to keep the command that flies from getting on
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
 
     def fly(self, now: Now, permit: bytes, ref: Ref, lasting_us: int | None) -> bool:
@@ -95,6 +96,7 @@ class Dispatcher:
         at_us = now.monotonic_us
         self.end(now, "replaced")
         self._journal.add(command)
+        self.hindrance = ""
         self.active = Active(ref, command, at_us, None if lasting_us is None else at_us + lasting_us)
         self.dispatched = self.used = True
         self._journal.effect(now, "dispatched", ref, token=command.token, detail=command.skill)
@@ -115,6 +117,12 @@ class Dispatcher:
         if active is not None:
             self.done = True
             self._journal.effect(now, OBEYED, active.ref, detail=" ".join(map(str, event.target or ())))
+
+    def hindered(self, now: Now, event: Hindered) -> None:
+        """Note what hinders the command that flies: where its time is over, that is why."""
+        if self.flying(event.token) is not None:
+            self._journal.note(now, event.text)
+            self.hindrance = event.text
 
     def flying(self, token: int) -> Active | None:
         """The command that flies, if it is this one: a late word about another one means nothing any more."""

@@ -32,7 +32,7 @@ MOST_SAID: Final = 200
 REFUSED_EVERY_US: Final = 1_000_000
 
 #: what is taken over before a crash or a takeover: it changes no stage, and tells how it came to that
-_TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.Said, ports.Noted)
+_TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.Said, ports.Noted, ports.Hindered)
 _RUNNING, _ENDED = Stage.RUNNING, Stage.ENDED  # an enumeration's attributes are slow to find
 
 
@@ -217,6 +217,8 @@ class EventHandler:
                 self._journal.note(now, event.text)
             case ports.Obeyed():
                 self._controller.dispatcher.obeyed(now, event)
+            case ports.Hindered():
+                self._controller.dispatcher.hindered(now, event)
             case ports.Anchored():
                 self._journal.effect(now, ANCHORED, detail=event.note)
 

@@ -63,13 +63,16 @@ class Supervisor:
         """How long the skill runs, in time with a link."""
         return at_us - self._started_us - (away_us - self._away_us)
 
-    def violated(self, state: State, now: Now, away_us: int = 0) -> Detail | None:
-        """The text of what does not hold any more, with the values that it read, or None while all does."""
+    def violated(self, state: State, now: Now, away_us: int = 0, hindrance: str = "") -> Detail | None:
+        """The text of what does not hold any more, with the values that it read, or None while all does. `hindrance`
+        is what is known to have taken its time, in words.
+        """
         contract = self._prepared.invocation.contract
         at_us = now.monotonic_us
         if 0 < contract.duration_us < self.lasted_us(at_us, away_us):
             away_ms = (away_us - self._away_us) // 1_000
-            return f"{DURATION}, besides {away_ms} ms without a link" if away_ms else DURATION
+            besides = f", besides {away_ms} ms without a link" if away_ms else ""
+            return f"{DURATION}{besides}: {hindrance}" if hindrance else f"{DURATION}{besides}"
         text = self.grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
         return None if text is None else partial(_with_values, text, self._prepared, self._policy, state)
 

@@ -8,9 +8,10 @@
 | `battery` | a collision, coming down too hard | the battery was made empty, and is |
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | ArduCopter's pause, sticks that nudge; PX4's in a stop, or a climb's end |
+| `unseen` | motion after a takeover | ArduCopter's pause until it stands, or near an end; a velocity in its takeoff |
+| `unseen` | motion after a takeover | sticks that nudge; PX4's pause in a stop, or a climb's end |
 | `unseen` | motion after a takeover | the mode is the one that our last frame asked for, which was lost |
-| `report` | standing down in the air | the mode in a stuck HEARTBEAT, as if somebody had chosen it again |
+| `report` | standing down in the air | a HEARTBEAT or position is stuck, or a target is told no more |
 | `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
 | `ground` | motion after a takeover | a landing was sent to a vehicle on the ground |
 | `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
@@ -20,10 +21,11 @@
 """
 
 from collections.abc import Callable, Iterator
-from math import hypot
+from math import cos, hypot, radians
 from typing import Final, NamedTuple
 
 import msgspec
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode, Way
@@ -50,6 +52,14 @@ _SAME_MM: Final = 1_000
 _UNWRITTEN_US: Final = 250_000
 #: us: a mode that a stuck HEARTBEAT told is believed so long after
 _MODE_US: Final = 2_000_000
+#: us until ArduCopter stands in a pause, and until that counts;
+#: mm and mm/s: so far from its target, having moved so fast
+_STANDS_US: Final = 4_000_000
+_NOTICED_US: Final = 3_000_000
+_FAR_MM: Final = 12_000
+_MOVED_MM_S: Final = 2_000
+_POSITION_TARGET: Final = (86).to_bytes(3, "little")  # SET_POSITION_TARGET_GLOBAL_INT
+_MM: Final = 11.132  # in 1e-7 degree
 _RANGES: Final = frozenset({"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"})
 _FOREVER: Final = 1 << 60
 
@@ -216,12 +226,24 @@ class Excuses:
         return self._flown.flavour == "ardupilot" and all(lands)
 
     def _misled(self, failure: Failure) -> str | None:
-        """The last mode that showed came from a HEARTBEAT that was stuck: as if somebody had chosen it again."""
+        """The last mode that showed came from a HEARTBEAT that was stuck, as if somebody had chosen it again. So it is
+        with ArduCopter's target that is told no more, and with a position that stands still.
+        """
         if self._flown.ending != "stood-down":
             return None
-        stuck = self._during(failure.at_us - _MODE_US, failure.at_us)
-        told = any(isinstance(fault, faults.MessageStuck) and fault.message == "HEARTBEAT" for fault in stuck)
-        return "report" if told else None
+        for fault in self._during(failure.at_us - _MODE_US, failure.at_us):
+            match fault:
+                case faults.MessageStuck(message="HEARTBEAT"):
+                    return "report"
+                case faults.MessageSilence(message="POSITION_TARGET_GLOBAL_INT") if self._is_copter:
+                    return "report"
+                case faults.MessageStuck(message="GLOBAL_POSITION_INT") if self._is_copter:
+                    return "report"
+        return None
+
+    @property
+    def _is_copter(self) -> bool:
+        return self._flown.flavour == "ardupilot"
 
     def _air_mm_s(self, at_us: int) -> float:
         start = self._flown.scenario.start
@@ -246,9 +268,8 @@ class Excuses:
         told = self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)
         if any(fault.at_us >= since_us for fault in told):
             return None
-        if self._flown.flavour == "ardupilot":
-            silent = any(self._before(failure.at_us, faults.PilotPause, faults.PilotSticks))
-            return "unseen" if silent else None
+        if self._is_copter:
+            return "unseen" if self._is_silent(failure) else None
         if any(self._before(failure.at_us, faults.PilotSticks)):
             return None
         for fault in self._before(failure.at_us, faults.PilotPause):
@@ -257,6 +278,38 @@ class Excuses:
             if sample is not None and climbs and any(abs(up - sample.up_mm) <= _SAME_MM for up in self._climbs()):
                 return "unseen"
         return None
+
+    def _is_silent(self, failure: Failure) -> bool:
+        """Whether what a pilot did to ArduCopter may not have shown. A pause on a leg does, once it stands, unless
+        something else went wrong, or is at its end.
+        """
+        others = (faults.PilotPause, faults.PilotSpeed, faults.AgentFault)
+        alone = all(isinstance(each.fault, others) for each in self._happened if each.at_us <= failure.at_us)
+        for fault in self._before(failure.at_us, faults.PilotPause, faults.PilotSticks, faults.PilotVelocity):
+            sample, left_mm = self._sample(fault.at_us), self._left_mm(fault.at_us + _STANDS_US)
+            if isinstance(fault, faults.PilotVelocity):
+                if left_mm is None and sample is not None and sample.in_air:
+                    return True  # in its takeoff it names no target that could vanish
+                continue
+            far = left_mm is not None and left_mm > _FAR_MM
+            moved = sample is not None and sample.speed_mm_s >= _MOVED_MM_S
+            shows = isinstance(fault, faults.PilotPause) and alone and far and moved
+            if not shows or failure.at_us - fault.at_us <= _STANDS_US + _NOTICED_US:
+                return True
+        return False
+
+    def _left_mm(self, at_us: int) -> float | None:
+        """How far it was then from the place that ArduCopter was last sent to; None if it was sent nowhere."""
+        sample, place = self._sample(at_us), None
+        for frame in self._flown.frames:
+            if frame.heard_us is None or frame.heard_us > at_us or frame.octets[7:10] != _POSITION_TARGET:
+                continue
+            message = dialect.MAVLink(None).decode(bytearray(frame.octets))
+            place = message.lat_int, message.lon_int
+        if sample is None or place is None:
+            return None
+        north, east = (place[0] - sample.latitude) * _MM, (place[1] - sample.longitude) * _MM
+        return hypot(north, east * cos(radians(sample.latitude / 1e7)))
 
     def _climbs(self) -> Iterator[int]:
         """The heights that the mission takes off to."""

@@ -84,7 +84,8 @@ class Recorded:
         self._frames = FrameSession()
         self.driver = Driver(self.policy, self._frames, fence=False)
         self._reader, self._teller = Codec(0, 0), Codec(1, 1)
-        self._told: dict[int, bytes] = {}  # the last report of mode and target
+        self._told: dict[int, bytes] = {}  # the last report of mode and target,
+        self._told_us: dict[str, int] = {}  # and when it came
         self._alive_us = START_US  # when the autopilot itself was last heard
         self._now_us = START_US
         self._boots: deque[int] = deque(maxlen=20)  # boot time minus ours, as the last stamps have it
@@ -163,10 +164,11 @@ class Recorded:
             if isinstance(event, Readings):
                 self._monitor.update(event)
 
-    def _receive(self, frame: bytes) -> None:
+    def _receive(self, frame: bytes, *, again: bool = False) -> None:
         for received in self._reader.parse(frame):
             if received.name in ASKED and received.component == 1:
                 self._told[ASKED[received.name]] = frame
+                self._told_us[received.name] = self._told_us.get(received.name, 0) if again else self._now_us
         heard = self.driver.receive(frame, self._now_us)
         self._boots += [boot_us - self._now_us for boot_us in map(_boot_us, heard.frames) if boot_us]
         self._take(heard.events)
@@ -191,10 +193,13 @@ class Recorded:
         self._receive(self._teller.pack(mavlink.MAVLink_command_ack_message(number, 0, 0, 0, 1, OURS)))
 
     def _tell(self, number: int) -> None:
-        """As both real ones answer: acknowledged, and as it was told last."""
+        """As both real ones answer: acknowledged, and as it was told last; a target only while it is streamed."""
         self._acknowledge(mavlink.MAV_CMD_REQUEST_MESSAGE)
+        streamed = self._now_us - self._told_us.get("POSITION_TARGET_GLOBAL_INT", 0) <= SILENT_US
+        if number == ASKED["POSITION_TARGET_GLOBAL_INT"] and not streamed:
+            return
         if number in self._told and self._now_us - self._alive_us <= SILENT_US:
-            self._receive(self._told[number])
+            self._receive(self._told[number], again=True)
 
     def _answer_clock(self, at_us: int, ts1_ns: int) -> None:
         if self._now_us - self._alive_us > SILENT_US:

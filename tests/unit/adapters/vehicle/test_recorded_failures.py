@@ -1,4 +1,4 @@
-"""Six recorded flights of ours in which something went wrong, through the driver: what it makes of them now.
+"""Nine recorded flights of ours in which something went wrong, through the driver: what it makes of them now.
 
 Times are seconds from the first frame of the recording (`tests/traces/README.md`).
 """
@@ -74,6 +74,45 @@ def test_a_guided_target_is_not_overwritten() -> None:
     """
     seen = flown("arducopter-pilot-goto", (18.6, leg()), until_s=61)
     assert len([at for at in legs_sent(seen) if at < 60]) <= 2
+
+
+#: when the first frame of a recording that was cut came, in seconds of what it was cut from
+FIRST_S = {"arducopter-velocity-takeover": 0.26, "arducopter-pause-takeover": 0.25}
+FAR = (473_996_000, 85_455_900)
+
+
+def far_leg() -> Any:
+    return command(1, MotionKind.FLY, *FAR, altitude=20_000, speed=6_000)
+
+
+@pytest.mark.parametrize(
+    ("name", "begun", "taken_at", "how"),
+    [
+        ("arducopter-velocity-takeover", 49.88, 52.87, "no target"),  # it was braked at 62.58, and flown home
+        ("arducopter-pause-takeover", 49.29, 57.0, "paused"),  # at 63.28; it stands from 54.9 s on
+    ],
+)
+def test_a_velocity_and_a_pause_in_guided_are_seen_and_not_fought(
+    name: str, begun: float, taken_at: float, how: str
+) -> None:
+    """The numbers of the frames in these recordings have gaps, so that only many heartbeats without a target tell."""
+    seen = flown(name, (begun - FIRST_S[name], far_leg()), until_s=64 - FIRST_S[name])
+    (at, taken), *_ = seen.of(TakenOver)
+    assert taken.how == how
+    late = 2.6 if how == "no target" else 0.5  # without answers, 25 heartbeats
+    assert taken_at - 0.7 < at + FIRST_S[name] < taken_at + late
+    steers = [frame.name for _, frame in seen.sent if frame.name == "SET_POSITION_TARGET_GLOBAL_INT"]
+    modes = [f for _, f in seen.sent if f.name == "COMMAND_LONG" and f.message.command == mavlink.MAV_CMD_DO_SET_MODE]
+    assert len(steers) == 1
+    assert not modes
+
+
+def test_a_land_that_was_undone_is_not_seen_and_our_leg_asks_for_no_mode_now() -> None:
+    """Nothing in the recording shows it: what leaves must not be able to undo it."""
+    seen = flown("px4-land-undone", (30.86, hover()), (33.45, leg(3)), until_s=38)
+    sent = [frame.message for _, frame in seen.sent if frame.name == "COMMAND_INT"]
+    assert sent
+    assert {message.param2 for message in sent} == {0.0}
 
 
 def test_after_a_dropout_all_is_known_again_before_a_second_is_over() -> None:

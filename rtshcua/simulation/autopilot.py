@@ -279,6 +279,7 @@ class Autopilot:
         self._told_mode = self.vehicle.mode
         self._status = self._present
         self._published: deque[tuple[int, Status]] = deque()  # until when its reports still tell of what was so
+        self._told_danger = False
         self._remind_us = _REMIND_US
         self._text_id = 0
 
@@ -482,6 +483,12 @@ class Autopilot:
         while published and now_us >= published[0][0]:
             published.popleft()
         return published[0][1] if published else self._present
+
+    def tells_danger(self, danger: bool) -> bool:
+        """Whether its state is told to be critical: with the mode that it is in, and as late."""
+        if self.shown.mode is self.vehicle.mode:
+            self._told_danger = danger
+        return self._told_danger
 
     @property
     def ready(self) -> bool:

@@ -61,7 +61,7 @@ def heartbeat(a: Autopilot) -> Message:
     booting = a.sensors.booting
     if booting is not None:
         status = booting
-    elif a.failsafes.low_voltage or (vehicle.armed and _in_danger(a)):
+    elif a.tells_danger(a.failsafes.low_voltage or (vehicle.armed and _in_danger(a))):
         status = mavlink.MAV_STATE_CRITICAL
     else:
         status = mavlink.MAV_STATE_ACTIVE if active else mavlink.MAV_STATE_STANDBY

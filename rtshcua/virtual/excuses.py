@@ -288,7 +288,7 @@ class Excuses:
         for fault in self._before(failure.at_us, faults.PilotPause, faults.PilotSticks, faults.PilotVelocity):
             sample, left_mm = self._sample(fault.at_us), self._left_mm(fault.at_us + _STANDS_US)
             if isinstance(fault, faults.PilotVelocity):
-                if left_mm is None and sample is not None and sample.in_air:
+                if self._left_mm(failure.at_us - failure.amount) is None:
                     return True  # in its takeoff it names no target that could vanish
                 continue
             far = left_mm is not None and left_mm > _FAR_MM

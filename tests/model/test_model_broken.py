@@ -175,7 +175,7 @@ def lasting_links(of: Any) -> Any:
 
 
 ENDLESS: dict[str, tuple[type, str, Callable[[Any], Any], str]] = {
-    "steps last": (Supervisor, "violated", lambda of: lambda self, state, now: None, "interrupted"),
+    "steps last": (Supervisor, "violated", lambda of: lambda self, state, now, *_: None, "interrupted"),
     "links last": (Fallback, "turn", lasting_links, "interrupted"),
     "nothing is insisted on": (
         Fallback, "_insist", lambda of: lambda self, now, state: True, "interrupted"),

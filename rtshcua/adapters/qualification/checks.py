@@ -467,8 +467,8 @@ def _takeover(
         found = "not detected" if shown is None else f"detected by `{takeover.how}`; how late is not known"
         return _check(slug, shown is not None and flown.ending == Ending.STOOD_DOWN, "it is detected", found)
     limit = _within_us(observed)
-    stalls = takeover.kind is TakeoverKind.PAUSE and takeover.how == "stopped-short"
-    if stalls:  # ArduCopter's pause changes neither mode nor target: it is no progress (docs/adr/0034)
+    stalls = takeover.kind is TakeoverKind.PAUSE and takeover.how == "paused"
+    if stalls:  # ArduCopter's pause changes neither mode nor target: it shows once the vehicle stands (docs/adr/0034)
         limit = _STALLS_US + 2 * _SECOND + observed.mode_within_us
     expected = f"detected within {_time(limit)}, and no motion frame is sent after that"
     advice = "the program would fly against the pilot: do not fly it"

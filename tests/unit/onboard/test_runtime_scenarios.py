@@ -27,7 +27,7 @@ from rtshcua.model.flat.contract import QUANTITY, Motion, MotionKind, Parameter
 from rtshcua.model.flat.mission import Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.onboard.enforcement.load import Mode
-from rtshcua.onboard.ports import AirState, Ending, Failed, Readings, Ready, Succeeded
+from rtshcua.onboard.ports import AirState, Ending, Failed, Hindered, Readings, Ready, Succeeded
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import Stage
 
@@ -179,6 +179,20 @@ def test_a_skill_that_lasts_too_long_is_given_up() -> None:
     assert [record["detail"] for record in run.records if record.get("event") == "violated"] == [
         "lasts longer than it may"
     ]
+
+
+def test_what_kept_a_skill_from_getting_on_is_named_where_its_time_is_over() -> None:
+    run = start(vehicle=FakeVehicle(deaf={"goto"})).until_flies("goto")
+    token = run.vehicle.commands[-1].token
+    run.step(Hindered(0, token - 1, "of the one before"))
+    run.step(Hindered(0, token, "it flies at 1.0 m/s where 5.0 m/s were told"))
+    run.until_over(400)
+    details = [record["detail"] for record in run.records if record.get("event") in ("violated", "noted")]
+    assert details == [
+        "it flies at 1.0 m/s where 5.0 m/s were told",
+        "lasts longer than it may: it flies at 1.0 m/s where 5.0 m/s were told",
+    ]
+    assert run.flown == ["takeoff", "goto", "hover", "return_home"]
 
 
 def test_it_came_down_without_being_told_to() -> None:

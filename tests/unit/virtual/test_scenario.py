@@ -330,7 +330,7 @@ def test_a_pause_in_the_last_metres_of_a_climb_of_px4_is_seen(at_s: float, seed:
 
 def test_a_pause_that_our_next_step_undoes_before_it_shows() -> None:
     """Both reach PX4 in the same moment, as the climb ends."""
-    found = flown(scenario(incident(10, faults.PilotPause(0))), seed=1)
+    found = flown(scenario(incident(10.34, faults.PilotPause(0))), seed=1)
     judgement = judge(found)
     assert judgement.failures == ()
     assert {each.cause for each in judgement.exceptions} == {"crossed"}

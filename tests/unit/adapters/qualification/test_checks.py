@@ -119,9 +119,10 @@ def taken(kind: TakeoverKind, shown_us: int | None, how: str = "another target",
         (taken(TakeoverKind.MODE, None), FAILED),
         (taken(TakeoverKind.TARGET, 320_000, moved_us=S + 320_000), HELD),
         (taken(TakeoverKind.TARGET, 320_000, moved_us=S + 400_000), FAILED),
-        (taken(TakeoverKind.PAUSE, 9 * S, "stopped-short"), HELD),  # ArduCopter's: no progress is all that shows
-        (taken(TakeoverKind.TARGET, 9 * S, "stopped-short"), FAILED),
-        (taken(TakeoverKind.PAUSE, 11 * S, "stopped-short"), FAILED),
+        (taken(TakeoverKind.PAUSE, 6 * S, "paused"), HELD),  # ArduCopter's: that it stands is all that shows
+        (taken(TakeoverKind.TARGET, 6 * S, "paused"), FAILED),
+        (taken(TakeoverKind.PAUSE, 11 * S, "paused"), FAILED),
+        (taken(TakeoverKind.PAUSE, 6 * S, "stopped-short"), FAILED),
     ],
 )
 def test_a_takeover_shows_within_what_is_declared_and_the_links_delay(

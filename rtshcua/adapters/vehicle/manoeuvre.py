@@ -637,7 +637,7 @@ class Manoeuvre:
 
     def _flown_otherwise(self, seen: ObservedVehicle, now_us: int) -> str | None:
         """What shows over a while that somebody else flies, in our mode and without another target."""
-        if self._taken or self._aids.suspicion.stands or seen.mode not in self._modes:
+        if self._taken or self._aids.suspicion.stands or seen.mode not in self.modes:
             return None
         if not self._names_target(seen):  # in a climb it names none
             paused = self._command.kind == MotionKind.CLIMB and self._is_paused(seen, now_us)

@@ -105,7 +105,7 @@ class Flight:
         self.link.close()
 
 
-def measured(name: str, of: Loaded, folder: Path, blocks: int = BLOCKS, lasts_s: float = BLOCK_S) -> float:
+def measured(name: str, of: Loaded, folder: Path) -> float:
     """Print the gaps of a mode, and give how many times the quiet one that of a flood is."""
     flight = Flight(of, folder)
     documents = [document for document, _ in hostile(MISSION_KEY).values()] + [replacement(of)] * 2
@@ -121,10 +121,10 @@ def measured(name: str, of: Loaded, folder: Path, blocks: int = BLOCKS, lasts_s:
     try:
         flight.worst_gap_s(2.0)
         gaps: tuple[list[float], list[float]] = ([], [])
-        for _ in range(blocks):
+        for _ in range(BLOCKS):
             for flooded, of_kind in enumerate(gaps):
                 (switch.set if flooded else switch.clear)()
-                of_kind.append(flight.worst_gap_s(lasts_s))
+                of_kind.append(flight.worst_gap_s(BLOCK_S))
         assert flight.handed_in, "nothing was handed in"
     finally:
         for each in others:
@@ -141,7 +141,7 @@ def measured(name: str, of: Loaded, folder: Path, blocks: int = BLOCKS, lasts_s:
     return ratio
 
 
-def in_process(folder: Path, blocks: int = BLOCKS, lasts_s: float = BLOCK_S) -> float:
+def in_process(folder: Path) -> float:
     """The same with the boundary in a process of its own."""
     process = BoundaryProcess(ROOT.sign(ROOT_KEY), PIN, VEHICLE, folder, paced=True)
     try:
@@ -150,7 +150,7 @@ def in_process(folder: Path, blocks: int = BLOCKS, lasts_s: float = BLOCK_S) -> 
             session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False, caller=Caller(process.call),
         )  # fmt: skip
         assert isinstance(of, Loaded), of
-        return measured("process", of, folder, blocks, lasts_s)
+        return measured("process", of, folder)
     finally:
         process.close()
 

@@ -177,7 +177,7 @@ class Flight:
             self._feed.post(Note(_CRASHED))
         missing = self._close(ending)
         lacks = ExitCode.FULL
-        found = ReadBack(None) if missing else read_back(self._run.path / LOG, self._root)
+        found = ReadBack(None) if missing else read_back(self._run.path / LOG)
         if found.refused is not None:
             missing, lacks = (found.refused,), ExitCode.EVIDENCE
         self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=not missing)

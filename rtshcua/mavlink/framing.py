@@ -57,5 +57,5 @@ def with_flags(frame: bytes, flags: int) -> bytes:
 
 
 def unsigned(frame: bytes) -> bytes:
-    """A frame as it is logged: without its signature: none are to be collected (guide to signing, "Logging")."""
+    """A frame without its signature."""
     return with_flags(frame, 0) if frame[FLAGS] & FLAG_SIGNED else frame

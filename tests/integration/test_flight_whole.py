@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +20,8 @@ from rtshcua.adapters.files.signing import fingerprint, read_link_key, write_lin
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink import tlog
-from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
+from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
+from rtshcua.mavlink.radio import RADIO_STATUS
 from virtual.forked import Forked
 
 
@@ -204,11 +206,16 @@ def test_bundle_flies_again_with_fresh_state_and_a_pipe_gets_plain_lines(watched
 # ----------------------------------------------------------------------------------------- a signed link
 
 
-def test_signatures_are_not_in_the_raw_frames_and_what_they_promise_is_kept(signed: Flown) -> None:
+def test_whoever_has_the_links_key_can_verify_each_raw_frame_and_what_signatures_promise_is_kept(
+    signed: Flown,
+) -> None:
     frames = [entry.frame for entry in tlog.read((signed.run.folder / "telemetry.tlog").read_bytes())]
-    assert len(frames) > 100
-    assert not any(frame[FLAGS] & FLAG_SIGNED for frame in frames)
     link_key = read_link_key(signed.ground.folder / "link.key")
+    sealed = [frame for frame in frames if frame[FLAGS] & FLAG_SIGNED]
+    assert len(sealed) > 100
+    assert all(sha256(link_key + frame[:-6]).digest()[:6] == frame[-6:] for frame in sealed)
+    assert {frame[5:7] for frame in sealed} == {bytes([1, 1]), bytes([1, 191])}
+    assert {message_id(frame, 0) for frame in frames if not frame[FLAGS] & FLAG_SIGNED} <= {RADIO_STATUS}
     (state,) = (signed.ground.folder / "data").rglob(fingerprint(link_key))
     streams = json.loads(state.read_text())["streams"]
     assert [stream[:2] for stream in streams] == [[1, 1]]

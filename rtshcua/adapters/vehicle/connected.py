@@ -7,7 +7,6 @@ from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.driver import HEARTBEAT_US, Driver
 from rtshcua.adapters.vehicle.transport import Transport
 from rtshcua.codec.stream import FrameStream, StreamCounts
-from rtshcua.mavlink.framing import unsigned
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.onboard.ports import Command, Event, Noted
 
@@ -181,4 +180,4 @@ class ConnectedVehicle:
         """Hand over what came and left since the last call, in its order."""
         unkept, self._unkept = self._unkept, []
         for utc_us, frame in unkept:
-            self._keep(utc_us, unsigned(frame))
+            self._keep(utc_us, frame)

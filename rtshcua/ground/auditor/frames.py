@@ -29,6 +29,7 @@ from rtshcua.ground.auditor.sent import Frame, Nature, name, nature, read, switc
 from rtshcua.ground.auditor.sent import parameter as setting
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.mavlink import enums
+from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
 from rtshcua.mavlink.modes import is_vehicle
 from rtshcua.mavlink.parameters import bits_of
@@ -277,7 +278,7 @@ class Frames:
             self._set(frame, entry, allowed)
             return
         self.count += 1
-        self._finding = self._finding or self._passed.frame(entry.octets)
+        self._finding = self._finding or self._passed.frame(unsigned(entry.octets))
         if self._suspect is not None or self._finding is not None:
             return
         running = self._running

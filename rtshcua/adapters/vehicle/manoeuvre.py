@@ -630,7 +630,7 @@ class Manoeuvre:
         if seen.landing and not homeward and not self._was_landing:
             return "landing", "landing", seen.landings
         if seen.critical and seen.airborne and not homeward and self._flavour.critical_acts:
-            return "failsafe", "failsafe", seen.beats
+            return "failsafe", "its state is critical", seen.beats
         if self._aids.targets.is_foreign(seen):
             return "target", "another target", seen.targets
         return None

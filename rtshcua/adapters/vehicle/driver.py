@@ -427,6 +427,7 @@ class Driver:
         at_us = source.of(frame, now_us)
         if source.stepped:
             seen.made_us.clear()
+            self._crash.forget()
         if component == AUTOPILOT:
             seen.count(source.place)
             self._spoken.add(name)
@@ -447,7 +448,7 @@ class Driver:
             return False
         before = seen.mode
         new = seen.take(name, message, now_us, at_us, source.place)
-        crashed = self._crash.look(seen, now_us)
+        crashed = self._crash.look(seen, name, now_us)
         if crashed is not None:
             events.append(ports.Crashed(now_us, crashed))
             self._others = "crashed"

@@ -9,7 +9,7 @@ and EKF_STATUS_REPORT (ArduPilot) tell; up to 0x200 they mean the same in both.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import acos, cos, degrees, hypot, isfinite
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from rtshcua.adapters.vehicle.suspicion import UNBROKEN_US
 from rtshcua.mavlink import enums
@@ -153,6 +153,16 @@ _SENSORS: Final = {
 }  # fmt: skip
 
 
+class Placed(NamedTuple):
+    """What one report of its place said of the moment at which it was measured, in us: mm above home, None where the
+    estimator did not vouch for that then, and how fast it sank, in mm/s.
+    """
+
+    at_us: int
+    height: int | None
+    descent: int
+
+
 Reported = tuple[int, int, int]
 """Where an autopilot says that it flies to: latitude and longitude in 1e-7 degree, mm above mean sea level."""
 
@@ -166,8 +176,8 @@ class ObservedVehicle:
     """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us.
 
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
-    so now, of a position that is not old. `target` is where the autopilot says that it flies to. `descent` is how fast
-    it sinks and `tilt` how many degrees it leans (`tilt_us`: told then), whoever vouches for that. `beats` counts
+    so now, of a position that is not old; `placed` is the last report of all, however old. `target` is where the autopilot says that it flies to. `descent` is how fast
+    it sinks and `tilt` how many degrees it leans (`tilt_us`: measured then), whoever vouches for that. `beats` counts
     heartbeats and `targets` reports of a target (`target_us`: told last); `up_us` is link time, see `LinkWatch`.
     `heard` counts frames of the autopilot, `numbered` those that it sent by then, as their numbers tell, and `answers`
     its answers to questions for messages. `ahead` is what its range finder last saw in front, at `ahead_us`.
@@ -193,6 +203,7 @@ class ObservedVehicle:
     speed: int | None = None
     descent: int = 0
     placed_us: int = 0
+    placed: Placed | None = None
     down_us: int = 0
     tilt: int = 0
     tilt_us: int = 0
@@ -243,7 +254,8 @@ class ObservedVehicle:
     def _take(self, name: str, message: Any, now_us: int, at_us: int | None) -> bool:
         match name:  # what comes most often, first
             case "ATTITUDE":
-                self.tilt, self.tilt_us = _tilt(message.roll, message.pitch), now_us
+                self.tilt = _tilt(message.roll, message.pitch)
+                self.tilt_us = now_us if at_us is None else at_us
             case "HEARTBEAT":
                 self.mode = message.custom_mode
                 armed = bool(message.base_mode & enums.MAV_MODE_FLAG_SAFETY_ARMED)
@@ -256,7 +268,11 @@ class ObservedVehicle:
                 was, self.landed_state = self.landed_state, message.landed_state
                 self.landings += 1
                 return bool(was != self.landed_state)
-            case "GLOBAL_POSITION_INT" if at_us is not None and now_us - at_us <= STALE_US:
+            case "GLOBAL_POSITION_INT" if at_us is not None:
+                height = message.relative_alt if self.estimator.height(at_us) else None
+                self.placed = Placed(at_us, height, 10 * message.vz)
+                if now_us - at_us > STALE_US:
+                    return False
                 self._place(message, now_us)
                 return True
             case "POSITION_TARGET_GLOBAL_INT":

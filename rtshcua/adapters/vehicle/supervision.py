@@ -4,7 +4,7 @@ whether it crashed. A mode report or an acknowledgement proves nothing, only wha
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.effects import STILL, apart, still
 from rtshcua.adapters.vehicle.flavour import KEPT, KEPT_LEVEL, ExpectedProgress, ExpectedTarget
@@ -383,7 +383,8 @@ class SpeedWatch:
 
 # ---------------------------------------------------------------- crashes
 
-#: us: how old the last report of its flight may be when they stop; after a silence it may have landed meanwhile
+#: us between what is judged together: its height, that it flies, and that its motors stopped. What lies further apart is
+#: of two moments, between which it may have landed.
 RECENT_US: Final = 2_000_000
 #: us between two reports of a tilt, of which a single one proves nothing
 LASTS_US: Final = 400_000
@@ -395,67 +396,133 @@ LIES_WITHIN_US: Final = 10_000_000
 #: degrees: autopilots lean at most 45 of their own accord
 TILTED: Final = 60
 
+_POSITION: Final = "GLOBAL_POSITION_INT"
+
+
+class _Off(NamedTuple):
+    """The first heartbeat that says that the motors are off: its place in the order of sending, by when they were, and
+    whether that is by the vehicle's clock.
+    """
+
+    place: int
+    by_us: int
+    settled: bool
+
 
 class CrashWatch:
     """A crash told from a landing, once, by each observation of one flight: by the motors, the fall and the attitude.
 
     What lies on the ground with its motors off says ON_GROUND however it came there.
+
+    All times are the vehicle's, on our clock (`source_time`): after a stall or a silence what waited comes all at once,
+    with a gap behind it, and only its own time tells what is of one moment. The time of a report without a stamp is at
+    least that of the last stamp before it, and at most that of the next one, or when it came. What must be recent
+    counts by the first, what must have been soon by the second.
     """
 
     def __init__(self) -> None:
         self._flown = False
         self._told = False
+        self.forget()
+
+    def forget(self) -> None:
+        """Times from before mean nothing any more: the vehicle's clock was set."""
         self._flew: tuple[int, int, bool] | None = None  # when it was last seen to, how high, and whether to land
-        self._tilted_us: int | None = None
+        self._off: _Off | None = None
+        self._tilted: tuple[int, int] | None = None  # since when, and when it was last seen to be
         self._fell: tuple[int, int] | None = None  # when, and how fast it came down
         self._impact: tuple[int, int] | None = None
 
-    def look(self, seen: ObservedVehicle, now_us: int) -> str | None:
-        """What shows that it crashed; None, also once that was told."""
+    def look(self, seen: ObservedVehicle, name: str, now_us: int) -> str | None:
+        """What shows that it crashed, now that a message of this name came; None, also once that was told."""
         flies = seen.armed and seen.airborne
         if flies:
             self._flown = True
         if not self._flown or self._told:
             return None
-        if seen.armed:
-            if flies and seen.levelled:
-                self._flew = now_us, seen.height, seen.landing
-            how = None
-        else:
-            how = self._motors(now_us)
-        if how is None and (seen.tilt >= TILTED or self._tilted_us is not None):
+        how = None
+        if name == _POSITION:
+            how = self._place(seen, flies=flies)
+        elif name == "HEARTBEAT":
+            how = self._motors(seen, now_us)
+        if how is None and (seen.tilt >= TILTED or self._tilted is not None):
             how = self._attitude(seen)
-        if how is None and (seen.descent >= FALLS or self._fell is not None or self._impact is not None):
-            how = self._fall(seen, now_us, flies=flies)
         self._told = how is not None
         return how
 
-    def _motors(self, now_us: int) -> str | None:
-        """Autopilots call a vehicle landed that is disarmed: what counts is how it flew when it was last seen armed."""
-        flew, self._flew = self._flew, None
-        if flew is None or now_us - flew[0] > RECENT_US or flew[1] < ABOVE or flew[2]:
+    def _place(self, seen: ObservedVehicle, *, flies: bool) -> str | None:
+        placed = seen.placed
+        if placed is None:
+            return None
+        at_us, height, descent = placed
+        off = self._off
+        if off is None:
+            if flies and height is not None and _says_air(seen, at_us):
+                self._flew = at_us, height, seen.landing
+        elif not off.settled and seen.places[_POSITION] > off.place:
+            self._off = _Off(off.place, min(off.by_us, at_us), settled=True)
+            how = self._stopped(seen)
+            if how is not None:
+                return how
+        if descent >= FALLS or self._fell is not None or self._impact is not None:
+            return self._fall(at_us, descent, flies=flies)
+        return None
+
+    def _motors(self, seen: ObservedVehicle, now_us: int) -> str | None:
+        if seen.armed and not seen.disarms:
+            self._off = None
+            return None
+        if self._off is None:
+            self._off = _Off(seen.places["HEARTBEAT"], now_us, settled=False)
+        return self._stopped(seen)
+
+    def _stopped(self, seen: ObservedVehicle) -> str | None:
+        """Autopilots call a vehicle landed that is disarmed: what counts is how it flew just before."""
+        off, flew = self._off, self._flew
+        if seen.armed or off is None or flew is None:
+            return None
+        if off.by_us - flew[0] > RECENT_US or flew[1] < ABOVE or flew[2]:
             return None
         return f"its motors stopped {flew[1] // 1_000} m above home"
 
     def _attitude(self, seen: ObservedVehicle) -> str | None:
         if seen.tilt < TILTED or not (seen.armed or seen.airborne):
-            self._tilted_us = None
+            self._tilted = None
             return None
-        if self._tilted_us is None:
-            self._tilted_us = seen.tilt_us
-        return f"it leans {seen.tilt} degrees" if seen.tilt_us - self._tilted_us >= LASTS_US else None
+        at_us = seen.tilt_us
+        since_us, last_us = self._tilted or (at_us, at_us)
+        if at_us - last_us > RECENT_US:
+            since_us = at_us
+        self._tilted = since_us, at_us
+        # it may lie on its side after it landed, and be carried
+        stands = _says_air(seen, at_us) or (
+            seen.armed and not seen.disarms and _is_recent(seen, "HEARTBEAT", at_us)
+        )
+        return f"it leans {seen.tilt} degrees" if stands and at_us - since_us >= LASTS_US else None
 
-    def _fall(self, seen: ObservedVehicle, now_us: int, *, flies: bool) -> str | None:
-        if seen.descent >= FALLS:
-            self._fell, self._impact = (now_us, seen.descent), None
+    def _fall(self, at_us: int, descent: int, *, flies: bool) -> str | None:
+        if descent >= FALLS:
+            self._fell, self._impact = (at_us, descent), None
         elif self._fell is not None:
             # an estimator takes some reports to believe that it stands
-            if now_us - self._fell[0] > AT_ONCE_US:
+            if at_us - self._fell[0] > AT_ONCE_US:
                 self._fell = None
-            elif abs(seen.descent) <= STOPPED:
+            elif abs(descent) <= STOPPED:
                 self._impact, self._fell = self._fell, None
-        if self._impact is None or now_us - self._impact[0] > LIES_WITHIN_US:
+        if self._impact is None:
             return None
-        if flies:
+        if at_us - self._impact[0] > LIES_WITHIN_US:
+            self._impact = None
             return None
-        return f"it came down at {self._impact[1] / 1_000:.1f} m/s"
+        return None if flies else f"it came down at {self._impact[1] / 1_000:.1f} m/s"
+
+
+def _says_air(seen: ObservedVehicle, at_us: int) -> bool:
+    """Whether it said not long before that it is in the air."""
+    return seen.airborne and _is_recent(seen, "EXTENDED_SYS_STATE" if seen.landed_state else "HEARTBEAT", at_us)
+
+
+def _is_recent(seen: ObservedVehicle, name: str, at_us: int) -> bool:
+    """Whether a message of this name was made at most `RECENT_US` before; not known is no."""
+    made_us = seen.made_us.get(name)
+    return made_us is not None and at_us - made_us <= RECENT_US

@@ -3,14 +3,17 @@ group of processes, a hypervisor, a debugger. Its log proves itself, and tells h
 """
 
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from rtshcua.evidence.report import Verdict
 from rtshcua.model.faults import MessageSilence
+from rtshcua.model.faults import Mode as FlightMode
 from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.ports import Ending
 from virtual import case
 from virtual.flight import Flight
 from virtual.stalling import TOLD_US, StallingFlight, silences
@@ -50,6 +53,32 @@ def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
     shown = [claim.text for claim in report.unproven if claim.slug == "gap"]
     assert len(shown) == len(report.gaps)
     assert all("vouched for by the key that signed record" in text for text in shown)
+
+
+@pytest.mark.parametrize(("for_s", "height", "flavour"), [
+    *product((28, 44, 60), (16 * case.M,), ("px4", "ardupilot")),
+    *product((28, 44), (4 * case.M,), ("px4", "ardupilot")),
+])  # fmt: skip
+def test_a_vehicle_that_lands_while_nobody_reads_has_landed(for_s: int, height: int, flavour: str) -> None:
+    """What waited says that it flies, what comes then that its motors are off, and maybe, as of PX4, in another mode:
+    that is neither a crash nor a takeover.
+    """
+    flight = StallingFlight(bundle(), flavour, {})
+    stood = False
+
+    def stall(of: Flight) -> tuple[()]:
+        nonlocal stood
+        truth = of.vehicle.simulation.truth()
+        if not stood and truth.in_air and truth.mode is FlightMode.RETURN and truth.up_mm <= height:
+            stood = True
+            of.vehicle.stand_still(for_s * case.S)
+        return ()
+
+    flown = flight.fly(stall)
+    truth = flown.vehicle.simulation.truth()
+    assert (stood, truth.crashed, truth.armed) == (True, False, False)
+    assert [record["event"] for record in flown.records if record.get("event") in ("crashed", "taken-over")] == []
+    assert flown.ending is Ending.COMPLETED
 
 
 def test_a_gap_is_recorded_before_anything_else_and_sealed_at_once() -> None:

@@ -619,7 +619,7 @@ class Manoeuvre:
         if self._taken or seen.mode is None:
             return None
         homeward = self._command.kind in _HOMEWARD
-        if homeward and seen.comes_to_rest:  # it is done: no flight is left
+        if homeward and seen.may_rest:  # it is done: no flight is left
             return None
         if seen.mode in self._modes:
             self._before, self._accepted = frozenset(), None

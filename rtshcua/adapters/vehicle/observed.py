@@ -176,14 +176,14 @@ class ObservedVehicle:
     """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us.
 
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
-    so now, of a position that is not old; `placed` is the last report of all, however old. `target` is where the autopilot says that it flies to. `descent` is how fast
-    it sinks and `tilt` how many degrees it leans (`tilt_us`: measured then), whoever vouches for that. `beats` counts
-    heartbeats and `targets` reports of a target (`target_us`: told last); `up_us` is link time, see `LinkWatch`.
-    `heard` counts frames of the autopilot, `numbered` those that it sent by then, as their numbers tell, and `answers`
-    its answers to questions for messages. `ahead` is what its range finder last saw in front, at `ahead_us`.
-    `notes` collects what an operator should know. `disarms`: one heartbeat says that the motors are off; they count as
-    off when the next one says so, too, or, while two speak under its ids (`disputed`), when nothing else is said for a
-    while. `landings` counts reports of `landed_state`.
+    so now, of a position that is not old; `placed` is the last report of all, however old. `target` is where the
+    autopilot says that it flies to. `descent` is how fast it sinks and `tilt` how many degrees it leans (`tilt_us`:
+    measured then), whoever vouches for that. `beats` counts heartbeats and `targets` reports of a target (`target_us`:
+    told last); `up_us` is link time, see `LinkWatch`. `heard` counts frames of the autopilot, `numbered` those that it
+    sent by then, as their numbers tell, and `answers` its answers to questions for messages. `ahead` is what its range
+    finder last saw in front, at `ahead_us`. `notes` collects what an operator should know. `disarms`: one heartbeat
+    says that the motors are off; they count as off when the next one says so, too, or, while two speak under its ids
+    (`disputed`), when nothing else is said for a while. `landings` counts reports of `landed_state`.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -361,6 +361,15 @@ class ObservedVehicle:
     def comes_to_rest(self) -> bool:
         """On the ground with its motors off, also while only one report says that they are."""
         return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and (self.disarms or not self.armed)
+
+    @property
+    def may_rest(self) -> bool:
+        """It comes to rest, as far as is known: its motors are said to be off, that it flies was said long before."""
+        if self.comes_to_rest:
+            return True
+        said_us = self.made_us.get("EXTENDED_SYS_STATE")
+        stale = said_us is not None and (self.heartbeat_us or 0) - said_us > STALE_US
+        return stale and (self.disarms or not self.armed)
 
     @property
     def rests(self) -> bool:

@@ -167,7 +167,8 @@ def _drift_us(passed_us: int) -> int:
 
 # ---------------------------------------------------------------- the time of a frame
 
-#: After a silence of this length the next frame counts as sent after all before, whatever its number.
+#: After a silence of this length, by when frames came or by their stamps, the next frame counts as sent after all
+#: before, whatever its number.
 GAP_US: Final = 500_000
 #: How long the link holds frames back is the longest within this time, and at most twice as long.
 WINDOW_US: Final = 1_000_000
@@ -366,7 +367,9 @@ class SourceTime:
         sent_us, newest, order = self._sent_us, self._newest, self._order
         fresh = at_us is not None and (sent_us is None or at_us > sent_us)
         ahead = (number - newest) % _NUMBERS
-        if 0 < ahead < _AHEAD or now_us - self._came_us > GAP_US:
+        # what waited while nobody read comes just before what follows a gap: then only its stamp tells the gap
+        resumed = fresh and sent_us is not None and at_us is not None and at_us - sent_us > GAP_US
+        if 0 < ahead < _AHEAD or resumed or now_us - self._came_us > GAP_US:
             if ahead > 1:
                 self._aside = (newest + 1) % _NUMBERS, 0
                 for skipped in range(newest + 1, newest + ahead):

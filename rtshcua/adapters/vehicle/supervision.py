@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.effects import STILL, apart, still
 from rtshcua.adapters.vehicle.flavour import KEPT, KEPT_LEVEL, ExpectedProgress, ExpectedTarget
-from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STOPPED, ObservedVehicle, Reported
+from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STOPPED, ObservedVehicle, Placed, Reported
 from rtshcua.model.flat.policy import Vehicle
 
 NEVER: Final = (1 << 63) - 1  # us
@@ -383,8 +383,8 @@ class SpeedWatch:
 
 # ---------------------------------------------------------------- crashes
 
-#: us between what is judged together: its height, that it flies, and that its motors stopped. What lies further apart is
-#: of two moments, between which it may have landed.
+#: us between what is judged together: its height, that it flies, and that its motors stopped. What lies further apart
+#: is of two moments, between which it may have landed.
 RECENT_US: Final = 2_000_000
 #: us between two reports of a tilt, of which a single one proves nothing
 LASTS_US: Final = 400_000
@@ -400,11 +400,12 @@ _POSITION: Final = "GLOBAL_POSITION_INT"
 
 
 class _Off(NamedTuple):
-    """The first heartbeat that says that the motors are off: its place in the order of sending, by when they were, and
-    whether that is by the vehicle's clock.
+    """The first heartbeat that says that the motors are off: its place in the order of sending, what was known of the
+    vehicle's place then, by when they were off, and whether that is by the vehicle's clock.
     """
 
     place: int
+    placed: Placed | None
     by_us: int
     settled: bool
 
@@ -459,8 +460,8 @@ class CrashWatch:
         if off is None:
             if flies and height is not None and _says_air(seen, at_us):
                 self._flew = at_us, height, seen.landing
-        elif not off.settled and seen.places[_POSITION] > off.place:
-            self._off = _Off(off.place, min(off.by_us, at_us), settled=True)
+        elif not off.settled and placed is not off.placed and seen.places[_POSITION] > off.place:
+            self._off = off._replace(by_us=min(off.by_us, at_us), settled=True)
             how = self._stopped(seen)
             if how is not None:
                 return how
@@ -473,7 +474,7 @@ class CrashWatch:
             self._off = None
             return None
         if self._off is None:
-            self._off = _Off(seen.places["HEARTBEAT"], now_us, settled=False)
+            self._off = _Off(seen.places["HEARTBEAT"], seen.placed, now_us, settled=False)
         return self._stopped(seen)
 
     def _stopped(self, seen: ObservedVehicle) -> str | None:
@@ -495,9 +496,7 @@ class CrashWatch:
             since_us = at_us
         self._tilted = since_us, at_us
         # it may lie on its side after it landed, and be carried
-        stands = _says_air(seen, at_us) or (
-            seen.armed and not seen.disarms and _is_recent(seen, "HEARTBEAT", at_us)
-        )
+        stands = _says_air(seen, at_us) or (seen.armed and not seen.disarms and _is_recent(seen, "HEARTBEAT", at_us))
         return f"it leans {seen.tilt} degrees" if stands and at_us - since_us >= LASTS_US else None
 
     def _fall(self, at_us: int, descent: int, *, flies: bool) -> str | None:

@@ -184,6 +184,20 @@ def test_after_a_silence_the_order_begins_anew() -> None:
     assert ear.hear(HEARTBEAT, now_us + 2_000, number=110) == fresh, "frames in between were lost"
 
 
+@rows("lost", [80, 127, 128, 200, 255, 256, 900])
+def test_what_follows_a_gap_is_sent_last_though_a_backlog_came_just_before(lost: int) -> None:
+    """A computer that stood still reads what waited, all at once, and then what comes: what was in between is lost."""
+    ear = Ear()
+    for step in range(5):
+        ear.place(10_100_000 + 100_000 * step, 40 * S)
+    behind, number = ear.source.place, ear.number + lost
+    fresh = ear.place(40_010_000, 40_020_000, number=number % 256)
+    assert ear.source.place > behind
+    behind = ear.source.place
+    assert ear.hear(HEARTBEAT, 40_030_000, number=(number + 1) % 256) == fresh
+    assert ear.source.place > behind
+
+
 def test_a_stamp_that_does_not_advance_is_the_same_measurement() -> None:
     ear = Ear()
     first = ear.hear(gps(3_900_000), 10 * S)

@@ -111,7 +111,7 @@ def checked(work: Callable[[Check], Iterator[Done]], jobs: int) -> tuple[Cost, C
     cost = start.since()
     counts = Counter(each.entry.status for each in done)
     unclosed = (len(done) + 1) // 100
-    assert counts == {"verified": len(done) - 1 - unclosed, "incomplete": unclosed, "failed": 1}, counts
+    assert counts == Counter(verified=len(done) - 1 - unclosed, incomplete=unclosed, failed=1), counts
     return cost, Cost(workers.waited, spent().cpu_of_others - start.cpu_of_others, 0)
 
 

@@ -31,6 +31,7 @@ from rtshcua.model.outcome import Outcome
 
 DECIDE_MEDIAN, DECIDE_P99, AUTHORITY_MEDIAN, MANY_RULES = 30.0, 100.0, 5.0, 2.0  # us, us, us, ratio
 ROUNDS, CALLS = 40, 250
+KEYS, WIDE = 1_000, 1_000  # skills and roles that large policies have rules for, candidates of one that is wide
 ENTITIES = cedarpy.Entities.from_json_str("[]")
 ALTITUDE, BATTERY = 20 * flat.M, 9_000
 
@@ -217,14 +218,17 @@ def cedar_for_decide() -> Callable[[], object]:
 
 # ------------------------------------------------------------------------------------------------------ report
 
-SCENARIOS = (
-    Scenario("authority, 1 candidate", 1, 1),
-    Scenario("authority, 10 candidates", 1, 10),
-    Scenario("authority, 10 of 10,000 rules", 1_000, 10),
-    Scenario("authority, 10 of 10,000, random keys", 1_000, 10),
-    Scenario("authority, 5 for any and 5 of 5,000", 1_000, 10, shared=5),
-    Scenario("authority, 1,000 candidates", 1, 1_000),
-)
+
+def scenarios() -> tuple[Scenario, ...]:
+    """What is asked; named for the sizes that are measured."""
+    return (
+        Scenario("authority, 1 candidate", 1, 1),
+        Scenario("authority, 10 candidates", 1, 10),
+        Scenario("authority, 10 of 10,000 rules", KEYS, 10),
+        Scenario("authority, 10 of 10,000, random keys", KEYS, 10),
+        Scenario("authority, 5 for any and 5 of 5,000", KEYS, 10, shared=5),
+        Scenario("authority, 1,000 candidates", 1, WIDE),
+    )
 
 
 def main() -> int:
@@ -237,7 +241,7 @@ def main() -> int:
         ("decide, admissible, 10 rules", asked_of_decide(1), cedar_for_decide()),
         ("decide, from a new place each time", asked_of_decide(100), cedar_for_decide()),
     ]
-    for one in SCENARIOS:
+    for one in scenarios():
         keys = [divmod(chance.randrange(one.keys), one.roles) for _ in range(500)] if "random" in one.name else [(0, 0)]
         rows.append((one.name, asked_of_authority(loaded(one.ours()), keys), asked_of_cedar(one.cedar(), keys)))
     for name, ours, cedar in rows:
@@ -246,13 +250,13 @@ def main() -> int:
         faster = faster and mid < cedar_mid
         print(f"{name:38}{mid:10.1f}{high:10.1f}{cedar_mid:10.1f}{cedar_high:10.1f}{mid / cedar_mid:8.3f}")
     for name, any_rules in (("load 10,000 rules", 0), ("load 10,000 rules, 5,000 for any", 5_000)):
-        policy = Scenario("", 1_000, 10).ours()
+        policy = Scenario("", KEYS, 10).ours()
         rules = tuple(
             replace(rule, skills=(), roles=(), when=None) if number < any_rules else rule
             for number, rule in enumerate(policy.rules)
         )
         start = perf_counter_ns()
-        asked_of_authority(loaded(replace(policy, rules=rules)), [(0, 0), (99, 9)])
+        asked_of_authority(loaded(replace(policy, rules=rules)), [(0, 0), divmod(KEYS - 1, 10)])
         print(f"{name:38}{(perf_counter_ns() - start) / 1e6:10.0f} ms")
     decided, ten = figures["decide, admissible, 10 rules"], figures["authority, 10 candidates"][0]
     many = figures["authority, 10 of 10,000 rules"][0] / ten

@@ -8,8 +8,10 @@ in a block counts, and of the blocks the median. Exits with 1 where a flood make
 
 import json
 import multiprocessing
+import os
 import socket
 import sys
+import threading
 import time
 from base64 import b64encode
 from contextlib import suppress
@@ -36,10 +38,31 @@ LIMIT = 1.2
 BLOCKS, BLOCK_S = 7, 3.0
 EVERY_S = 0.02
 PIN = ROOT_KEY.verification().public
+_OURS: list[socket.socket] = []
 
 
-def send(port: int, frames: list[bytes]) -> None:
+def ends_with_us() -> socket.socket:
+    """In this process, a socket for its children: it can be read as soon as this process is gone, however it went."""
+    ours, theirs = socket.socketpair()
+    _OURS.append(ours)
+    return theirs
+
+
+def end_with_parent(parent: socket.socket) -> None:
+    """In a child: end when the parent is gone. It drops its copies of the parent's end, or it would never see."""
+    for each in _OURS:
+        each.close()
+
+    def wait() -> None:
+        parent.recv(1)
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def send(port: int, frames: list[bytes], parent: socket.socket) -> None:
     """Send a frame every 20 ms, until it is ended."""
+    end_with_parent(parent)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         begun, number = time.monotonic(), 0
         while True:
@@ -48,8 +71,9 @@ def send(port: int, frames: list[bytes]) -> None:
             link.sendto(frames[number % len(frames)], ("127.0.0.1", port))
 
 
-def flood(path: str, documents: list[bytes], switch: Switch) -> None:
+def flood(path: str, documents: list[bytes], switch: Switch, parent: socket.socket) -> None:
     """Hand documents in as fast as they are read, while the switch is on."""
+    end_with_parent(parent)
     lines = [json.dumps({"id": 1, "document": b64encode(each).decode()}).encode() + b"\n" for each in documents]
     while True:
         switch.wait()
@@ -111,10 +135,10 @@ def measured(name: str, of: Loaded, folder: Path) -> float:
     documents = [document for document, _ in hostile(MISSION_KEY).values()] + [replacement(of)] * 2
     assert max(map(len, documents)) <= MAX_DOCUMENT
     start = multiprocessing.get_context("fork")
-    switch = start.Event()
+    switch, parent = start.Event(), ends_with_us()
     others = [
-        start.Process(target=send, args=(flight.link.getsockname()[1], flight.frames), daemon=True),
-        start.Process(target=flood, args=(str(folder / "s"), documents, switch), daemon=True),
+        start.Process(target=send, args=(flight.link.getsockname()[1], flight.frames, parent), daemon=True),
+        start.Process(target=flood, args=(str(folder / "s"), documents, switch, parent), daemon=True),
     ]
     for each in others:
         each.start()
@@ -130,6 +154,8 @@ def measured(name: str, of: Loaded, folder: Path) -> float:
         for each in others:
             each.kill()
             each.join()
+        parent.close()
+        _OURS.pop().close()
         flight.close()
     quiet, flooded_s = map(median, gaps)
     ratio = flooded_s / quiet

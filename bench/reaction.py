@@ -206,7 +206,7 @@ def fly(*, slowly: bool) -> None:
 
 
 def reactions(
-    frames: list[bytes], chance: Random, *, slowly: bool, processes: int = 1, count: int = IN_PROCESS
+    frames: list[bytes], chance: Random, *, slowly: bool, count: int, processes: int = 1
 ) -> list[list[float]]:
     """The reactions in each of some processes, in us, in their order."""
     found = []
@@ -286,7 +286,7 @@ def main() -> int:
         return 0
     frames, chance = telemetry(under_way()), Random(1)
     gc.disable()
-    slow = reactions(frames, chance, slowly=True, processes=PROCESSES)
+    slow = reactions(frames, chance, slowly=True, count=IN_PROCESS, processes=PROCESSES)
     (quick,) = reactions(frames, chance, slowly=False, count=QUICK)
     middle, worst = min(map(median, slow)), min(map(high, slow))
     print(

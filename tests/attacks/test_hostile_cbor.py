@@ -145,7 +145,9 @@ def test_show_says_what_is_wrong(entry: str, tmp_path: Path, capsys: pytest.Capt
     assert "items" in capsys.readouterr().err
 
 
-JSON = {"lists": b"[]", "objects": b"{}", "numbers": b"1", "texts": b'""', "features": b'{"type":"Feature"}'}
+JSON = {"lists": b"[]", "objects": b"{}", "numbers": b"1", "texts": b'""', "features": b'{"type":"Feature"}',
+        "positions in lists": b"[[1,2]]", "positions deep down": b"[" * 9 + b"1,2" + b"]" * 9,
+        "a position and a list": b"[1,2],[]", "positions never closed": b"[1,2"}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", JSON)
@@ -162,6 +164,18 @@ def test_geojson_of_tiny_values_is_refused_before_any_is_built(kind: str) -> Non
         tracemalloc.stop()
     assert most < MOST_BYTES
     assert took < BOUND_S
+
+
+def test_borders_that_fill_a_file_are_read() -> None:
+    begins = b'{"type":"Polygon","coordinates":[[[8,47],[9,47],[9,48],[8,47]]]}'
+    first = b'{"type":"FeatureCollection","features":[{"type":"Feature","id":"a","geometry":' + begins + b"},"
+    first += b'{"type":"Feature","id":"b","geometry":{"type":"Polygon","coordinates":[['
+    for position in (b"[8.545612,47.397712],", b"[ 8.5456 ,\n -47.3977, 0.0 ],"):
+        borders = position * ((MAX_SIZE - len(first) - 20) // len(position))
+        (area,) = read_area(first + borders + b"[8,47]]]}}]}", "a")
+        assert len(area.outer) == 3
+        with pytest.raises(Refused, match="positions, and at most 4,096 corners fit on board"):
+            read_area(first + borders + b"[8,47]]]}}]}", "b")
 
 
 def test_a_border_of_many_corners_is_read_however_its_texts_are_written() -> None:

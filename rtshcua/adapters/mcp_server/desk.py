@@ -149,7 +149,7 @@ class Desk:
     def check_mission(self, mission: Any) -> dict[str, Any]:
         """What the compiler says of a mission; nothing is signed."""
         answer = self._missions.check(mission, _utc_us())
-        return {"accepted": answer.accepted, "rejections": answer.rejections, "bounds": answer.bounds}
+        return _checked(answer) | {"bounds": answer.bounds}
 
     def propose_mission(self, mission: Any, idempotency_key: str) -> dict[str, Any]:
         """Check, sign, and hand to the vehicle; answers with a ticket before the vehicle does."""
@@ -197,21 +197,21 @@ class Desk:
         if known is not None:
             if known.said != said:
                 raise Misused("key-reused", "the key was used for another proposal", "give each proposal its own key")
-            return {"accepted": True, "rejections": []} | self._told(known)
+            return {**_ACCEPTED} | self._told(known)
         latest = self._latest
         if latest is not None and latest.said == said and self.following.stage == "flying":
-            return {"accepted": True, "rejections": []} | self._told(latest)
+            return {**_ACCEPTED} | self._told(latest)
         if len(self._tickets) >= MOST_TICKETS:
             raise Misused("too-many", f"this server handed in {MOST_TICKETS} proposals", "the host starts it anew")
         answer = self._missions.check(mission, _utc_us())
         if not answer.accepted:
-            return {"accepted": False, "rejections": answer.rejections}
+            return _checked(answer)
         document, signed = self._signed(answer, first)
         ticket = _Ticket(name, said)
         with self._lock:
             self._tickets[name] = ticket
         threading.Thread(target=self._hand_in, args=(ticket, document, signed), daemon=True).start()
-        return {"accepted": True, "rejections": [], "bounds": answer.bounds} | ticket.told()
+        return _checked(answer) | {"bounds": answer.bounds} | ticket.told()
 
     def _told(self, ticket: _Ticket) -> dict[str, Any]:
         """What became of a proposal that comes again; nothing is handed in for it."""
@@ -349,8 +349,14 @@ class Desk:
         return {"verified": False, "next": more, "untrusted": {"note": UNTRUSTED, "records": told}}
 
 
+_ACCEPTED: Final[Mapping[str, Any]] = {"accepted": True, "rejections": [], "more_rejections": 0}
 _DECIDED: Final = ("seq", "outcome", "reason", "clause", "target")
 _HOW: Final = "a person of the rule's role signs: `rtshcua approve BUNDLE --step N --to SOCKET`; no agent can"
+
+
+def _checked(answer: Answer) -> dict[str, Any]:
+    """What the compiler said: of many rejections the first, and how many more there are."""
+    return {"accepted": answer.accepted, "rejections": answer.rejections, "more_rejections": answer.more}
 
 
 def _number(record: Mapping[str, Any]) -> int | None:

@@ -36,6 +36,8 @@ class Answer:
     mission: Mission | None
     rejections: list[dict[str, Any]]
     bounds: dict[str, Any] | None
+    #: rejections that there are beside those that are told
+    more: int = 0
 
     @property
     def accepted(self) -> bool:
@@ -88,7 +90,8 @@ class Missions:
         if compiled.mission is None or compiled.policy is None:
             found = read.pointed(compiled.diagnostics)
             source: Source = read.source
-            return Answer(None, None, rejections(specification, found, source, self._frame), None)
+            told, more = rejections(specification, found, source, self._frame)
+            return Answer(None, None, told, None, more)
         bounds = None if compiled.bounds is None else compiled.bounds._asdict()
         return Answer(compiled.policy, compiled.mission, [], bounds)
 

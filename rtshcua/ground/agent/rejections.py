@@ -17,6 +17,7 @@ from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.agent.patterns import written
 from rtshcua.ground.agent.permitted import Permitted
 from rtshcua.ground.agent.said import decimal, said
+from rtshcua.ground.agent.shape import untold
 from rtshcua.model.flat.contract import QUANTITY
 from rtshcua.model.quantity import Dimension
 
@@ -82,16 +83,28 @@ def _ranges(skills: Iterable[Permitted]) -> dict[tuple[str, str], Range]:
     }
 
 
-def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: Frame) -> list[dict[str, Any]]:
-    """One rejection for each error of the compiler on the specification `value`, whose text is `source`."""
+class Rejections(NamedTuple):
+    """The first rejections of a proposal, and how many more there are."""
+
+    told: list[dict[str, Any]]
+    more: int
+
+
+def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: Frame) -> Rejections:
+    """One rejection for each error of the compiler on the specification `value`, whose text is `source`. Of many the
+    first 40, and how many more there are: findings that the compiler counts and does not tell are among them.
+    """
     fit = islice(_Fit(frame).misfits(frame.schema, value, "", ("", "")), _MOST_MISFITS)
     misfits = [*fit, *islice(_Whole(frame, value).misfits(), _MOST_MISFITS)]
     told: dict[str, dict[str, Any]] = {}
+    more = 0
     for each in found:
-        if each.severity is Severity.ERROR:
+        if untold(each):
+            more += untold(each)
+        elif each.severity is Severity.ERROR:
             for one in _rejections(each, value, source, misfits):
                 told.setdefault(json.dumps([one["field"], one["limit"] or one["code"]]), one)
-    return list(told.values())[:_MOST]
+    return Rejections(list(told.values())[:_MOST], max(len(told) - _MOST, 0) + more)
 
 
 def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[Misfit]) -> Iterator[dict[str, Any]]:

@@ -1,5 +1,6 @@
 """E0902: where a specification does not follow its schema, told in words that say what to write instead."""
 
+import re
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
@@ -21,6 +22,7 @@ from rtshcua.ground.agent.schema import (
     StepShape,
 )
 
+_UNTOLD = re.compile(r"and ([0-9]+) more findings, which are not told")
 _ASKED: Mapping[str, str] = {
     "string_type": "a text",
     "int_type": "a whole number",
@@ -51,6 +53,12 @@ def uncounted(more: int, file: str) -> Diagnostic:
     """That there is more to find than is told, and how much."""
     message = f"and {more} more findings, which are not told"
     return Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0), "mend those that are told, and try again")
+
+
+def untold(found: Diagnostic) -> int:
+    """How many findings one of `uncounted` stands for; 0 for any other finding."""
+    matched = _UNTOLD.fullmatch(found.message) if found.code is codes.SPECIFICATION_SIZE else None
+    return 0 if matched is None else int(matched[1])
 
 
 def _shape_errors(error: ValidationError, tree: Tree) -> Iterator[Diagnostic]:

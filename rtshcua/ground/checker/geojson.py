@@ -6,11 +6,14 @@ that no float decides on which side of a fence a place lies.
 """
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal, localcontext
 from itertools import pairwise
 from typing import Any
+
+import msgspec
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.kinds import GEOJSON, recognised
@@ -18,18 +21,24 @@ from rtshcua.ground.checker.features import chosen
 from rtshcua.ground.checker.polygons import Corner, contains, crossing, tangled
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.checker.unread import refuse_height
-from rtshcua.ground.language.size import without_texts
+from rtshcua.ground.language.size import bare_of, values_of
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
 #: a FeatureCollection's MultiPolygon takes nine, foreign members (RFC 7946, 6.1) may take some more
 MAX_DEPTH = 32
-#: objects, lists, texts and numbers of a file; keys are none of them. A border of 80,000 corners has 240,000
+#: objects, lists, texts and numbers of a file beside its positions; keys are none of them. Of positions, which are
+#: lists of two or three numbers, as many are read as there is room for: borders of countries have hundreds of thousands
 MAX_VALUES = 250_000
 #: characters of a number: a double needs no more than 24
 MAX_NUMBER = 64
 MAX_EXPONENT = 3  # digits; that of a double has no more
 #: a local projection has no use nearer to a pole
 MAX_LATITUDE, MAX_LONGITUDE = 85, 180
+_NUMBER = rb"\s*+-?[0-9][0-9.eE+-]*+\s*+"
+_POSITION = re.compile(rb"\[%b,%b(?:,%b)?\]" % (_NUMBER, _NUMBER, _NUMBER))
+#: whether a number may be too long, or its exponent: `_number` then says which
+_LONG = re.compile(rb"[0-9.eE+-]{%d}|[eE][+-]?[0-9]{%d}" % (MAX_NUMBER + 1, MAX_EXPONENT + 1))
+_PIECE = 1 << 16  # octets that are looked at a time: what is left between millions of positions takes memory
 _DEGREE = Decimal(10_000_000)
 _AS_BRACKETS = bytes.maketrans(b"{}", b"[]")
 _NO_BRACKETS = bytes(each for each in range(256) if each not in b"[]{}")
@@ -46,9 +55,8 @@ class GeoPolygon:
     holes: tuple[GeoRing, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
-    """A number as it is written."""
+class Number(msgspec.Struct, frozen=True, gc=False):
+    """A number as it is written. A file has millions."""
 
     text: str
 
@@ -75,18 +83,34 @@ def _json(data: bytes) -> Any:
         text = data.decode("utf-8-sig")  # RFC 8259, 8.1: a parser may ignore a byte order mark
     except UnicodeDecodeError as error:
         raise _not_json(f"byte {error.start} (0x{data[error.start]:02x}) is not UTF-8") from error
-    bare = without_texts(data, MAX_VALUES)
-    if bare is None:
-        raise _not_json(f"it has more than {MAX_VALUES} values: leave the features out that are not needed")
+    bare = bare_of(data, MAX_VALUES)
+    if bare is None or _beside_positions(bare) > MAX_VALUES:
+        raise _not_json(
+            f"it has more than {MAX_VALUES} values beside its positions: leave the features out that are not needed"
+        )
     if _too_deep(bare):
         raise _not_json(f"it is nested more than {MAX_DEPTH} deep")
     try:
+        number = _number if _LONG.search(bare) else Number
         return json.loads(
-            text, parse_float=_number, parse_int=_number, parse_constant=_constant, object_pairs_hook=_object
+            text, parse_float=number, parse_int=number, parse_constant=_constant, object_pairs_hook=_object
         )
     except json.JSONDecodeError as error:
         message = error.msg[0].lower() + error.msg[1:]
         raise _not_json(f"line {error.lineno}, column {error.colno}: {message}") from error
+
+
+def _beside_positions(bare: bytes) -> int:
+    """How many values there are that are no positions and none of their numbers."""
+    if values_of(bare) <= MAX_VALUES:
+        return 0
+    found = start = 0
+    while start < len(bare) and found <= MAX_VALUES:
+        end = bare.find(b"]", start + _PIECE) + 1 or len(bare)  # within no position
+        rest, positions = _POSITION.subn(b"", bare[start:end])
+        found += values_of(rest) - positions  # a comma is left of each
+        start = end
+    return found
 
 
 def _too_deep(bare: bytes) -> bool:

@@ -15,8 +15,17 @@ def without_texts(data: bytes, most: int) -> bytes | None:
 
     That is found out before any of them is built: reading millions takes seconds and hundreds of megabytes.
     """
+    bare = bare_of(data, most)
+    return None if bare is None or values_of(bare) > most else bare
+
+
+def bare_of(data: bytes, most: int) -> bytes | None:
+    """JSON without its texts and keys; None where it has more of those than `most` values have."""
     if data.count(b'"') > 4 * most:  # a value may have a key, and a text has two quotes; few have more of them inside
         return None
-    bare = _TEXT.sub(b"", data.replace(b"\\\\", b"").replace(b'\\"', b""))
-    values = sum(map(bare.count, (b",", b"[", b"{")))  # each but the first of an object or a list is behind a comma
-    return None if values > most else bare
+    return _TEXT.sub(b"", data.replace(b"\\\\", b"").replace(b'\\"', b""))
+
+
+def values_of(bare: bytes) -> int:
+    """How many values JSON without texts has: each but the first of an object or a list is behind a comma."""
+    return sum(map(bare.count, (b",", b"[", b"{")))

@@ -20,8 +20,7 @@ MISSION = {"format": "rtshcua/mission-spec", "phases": [{"name": "a"}]}
         ("check_mission", {"mission": json.dumps(MISSION)}, {"mission": MISSION}),
         ("mission_status", {"ticket": "t", "wait_s": 60}, {"ticket": "t", "wait_s": 60}),
         ("mission_status", {"ticket": "t", "wait_s": 5.0}, {"ticket": "t", "wait_s": 5}),
-        ("replan", {"mission": {}, "from_step": 0, "idempotency_key": ""}, {"mission": {}, "from_step": 0,
-                                                                             "idempotency_key": ""}),
+        *(("replan", each, each) for each in [{"mission": {}, "from_step_number": 1, "idempotency_key": ""}]),
     ],
 )  # fmt: skip
 def test_taken(tool: str, given: dict[str, Any], taken: dict[str, Any]) -> None:
@@ -51,7 +50,12 @@ def test_taken(tool: str, given: dict[str, Any], taken: dict[str, Any]) -> None:
         ("mission_status", {"ticket": "t", "wait_s": True}, "this is true or false", "give a whole number"),
         ("mission_status", {"ticket": "t", "wait_s": 61}, "`wait_s` is 61", "it goes from 0 to 60"),
         ("mission_status", {"ticket": 7}, "a text is asked as `ticket`", 'write "7" as `ticket`'),
-        ("replan", {"mission": {}, "from_step": -1, "idempotency_key": "k"}, "`from_step` is -1", "it goes from 0 on"),
+        (
+            "replan",
+            {"mission": {}, "from_step_number": 0, "idempotency_key": "k"},
+            "`from_step_number` is 0",
+            "it goes from 1 on",
+        ),
     ],
 )
 def test_told(tool: str, given: dict[str, Any], text: str, repair: str) -> None:

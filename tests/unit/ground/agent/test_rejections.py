@@ -217,3 +217,15 @@ def test_a_place_that_is_none_is_told_the_places(missions: Missions) -> None:
     assert (found["nearest"], found["limit"]["places"]) == (None, ["bridge_a.entry", "bridge_b.entry"])
     assert '"bridge_a.entry"' in found["repair"]
     assert rejected(missions, pointer, "brigde_b.entry")["nearest"] == "bridge_b.entry"
+
+
+@pytest.mark.parametrize(("wrong", "more"), [(39, 0), (40, 0), (41, 1), (3_000, 2_960)])
+def test_of_many_rejections_the_first_are_told_and_others_counted(missions: Missions, wrong: int, more: int) -> None:
+    proposal = deepcopy(PROPOSAL)
+    proposal["phases"][0]["steps"][0] |= {f"x{number}": 1 for number in range(wrong)}
+    answer = missions.check(proposal, 0)
+    assert [each["field"] for each in answer.rejections] == [
+        f"/phases/0/steps/0/x{number}" for number in range(min(wrong, 40))
+    ]
+    assert {each["message"].split("`")[0] for each in answer.rejections} == {"there is no key "}
+    assert answer.more == more

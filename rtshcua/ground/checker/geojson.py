@@ -104,6 +104,9 @@ def _beside_positions(bare: bytes) -> int:
     """How many values there are that are no positions and none of their numbers."""
     if values_of(bare) <= MAX_VALUES:
         return 0
+    found = bare.count(b"[") - bare.count(b",")  # each position has a comma: so many lists are none
+    if found > MAX_VALUES:
+        return found
     found = start = 0
     while start < len(bare) and found <= MAX_VALUES:
         end = bare.find(b"]", start + _PIECE) + 1 or len(bare)  # within no position

@@ -36,7 +36,7 @@ from rtshcua.onboard.ports import Opening
 
 _FLOOR = "floor"
 _POLICIES = "floor-policies"
-_MARKER = re.compile(r"(?:[0-9a-f]{2})++")
+_MARKER = re.compile(r"(?:[0-9a-f]{2}){1,128}")  # a name has 255 octets at most
 _EXPIRY = re.compile(rb"[0-9]{1,20}\n")
 _LARGEST = 16 << 20  # octets of a file here
 

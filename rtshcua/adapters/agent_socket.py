@@ -424,8 +424,8 @@ class FlightFollower:
         """What came: records as their lines, and answers; None where the flight hung up. Raises OSError for a peer that
         says what no flight says.
         """
-        ahead, self._ahead = self._ahead, []
-        if ahead and self.flight:
+        if self._ahead and self.flight:
+            ahead, self._ahead = self._ahead, []
             return ahead
         try:
             chunk = self._link.recv(_CHUNK)

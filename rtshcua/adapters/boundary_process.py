@@ -93,7 +93,8 @@ _ENDED_HELP: Final = {
     _IO: "`chown -R` its folder to its user, or make room",
 }
 _DAMAGED_HELP: Final = (
-    "docs/flying/isolation.md says what to do; a file that is empty, missing or of another boundary key is damage too"
+    "docs/flying/isolation.md says what to do; a file that is empty, of another boundary key, or missing in a "
+    "provisioned folder is damage too"
 )
 
 

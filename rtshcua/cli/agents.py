@@ -42,7 +42,7 @@ _MOST_KNOWN: Final = 256
 _LASTING: Final = frozenset(
     {
         "malformed", "unknown-format", "unknown-version", "unknown-key", "revoked-key", "wrong-duty", "bad-signature",
-        "other-flight", "superseded", "already-released", "other-steps", "id-seen", "no-step", "id-mismatch",
+        "other-flight", "already-released", "other-steps", "id-seen", "no-step", "id-mismatch",
         "binding-mismatch", "wrong-policy", "wrong-vehicle", "wrong-source", "wrong-role", "key-other-policy",
     }
 )  # fmt: skip

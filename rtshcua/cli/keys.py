@@ -7,7 +7,8 @@ import re
 import secrets
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from getpass import getpass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -227,7 +228,7 @@ def provision(
             return fail(ExitCode.UNTRUSTED, text, "`--log-key` gives one that it names", slug=slug)
         own = attesting.boundary_key(root, vehicle, now_us, store, boundary_key, passphrase_file)
         before = store.provisioned(vehicle)
-        if before is not None and (not again or (own is not None and own.kid == before)):
+        if before is not None and (not again or own is None or own.kid == before):
             return _provisioned_before(vehicle, own, again=again)
         link = None if signing_key is None else read_link_key(signing_key)
     except Untrusted as error:
@@ -241,7 +242,7 @@ def provision(
     seeds |= {} if link is None else {"link.key": link}
     make_folder(folder, mode=PRIVATE_FOLDER)
     store.provision(vehicle, b"" if own is None else own.kid)
-    with appearing(place) as fresh:
+    with _marked_only_if_made(store, vehicle, before), appearing(place) as fresh:
         for name, octets in seeds.items():
             write_new(fresh / name, octets.hex().encode() + b"\n", mode=PRIVATE_FILE)
         write_new(fresh / "root.trust", store.root(), mode=PRIVATE_FILE)
@@ -260,6 +261,17 @@ def provision(
         "give it to the boundary's user: `chown -R rtshcua-boundary:` it, and keep these keys nowhere else aboard",
     )
     return ExitCode.OK
+
+
+@contextmanager
+def _marked_only_if_made(store: KeyStore, vehicle: str, before: bytes | None) -> Iterator[None]:
+    """Where no folder could be made, it is remembered as it was `before` which one was."""
+    try:
+        yield
+    except OSError:
+        with suppress(OSError):
+            store.provision_again(vehicle, before)
+        raise
 
 
 def _provisioned_before(vehicle: str, own: SigningKey | None, *, again: bool) -> ExitCode:

@@ -30,6 +30,7 @@ _FOUND: Final = {
     "archive/missing": "the archive does not have the file any more",
     "boundary/after-loss": "after the boundary was lost, a record tells of something that only a boundary makes",
     "boundary/beginning": "the boundary's session began with another flight, bundle or mode",
+    "boundary/gap": "the boundary signed before a gap ended that stands before what it signed",
     "boundary/clock": "the boundary's own time of day contradicts that of a record",
     "boundary/differs": "a record is not what the boundary made, or one before it was left out",
     "boundary/frames": "the raw frames are not those that passed the boundary",

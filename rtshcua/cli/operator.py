@@ -87,7 +87,7 @@ class _Console:
         """Until the flight is over, or somebody leaves it."""
         self.tell("following", f"{self._recalled.name}, flight {self._follower.flight.hex()}")
         self.tell("ready", _HELP)
-        watched: list[int] = [self._follower.fileno(), sys.stdin.fileno()]
+        watched = [self._follower.fileno(), *([] if sys.stdin is None else [sys.stdin.fileno()])]
         while True:
             ready = select.select(watched, [], [])[0]
             if watched[0] in ready and not self._hear():
@@ -96,8 +96,9 @@ class _Console:
             if len(ready) > (watched[0] in ready):
                 data = os.read(watched[1], _CHUNK)
                 if not data:
-                    del watched[1]  # nobody types any more: it is followed to its end
-                self._typed += data
+                    del watched[1]
+                    self.tell("ready", "nobody types any more: the flight is followed to its end")
+                self._typed += data or (b"\n" if self._typed else b"")
                 *lines, self._typed = self._typed.split(b"\n")
                 for line in lines:
                     if not self._obey(line.decode(errors="replace").strip().lower()):
@@ -126,8 +127,13 @@ class _Console:
 
     def _meet(self, line: bytes) -> None:
         """The mission that flies first, which need not be the bundle's: an agent may have handed in one of its own."""
-        told = json.loads(line)
-        if self._names is not None or not isinstance(told, dict) or told.get("type") != "mission":
+        if self._names is not None:
+            return
+        try:
+            told = json.loads(line)
+        except (ValueError, RecursionError):
+            raise ConnectionError("what listens there is no flight: it says what no flight says") from None
+        if not isinstance(told, dict) or told.get("type") != "mission":
             return
         flying = self._recalled.flying
         if told.get("digest") == flying.mission_digest.hex():
@@ -146,7 +152,13 @@ class _Console:
             self.tell("ready", _HELP)
             return True
         recalled = self._recalled._replace(flight=b"") if under_policy else self._recalled
-        self._follower.hand_in(recalled.sign(self._key, time.time_ns() // 1000, self._seconds))
+        document = recalled.sign(self._key, time.time_ns() // 1000, self._seconds)
+        try:
+            self._follower.hand_in(document)
+        except OSError:
+            self._code = ExitCode.REFUSED
+            self.tell("not-sent", "the flight hung up before the recall was sent")
+            return True
         self.tell("sent", f"the recall of {recalled.name}")
         return True
 

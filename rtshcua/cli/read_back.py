@@ -1,4 +1,6 @@
-"""A log read back at the end of its flight: what `verify-log` will say of it, so that nothing else is called whole."""
+"""A log read back at the end of its flight, so that none is called whole in which `verify-log` finds a part that is
+missing, changed or not signed. What the boundary stated, and each decision, `verify-log --audit` holds against it.
+"""
 
 from pathlib import Path
 from typing import NamedTuple

@@ -4,7 +4,6 @@ Without a number it begins with the cause, where the flight ended early, and goe
 that was not `allow`, else the last on a step.
 """
 
-from base64 import b64decode
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +20,7 @@ from rtshcua.cli.shown import utc
 from rtshcua.cli.subject import Subject, after, unpacked
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.ground.why.link import of_contingency, trace_link
@@ -92,7 +92,7 @@ class _Log:
 
     def _take(self, record: AnyRecord) -> ExitCode | None:
         if isinstance(record, Genesis):
-            found = unpacked(b64decode(record.bundle), f"the bundle in `{self._path}`")
+            found = unpacked(octets(record.bundle) or b"", f"the bundle in `{self._path}`")
             if isinstance(found, ExitCode):
                 return found
             self.start_us, self._in_force, self._names = record.at_us, found, Names.of(record)

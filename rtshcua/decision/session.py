@@ -35,7 +35,7 @@ from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
 #: how many documents may be considered ahead of being taken
-MOST_AHEAD: Final = 8
+MOST_AHEAD: Final = 16
 
 _KINDS: Final = {
     names.APPROVAL: APPROVAL, names.RECALL: RECALL, names.REPLACEMENT: REPLACEMENT, names.CANCELLATION: CANCELLATION,

@@ -24,7 +24,7 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now, State
 from rtshcua.model.outcome import WIRE_REASONS, Outcome
 from rtshcua.wire import boundary_chain, receipt, request, statement
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS, Tag
-from rtshcua.wire.clock import DRIFT_US, Source, bears_out
+from rtshcua.wire.clock import APART_US, DRIFT_US, Source, bears_out
 from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.preparation import MOST, ParameterWrite
@@ -118,7 +118,7 @@ class BoundaryEvidence:
         self._lost: tuple[int, int] | None = None  # the record that says so, and where it begins
         #: by the number of a record of a gap, that of the statement which says that nothing is missing before
         self.gaps: dict[int, int] = {}
-        self._gap: int | None = None
+        self._gap: tuple[int, int] | None = None  # the record of a gap, and when it ended
 
     def check(self, record: AnyRecord, offset: int) -> Finding | None:
         """What the boundary's evidence says against the next record, which begins at an octet of the log, or against
@@ -134,12 +134,13 @@ class BoundaryEvidence:
         if isinstance(record, Effect) and record.event == BOUNDARY:
             before_us = None if self.last is None else self.last.at_us
             found = self._stated_by(record) or self._timed(record, offset, before_us)
-            if self._gap is not None:
-                self.gaps[self._gap], self._gap = record.seq, None
+            if found is None:
+                found = self._vouched_for(record)
+            self._gap = None
             return found.at(record.seq, offset) if isinstance(found, Flaw) else found
         if isinstance(record, Decision | Effect):
             if isinstance(record, Effect) and record.event == STALLED:
-                self._gap = record.seq
+                self._gap = record.seq, record.at_us
             return self._entered(record, offset)
         flaw = None
         if isinstance(record, Seal | Close):
@@ -258,6 +259,20 @@ class BoundaryEvidence:
                 expected = f"{own.utc_us} us, to {own.utc_error_us} us" if known else "none: its clock is not known"
                 found = f"{own.monotonic_us + claim.ahead_us} us, to {claim.error_us} us"
                 return Flaw("boundary/clock", text, found, expected).at(claim.record, claim.offset)
+        return None
+
+    def _vouched_for(self, record: Effect) -> Flaw | None:
+        """Whoever holds the log's keys could put a gap before a statement that is older than its end, and so have the
+        boundary vouch for a time in which it went on.
+        """
+        if self._gap is None:
+            return None
+        assert self.last is not None
+        number, ended_us = self._gap
+        if self.last.at_us < ended_us - APART_US:
+            text = "the boundary signed this before the gap ended that stands before it"
+            return Flaw("boundary/gap", text, f"at {self.last.at_us} us", f"at {ended_us} us or later")
+        self.gaps[number] = record.seq
         return None
 
     def _sealed(self, record: Seal | Close) -> Flaw | None:

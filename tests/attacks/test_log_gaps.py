@@ -5,6 +5,9 @@ gap is told; who holds all keys still leaves nothing unsealed for longer than 20
 """
 
 from functools import cache
+from hashlib import sha256
+
+import pytest
 
 from reference.attested_flight import attested
 from reference.forgery import (
@@ -109,6 +112,30 @@ def test_what_the_boundary_made_cannot_be_left_out_as_a_gap() -> None:
         gap = line_of(gap_after(lines[number - 1], silent_us))
         found = expect(signed([*lines[:number], gap, *lines[made + 1 :]]))
         assert found[0] in ("boundary/omitted", "boundary/differs", "boundary/missing")
+
+
+@pytest.mark.parametrize("recovered", [False, True])
+def test_a_gap_before_an_older_statement_of_the_boundary_is_told(*, recovered: bool) -> None:
+    """Who holds the log's keys cuts the flight behind a statement, and has the boundary vouch that nothing came."""
+    lines, by_us = list(attested()), 990 * S
+    kinds = [read(line)["type"] for line in lines]
+    number = next(
+        at for at, line in enumerate(lines) if read(line).get("event") == "boundary" and kinds[at + 1] == "seal"
+    )
+    gap = line_of(gap_after(lines[number - 1], by_us))
+    forged = [*lines[:number], gap, *later(lines[number : number + 2], by_us)]
+    if recovered:
+        sealed = read(forged[-1])
+        empty = sha256(b"").hexdigest()
+        end = sealed | {
+            "type": "recover",
+            "discarded_bytes": 0,
+            "discarded_digest": empty,
+            "epoch": sealed["epoch"] + 1,
+        }
+        at = {name: sealed[name] for name in ("at_us", "utc_us")}
+        forged += [line_of(end), line_of(read(lines[-1]) | at | {"ending": "recovered", "tlog": None})]
+    assert expect(signed(forged)) == ("boundary/gap", number + 1)
 
 
 def test_all_keys_leave_nothing_unsealed_by_gaps() -> None:

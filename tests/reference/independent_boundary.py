@@ -104,6 +104,7 @@ class Boundary:
         self.last: list | None = None
         self.marks: dict[int, bytes] = {}
         self.stated = self.recovered = self.lost = False
+        self.gap_end = 0  # when the last gap of this epoch ended
         self.claim = genesis if genesis["utc_error_us"] < _UNKNOWN else None  # the first since the statement before
 
     def line(self, record: dict) -> None:
@@ -122,6 +123,8 @@ class Boundary:
             if self.last is None or len(self.digests) - 1 < self.last[3]:
                 raise Disputed("no statement before it was lost, or entries of one without a record")
         elif kind in ("decision", "effect") and record.get("event") != "boundary":
+            if record.get("event") == "stalled":
+                self.gap_end = record["at_us"]
             self._entry(record)
         elif kind == "effect":
             self._statement(record)
@@ -132,7 +135,7 @@ class Boundary:
             if kind == "close" and not recovers and (not self.last[-1] or len(self.digests) - 1 != self.last[3]):
                 raise Disputed("no final statement, or entries of it without a record")
             self.recovered = self.recovered or kind == "recover"
-            self.stated = False
+            self.stated, self.gap_end = False, 0
 
     def _alone(self, record: dict) -> None:
         """A record from which on there was no boundary."""
@@ -212,6 +215,9 @@ class Boundary:
         if len(marks) != 8 * min(count - earlier, _MOST_MARKS) or len(self.digests) - 1 > count:
             raise Disputed("it does not mark its entries, or is behind the records")
         self._time(record, clock[1:])
+        if clock[1] < self.gap_end - 2_000_000:
+            raise Disputed("older than the end of the gap before it")
+        self.gap_end = 0
         self.last, self.stated = said, True
         self.marks = {earlier + 1 + n: marks[8 * n : 8 * n + 8] for n in range(len(marks) // 8)}
         for number in range(earlier + 1, len(self.digests)):

@@ -228,6 +228,13 @@ class KeyStore:
         make_folder(path.parent, mode=PRIVATE_FOLDER)
         write_file(path, boundary_key.hex().encode() + b"\n", mode=PRIVATE_FILE)
 
+    def provision_again(self, vehicle: str, boundary_key: bytes | None) -> None:
+        """Remember what was before: no folder at all, for None. Raises OSError."""
+        if boundary_key is None:
+            self._provisioned_path(vehicle).unlink(missing_ok=True)
+        else:
+            self.provision(vehicle, boundary_key)
+
     def _provisioned_path(self, vehicle: str) -> Path:
         return self.folder.parent / "provisioned" / f"vehicle-{vehicle}"
 

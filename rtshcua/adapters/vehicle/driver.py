@@ -52,6 +52,8 @@ UNFIT_US = 5_000_000
 KEYLESS = "it signs what it sends, and answers nothing that is not signed: give the link's key with `--signing-key`"
 
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
+#: how many kinds of others that speak under its ids are told of: whoever makes them up has 65,536
+_MOST_STRANGERS = 8
 _OF_PREFLIGHT = frozenset(preflight.HEEDED)
 _heard = tuple.__new__  # the constructor that a named tuple is given is a function more
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
@@ -415,7 +417,7 @@ class Driver:
         text = two_speak(self.system, f"one with MAV_TYPE {kind[0]} and MAV_AUTOPILOT {kind[1]}")
         if is_another(*kind):
             self.link.meets(text)
-        if text not in self._strangers:
+        if text not in self._strangers and len(self._strangers) < _MOST_STRANGERS:
             self._strangers.add(text)
             events.append(ports.Noted(now_us, text))
         return True

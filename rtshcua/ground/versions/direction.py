@@ -20,8 +20,9 @@ STRICTER, LOOSER, CANNOT_TELL = "stricter", "looser", "cannot tell"
 #: bounds on integers: whether it is an upper one, and how far from the constant it is
 _BOUNDS: Final = {Op.LE: ((True, 0),), Op.LT: ((True, -1),), Op.GE: ((False, 0),), Op.GT: ((False, 1),),
                   Op.EQ: ((True, 0), (False, 0))}  # fmt: skip
-#: fields of which less is stricter, and those of which more is
-_LESS: Final = frozenset({"deadline", "lasts", "energy", "stale"})
+#: fields of which less is stricter. Not `energy` and `lasts`: less of them lets a step begin with less charge, or later
+#: in the active time of a zone
+_LESS: Final = frozenset({"deadline", "stale"})
 _CLAUSES: Final = frozenset({"require", "assume", "maintain"})
 
 

@@ -26,12 +26,13 @@ def names(p: Any) -> set[str]:
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_a_stock_vehicle_tells_none_of_it_in_a_flight_either(pilot: Callable[..., Any], flavour: str) -> None:
+    """But the voltage of the whole battery, which every vehicle measures."""
     p = pilot(flavour, extras=STOCK, wind=Wind(5_000, 270))
     p.take_off(5)
     ask(p).wait(2)
     assert not NOT_STOCK & names(p)
-    assert p.last("SYS_STATUS").voltage_battery == 65_535
-    assert p.last("BATTERY_STATUS").voltages[0] == 65_535
+    assert 14_000 < p.last("SYS_STATUS").voltage_battery < 16_800  # four cells
+    assert 14_000 < p.last("BATTERY_STATUS").voltages[0] < 16_800
     assert p.last("BATTERY_STATUS").battery_remaining > 90
     if flavour == "ardupilot":
         assert {(f.message.speed, f.message.direction) for f in p.seen if f.name == "WIND"} == {(0, -180)}

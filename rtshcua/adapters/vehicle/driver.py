@@ -321,12 +321,16 @@ class Driver:
             return [ports.Failed(now_us, command.token, "two-speak", contradicted)], []
         self.link.begin()
         before = modes_of(self.left, flavour) if self._manoeuvre is None else self._manoeuvre.modes
+        doubted = self._aids.suspicion.kind
+        if self._manoeuvre is None and self._left_mode is not None:
+            before, doubted = before | {self._left_mode}, "mode"
         try:
             stages = self._stages(flavour, command)
         except Exception as error:  # noqa: BLE001  a pack's code: whatever it raises, its skill has failed
             slug = "no-datum" if isinstance(error, NoDatum) else "broken-manoeuvre"
             return [ports.Failed(now_us, command.token, slug, str(error))], []
-        self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before)
+        self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before, doubted)
+        self._left_mode = None  # it goes on as a suspicion of the manoeuvre
         self._unsent = command.token
         events: list[Event] = []
         send: list[Message] = []

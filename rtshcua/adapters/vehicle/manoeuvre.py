@@ -365,12 +365,14 @@ class Manoeuvre:
     """Runs the stages of `command`; after its last effect, and a HOLD's time, it has succeeded.
 
     It goes on watching who flies after that, until another manoeuvre takes its place. `before` are the modes that may
-    still show at its start, while its own has not come.
+    still show at its start, while its own has not come. `doubted`: what one report showed when it began, and none
+    confirmed or contradicted yet (`Suspicion.kind`). Until its first frame leaves, nothing of it excuses that.
     """
 
     def __init__(
-        self, command: Command, aids: Aids, seen: ObservedVehicle, stages: list[Stage], before: frozenset[int]
-    ) -> None:
+        self, command: Command, aids: Aids, seen: ObservedVehicle, stages: list[Stage], before: frozenset[int],
+        doubted: str | None = None,
+    ) -> None:  # fmt: skip
         self._command = command
         self.token = command.token
         self._aids = aids
@@ -384,10 +386,14 @@ class Manoeuvre:
         self._held_us: int | None = None
         self._unnamed_us: int | None = None  # since when a frame waits to know whether the target is ours
         self._stands: tuple[int, int] | None = None
-        self._before = before if seen.mode is None else before | {seen.mode}
+        self._doubted = doubted
+        self._suspected = seen.mode if doubted == "mode" else None  # it is the pilot's, if the next report confirms it
+        if seen.mode is not None:
+            before = before - {seen.mode} if self._suspected is not None else before | {seen.mode}
+        self._before = before
         self._began_in = seen.mode
         self._modes: frozenset[int] = frozenset()
-        self._was_landing = seen.landing
+        self._was_landing = seen.landing and doubted != "landing"
         self._taken = False
         self._aimed = False  # the frame is out that says where to go, or to go nowhere,
         self._named: ExpectedTarget | None = None  # and it was seen to be obeyed, by this target of ours that it named
@@ -514,6 +520,7 @@ class Manoeuvre:
     def _send(self, seen: ObservedVehicle) -> list[Message]:
         """The message of the stage; none where it would ask for what is so already."""
         self._waits, self._entered_us, self._changed = False, seen.up_us, True
+        self._doubted = self._suspected = None
         target = self._left[0].target
         if target is not None or self._command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
             self._aids.targets.expect(target, seen)
@@ -614,17 +621,25 @@ class Manoeuvre:
         """What shows that somebody else flies: a mode, a landing, a failsafe or a target that is not of ours; its kind,
         what it is, and how many reports of its kind there were.
 
-        A mode may belong to this stage or, until its own mode showed, to those before.
+        A mode may belong to this stage or, until its own mode showed, to those before. What was doubted when this began
+        was not of this.
         """
         if self._taken or seen.mode is None:
             return None
-        homeward = self._command.kind in _HOMEWARD
+        found = self._found(seen)
+        if found is None:
+            self._doubted = self._suspected = None
+        return found
+
+    def _found(self, seen: ObservedVehicle) -> tuple[str, str, int] | None:
+        homeward = self._command.kind in _HOMEWARD and self._doubted is None
         if homeward and seen.may_rest:  # it is done: no flight is left
             return None
-        if seen.mode in self._modes:
+        if seen.mode in self._modes and seen.mode != self._suspected:
             self._before, self._accepted = frozenset(), None
             self._aids.targets.obeyed()
         elif seen.mode not in self._before or self._was_taken_back(seen):
+            assert seen.mode is not None
             return "mode", self._flavour.mode_name(seen.mode), seen.beats
         self._was_landing = self._was_landing and seen.landing
         if seen.landing and not homeward and not self._was_landing:

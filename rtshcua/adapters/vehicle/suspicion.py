@@ -59,6 +59,11 @@ class Suspicion:
         """Whether something waits to be confirmed."""
         return self._kind is not None
 
+    @property
+    def kind(self) -> str | None:
+        """The kind of what waits to be confirmed."""
+        return self._kind
+
     def judge(self, found: tuple[str, str, int] | None, up_us: int, *, disputed: bool, at_once: bool) -> str | None:
         """What is sure, of what was found: its kind, what it is, and how many reports of its kind there were.
 

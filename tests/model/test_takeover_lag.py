@@ -99,3 +99,47 @@ def test_a_stop_takes_no_mode_back() -> None:
         one = taken_at(flying(15 * MS), Mode.LAND, begun_ms, MotionKind.HOLD)
         assert one.truth.mode is Mode.LAND, begun_ms
         assert any(isinstance(event, TakenOver) for event in one.events)
+
+
+#: a command of ours that begins so long after the pilot's, through each moment up to the report that confirms it
+AFTER_MS = range(0, 320, 10)
+#: what names a mode is undone where it falls between the pilot's and the answer to its own question
+MAY_BE_LOST_MS = range(41)
+#: of the phases of our questions for the mode, which come every 150 ms
+PHASES_MS = (0, 40, 80, 120)
+ANY_KIND = (MotionKind.FLY, MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
+
+
+def begun_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> tuple[bool, bool]:
+    """Whether a pilot who takes over in a leg keeps it, where a command begins so long after; whether it is told."""
+    one = copied(flying(lag_us))
+    one.wait(phase_ms * MS / S)
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.wait(after_ms * MS / S)
+    if not any(isinstance(event, TakenOver) for event in one.events):
+        if kind == MotionKind.FLY:
+            one.begin(kind, (200_000, 90_000), altitude=25_000, speed=5_000)
+        else:
+            one.begin(kind)
+        one.wait(2)
+    return one.truth.mode is Mode.POSITION, any(isinstance(event, TakenOver) for event in one.events)
+
+
+def check_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> None:
+    kept = begun_after(lag_us, phase_ms, after_ms, kind)
+    may_be_lost = kind in (MotionKind.HOME, MotionKind.LAND) and after_ms in MAY_BE_LOST_MS
+    assert may_be_lost or kept == (True, True), (lag_us, phase_ms, after_ms, kind)
+
+
+@pytest.mark.parametrize("kind", ANY_KIND)
+def test_a_command_that_begins_before_a_takeover_is_confirmed_leaves_it_to_the_pilot(kind: MotionKind) -> None:
+    """One report of it may have come by then: it is neither forgotten, nor taken for the mode of what flew before."""
+    for after_ms in (*range(0, 140, 30), *range(140, 190, 10)):
+        check_after(0, 0, after_ms, kind)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ANY_KIND)
+def test_no_command_takes_a_mode_back_that_was_chosen_in_a_leg(kind: MotionKind) -> None:
+    for lag_us, phase_ms, after_ms in product((LAGS_US[0], LAGS_US[-1]), PHASES_MS, AFTER_MS):
+        check_after(lag_us, phase_ms, after_ms, kind)

@@ -309,6 +309,10 @@ class WhoFliesQuery:
 UNKNOWN: Final = "unknown/no-answer"
 #: It stands still, and is not where it was sent.
 STOPPED_SHORT: Final = "stopped-short"
+#: what a command comes to, too, where a pilot flies and somebody goes on reporting our mode
+_AS_IF_OTHERS_FLEW: Final = frozenset(
+    (UNKNOWN, STOPPED_SHORT, "no-mode-report", "no-progress", "no-effect", "did-not-stop", "did-not-hold")
+)
 #: The mode that a frame waits for was not told in this time.
 MODE_UNKNOWN_US: Final = 5_000_000
 #: mm: a vehicle that holds, and is further than this from where it came to stand, does not hold
@@ -322,6 +326,9 @@ _LEGS: Final = (MotionKind.FLY, MotionKind.COVER)
 #: a frame that stops the vehicle, or brings it home or down, waits no longer than this to know whether its target is
 #: its own still, in us
 UNNAMED_MOST_US: Final = 1_000_000
+#: so long a frame that brings it home or down waits for the answer to its own question, in us: then the last report
+#: will do, if that is young
+ANSWER_MOST_US: Final = 50_000
 
 
 class Aids:
@@ -385,6 +392,7 @@ class Manoeuvre:
         self._stop: BrakingWatch | None = None
         self._held_us: int | None = None
         self._unnamed_us: int | None = None  # since when a frame waits to know whether the target is ours
+        self._asked_us: int | None = None  # since when a frame that brings it home or down waits for an answer
         self._stands: tuple[int, int] | None = None
         self._doubted = doubted
         self._suspected = seen.mode if doubted == "mode" else None  # it is the pilot's, if the next report confirms it
@@ -455,6 +463,9 @@ class Manoeuvre:
         if reason == STOPPED_SHORT and self._names_target(seen) and stands_idly(seen, self._way_left(seen), now_us):
             self.over = self._taken = True  # it never set off, though it says that it flies there
             return [], [TakenOver(now_us, "paused")]
+        if reason in _AS_IF_OTHERS_FLEW and self._aids.contradictions.stand(now_us):
+            self.over = self._taken = True
+            return [], [TakenOver(now_us, self._aids.suspicion.how or "two speak")]
         if reason is None and self._left:
             told = self._hindered(seen, now_us)
             return self._again(seen, now_us), told
@@ -496,16 +507,24 @@ class Manoeuvre:
     def _may_send(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether it is known well enough who flies, for a frame that moves the vehicle (docs/adr/0034)."""
         query, urgent = self._aids.query, self._command.kind in _URGENT
-        if self._aids.suspicion.stands:
+        if self._aids.suspicion.stands or self._aids.contradictions.stand(now_us):
             return False
         if self._is_unnamed(seen, now_us):
             self._unnamed_us = now_us if self._unnamed_us is None else self._unnamed_us
             if now_us - self._unnamed_us <= UNNAMED_MOST_US:
                 query.is_newer(seen, now_us, target=True)  # it is asked for
                 return False
-        if urgent and query.is_young(seen, now_us):
+        if urgent and self._answers_late(seen, now_us) and query.is_young(seen, now_us):
             return True
         return query.is_newer(seen, now_us, target=self._aids.targets.compares and not urgent, twice=not urgent)
+
+    def _answers_late(self, seen: ObservedVehicle, now_us: int) -> bool:
+        """Whether a frame that names a mode, and so would undo one, waits no longer for the answer to its question."""
+        if self._command.kind not in _HOMEWARD:
+            return True
+        if self._asked_us is None:
+            self._asked_us = now_us
+        return now_us - self._asked_us >= ANSWER_MOST_US * self._commander.slack
 
     def _is_unnamed(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether it goes on naming a target of ours as a rule, and did not for as long as a mode report may be old."""
@@ -519,7 +538,7 @@ class Manoeuvre:
 
     def _send(self, seen: ObservedVehicle) -> list[Message]:
         """The message of the stage; none where it would ask for what is so already."""
-        self._waits, self._entered_us, self._changed = False, seen.up_us, True
+        self._waits, self._entered_us, self._changed, self._asked_us = False, seen.up_us, True, None
         self._doubted = self._suspected = None
         target = self._left[0].target
         if target is not None or self._command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
@@ -539,10 +558,12 @@ class Manoeuvre:
             return []
         if self._is_followed or seen.up_us < commander.due_us:
             self._aids.query.sent()
+            self._asked_us = None
             return []
         if not self._may_send(seen, now_us):
             return []
         self._aids.query.sent()
+        self._asked_us = None
         self._aids.targets.told_again()
         self._aids.sent_us = seen.up_us
         return commander.due(seen.up_us)
@@ -564,6 +585,8 @@ class Manoeuvre:
         if not self.over:
             at_us = min(at_us, self._ends_us)
         due_us, answer_us = now_us + max(at_us - seen.up_us, 0), self._aids.query.ends_us
+        if self._asked_us is not None:
+            due_us = min(due_us, max(self._asked_us + ANSWER_MOST_US * self._commander.slack, now_us))
         return due_us if answer_us is None else min(due_us, answer_us)
 
     @property

@@ -4,7 +4,8 @@ On a link without a key anybody can put in a frame, and a component with the veh
 So a report that would end what we do (another mode, a landing, a failsafe, another target, motors that stop) counts
 when the next report of its kind shows the same. Until then no frame that moves the vehicle leaves, and the vehicle is
 asked: that is one round trip. Where the next report says otherwise, two speak as the vehicle; that is noted, and what
-the vehicle does goes on being watched.
+the vehicle does goes on being watched. While reports go back and forth, nobody knows whose the vehicle is: no frame
+that moves it leaves, and what then fails, or waits for 5 s, ends as taken over.
 
 A frame of ours that is on its way may undo what a pilot chose, which then shows for a moment: near such a frame a
 single report counts (docs/adr/0034).
@@ -58,6 +59,11 @@ class Suspicion:
     def stands(self) -> bool:
         """Whether something waits to be confirmed."""
         return self._kind is not None
+
+    @property
+    def how(self) -> str:
+        """What was reported last of what may be a takeover, confirmed or not."""
+        return self._how
 
     @property
     def kind(self) -> str | None:

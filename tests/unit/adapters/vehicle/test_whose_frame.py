@@ -285,3 +285,25 @@ def test_a_vehicle_that_only_needs_time_is_not_given_up(flavour: str) -> None:
     one = Flyer(flavour)
     one.until(Ready)
     assert not any(isinstance(each, Unfit) for each in one.events)
+
+
+@pytest.mark.parametrize("next_", [None, MotionKind.HOME, MotionKind.LAND, MotionKind.FLY])
+def test_a_takeover_is_not_hidden_by_a_voice_that_goes_on_reporting_our_mode(
+    aloft: Make, next_: MotionKind | None
+) -> None:
+    """Each true report was refuted by a forged one: the vehicle was the pilot's for 10 s, and none of ours knew it."""
+    one = aloft()
+    one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
+    one.wait(4)
+    ours = own(one, mode=one.vehicle.driver.seen.mode)
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    for beats in range(1_000):
+        says(one, ours)
+        one.wait(0.02)
+        if next_ is not None and beats == 100:
+            where = (200_000, 90_000) if next_ is MotionKind.FLY else None
+            one.begin(next_, *((where,) if where else ()), altitude=25_000, speed=5_000)
+        if any(isinstance(event, TakenOver | Failed) for event in one.events):
+            break
+    assert any(isinstance(event, TakenOver) for event in one.events)
+    assert one.truth.mode is Mode.POSITION

@@ -123,11 +123,13 @@ def test_after_a_dropout_all_is_known_again_before_a_second_is_over() -> None:
     assert why.why == "silent"
     assert 17.5 < lost < 19.5
     assert 22.4 < back < 22.7
-    known = seen.states[24]
+    before, known = seen.states[17], seen.states[24]
+    assert before["battery.drain"] is None, "the charge changed too seldom in this recording"
     assert {name for name, value in known.items() if value is None} <= {
         "wind.speed",
         "link.quality",
         "obstacle.distance",
+        "battery.drain",
     }
     assert not [frame for _, frame in seen.sent if frame.name == "COMMAND_LONG" and frame.message.command in LANDS]
 

@@ -14,10 +14,11 @@ from rtshcua.mavlink.enums import VEHICLES
 from rtshcua.model.faults import Mode, PilotMode, SecondVoice, Voice
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
-from rtshcua.onboard.ports import Crashed, Failed, LinkLost, Noted, Ready, Succeeded, TakenOver, Unfit
+from rtshcua.onboard.ports import Crashed, Failed, LinkLost, Noted, Ready, Sent, Succeeded, TakenOver, Unfit
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.virtual.vehicle import VirtualVehicle
-from virtual.flyer import Flyer
+from virtual.copying import copied
+from virtual.flyer import Flyer, climbed
 from virtual.policy import POLICY
 from virtual.rows import rows
 
@@ -306,4 +307,24 @@ def test_a_takeover_is_not_hidden_by_a_voice_that_goes_on_reporting_our_mode(
         if any(isinstance(event, TakenOver | Failed) for event in one.events):
             break
     assert any(isinstance(event, TakenOver) for event in one.events)
+    assert one.truth.mode is Mode.POSITION
+
+
+@pytest.mark.parametrize("kind", [MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND])
+def test_a_command_that_begins_where_one_report_says_that_a_mode_was_left_leaves_it_to_the_pilot(
+    kind: MotionKind,
+) -> None:
+    """Nothing of ours flies, as after a restart: the mode that is left counts as the one before."""
+    one = copied(climbed("px4", 20_000))
+    one.vehicle.driver._manoeuvre = None
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    for _ in range(400):
+        one.wait(0.01)
+        if one.vehicle.driver._left_mode is not None:
+            break
+    assert one.vehicle.driver._left_mode is not None
+    token = one.begin(kind)
+    one.wait(3)
+    assert any(isinstance(event, TakenOver) for event in one.events)
+    assert not any(isinstance(event, Sent) and event.token == token for event in one.events)
     assert one.truth.mode is Mode.POSITION

@@ -80,7 +80,9 @@ class Thief:
 
     def stated(self) -> Statement:
         """What the boundary signs of its own evidence."""
-        return claimed(self.of._answer(bytes([STATEMENT, 0]))[1:])
+        now = self.of.flight.clock.now()
+        times = struct.pack(">qqq", now.monotonic_us, now.utc_us, now.utc_error_us)
+        return claimed(self.of._answer(bytes([STATEMENT, 0]) + times)[1:])
 
     def send(self, frame: bytes) -> None:
         self.of.vehicle.simulation.receive(frame, self.of.flight.clock.elapsed_us)

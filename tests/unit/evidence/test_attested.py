@@ -129,6 +129,14 @@ def test_the_first_statement_behind_a_gap_and_before_the_seal_vouches_for_it(log
     assert log.evidence.gaps == {3: 5}
 
 
+def test_a_statement_that_is_older_than_the_end_of_a_gap_does_not_vouch_for_it(log: Log) -> None:
+    assert log.take(SEAL) is None
+    at_us = EFFECT.at_us + 3_600_000_000
+    assert log.take(effect("stalled", "9 us", at_us=at_us, utc_us=EFFECT.utc_us + 3_600_000_000)) is None
+    assert log.state() == ("boundary/gap", 4)
+    assert log.evidence.gaps == {}
+
+
 def test_records_may_come_after_the_statement_that_speaks_of_them(log: Log) -> None:
     log.chain.add(Tag.REFUSED, boundary_chain.refused("permit/late", 5))
     log.chain.add(Tag.REFUSED, boundary_chain.refused("permit/used", 5))

@@ -117,6 +117,15 @@ def test_an_epoch_is_over_after_a_while_or_after_many_records(
     assert recorder.overdue(now(10_001))
 
 
+def test_an_epoch_that_ends_late_begins_its_end_with_the_gap(
+    recorder: Recorder, begin: Callable[[], bytes], now: Callable[[int], Now]
+) -> None:
+    begin()
+    assert recorder.caught_up(now(1)) == ()
+    gap, seal = (json.loads(line) for line in recorder.caught_up(now(30_000)))
+    assert (gap["event"], gap["detail"], seal["type"]) == ("stalled", "30000000 us", "seal")
+
+
 def test_a_recorder_goes_on_after_a_crash_with_a_key_of_its_own(log: list[bytes], log_key: SigningKey) -> None:
     head, later = Head(), Now(40, 1_750_000_000_900_000, 9_000)
     for number, line in enumerate(log[:5]):

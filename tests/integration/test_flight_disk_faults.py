@@ -197,7 +197,8 @@ def test_a_step_is_not_sent_while_its_record_hangs(tmp_path: Path) -> None:
     run = Watched(tmp_path, LAND)
     flown = run.fly(hangs, 15, 60)
     assert "goto" not in run.skills
-    assert [record["detail"] for record in flown.effects("failed")][:1] == ["late"]
+    (failed, *_) = [str(record["detail"]) for record in flown.effects("failed")]
+    assert failed.startswith("late: nothing was sent: this computer was too busy, or its disk too slow")
     verified(flown)
 
 

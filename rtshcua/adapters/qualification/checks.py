@@ -390,6 +390,8 @@ def _lowest_across(observed: ObservedQualification, vehicle: Vehicle) -> Qualifi
 
 # ---------------------------------------------------------------- answers
 
+_UNSUPPORTED: Final = 3  # MAV_RESULT_UNSUPPORTED
+
 
 def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     answers = [each for sortie in observed.sorties for each in sortie.answers]
@@ -408,7 +410,14 @@ def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
         latest = max(times)
         expected = f"within {_time(RETRY_US)}: then it is sent again"
         yield _check("answers/late", latest <= RETRY_US, expected, _time(latest), RETRY_US, latest, _US)
-    refused = sorted({(each.command, each.result) for each in answers if each.result})
+    obeyed = {(True, _UNSUPPORTED)}  # whether it flew there, other checks say
+    refused = sorted(
+        {
+            (each.command, each.result)
+            for each in answers
+            if each.result and (each.asks_no_mode, each.result) not in obeyed
+        }
+    )
     told = ", ".join(f"MAV_CMD {command} {RESULTS.get(result or 0, result)}" for command, result in refused)
     yield _check("answers/accepted", not refused, "accepted", told or "all")
 

@@ -49,12 +49,15 @@ class ObservedCommand:
 
 @dataclass(slots=True)
 class ObservedAnswer:
-    """A MAV_CMD that was sent, and the result of its first acknowledgement."""
+    """A MAV_CMD that was sent, and the result of its first acknowledgement. `asks_no_mode`: a DO_REPOSITION without the
+    flag that changes the mode, which PX4 calls unsupported and obeys in Hold (recorded; ADR 34).
+    """
 
     command: int
     sent_us: int
     answered_us: int | None = None
     result: int | None = None
+    asks_no_mode: bool = False
 
 
 @dataclass(slots=True)

@@ -31,7 +31,7 @@ from rtshcua.adapters.vehicle.effects import Effect, apart
 from rtshcua.adapters.vehicle.flavour import Stage, Stages
 from rtshcua.adapters.vehicle.link import Heard
 from rtshcua.adapters.vehicle.manoeuvre import AGAIN_US, LATE_US
-from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.messages import REPOSITION, Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
 from rtshcua.codec.frames import Received, is_addressed
@@ -254,7 +254,8 @@ class QualifyingDriver(Driver):
             if number in _QUESTIONS or message.get_type() not in _MOVING:
                 continue
             if number is not None:
-                self.found.answers.append(ObservedAnswer(number, now_us))
+                asks_no_mode = number == REPOSITION and not message.param2
+                self.found.answers.append(ObservedAnswer(number, now_us, asks_no_mode=asks_no_mode))
             if self.found.takeover is not None:
                 self.found.takeover.moved_us = now_us
         return frames

@@ -135,6 +135,13 @@ class UtcWatch:
         """Whether the vehicle's time would still be taken."""
         return self.bound.source == "unknown"
 
+    @property
+    def vehicle_may_tell(self) -> bool:
+        """Whether the vehicle is to be asked for its time: a boundary of its own takes it in answer to a number alone,
+        which it draws where the link has a key.
+        """
+        return self.waits and (self._own is None or self.question() != 0)
+
     def look(self, told: SourceTime, flavour: str, now_us: int) -> bool:
         """Take the vehicle's own time, if it is needed and told. Whether it was taken."""
         if self._own is not None:

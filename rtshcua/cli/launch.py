@@ -203,7 +203,7 @@ def _launch(order: Launch) -> ExitCode:
                 if order.incidents is not None:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
             agents = agents or _agents(order, loaded, stack)
-            vehicle.driver.asks_utc, vehicle.driver.asks_back = utc.waits, utc.question
+            vehicle.driver.asks_utc, vehicle.driver.asks_back = utc.vehicle_may_tell, utc.question
             hurried = not order.dry_run and _broke_off(past) and _may_have_flown(order, loaded)
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
             events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)

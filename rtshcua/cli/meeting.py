@@ -43,6 +43,8 @@ def unopened(link: Address, error: OSError) -> Refusal:
 
 #: How long the vehicle's time is waited for where the operator stated how far ours is off, in seconds
 UTC_S = 3.0
+#: and so long before a flight, once nothing else keeps the vehicle from being ready
+READY_UTC_S: Final = 10.0
 UTC_NOTE: Final = (
     "nothing tells how far this machine's time of day is off: until the vehicle does, steps are deferred "
     "(`--utc-error 500ms` states it)"
@@ -100,7 +102,7 @@ def meet(
 
 def await_utc(utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, patient: bool) -> list[Event]:
     """Take the vehicle's time of day where the kernel vouches for none; what happened meanwhile. `patient`: it is
-    waited for, and then what the operator stated holds; else the flight waits for it itself.
+    waited for, and then what the operator stated holds; else the vehicle is not ready before it told it.
     """
     events: list[Event] = []
     until_s = time.monotonic() + (UTC_S if patient else 0)
@@ -111,5 +113,6 @@ def await_utc(utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, pat
             break
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     utc.settle()
-    vehicle.driver.asks_utc = utc.waits
+    vehicle.driver.asks_utc = utc.vehicle_may_tell
+    vehicle.driver.utc_patience_us = 0 if patient else clock.us_in(READY_UTC_S)
     return events

@@ -51,6 +51,7 @@ UNFIT_US = 5_000_000
 #: why a vehicle that signs answers nothing to whoever does not
 KEYLESS = "it signs what it sends, and answers nothing that is not signed: give the link's key with `--signing-key`"
 
+_UNDATED = "nobody has told the time of day yet, without which no step is decided: its SYSTEM_TIME is awaited"
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 #: how many kinds of others that speak under its ids are told of: whoever makes them up has 65,536
 _MOST_STRANGERS = 8
@@ -122,13 +123,16 @@ class Driver:
         self._strangers: set[str] = set()  # and what was said of who speaks under its ids and is of another
         #: that it is no multirotor, in words
         self.other_kind: str | None = None
-        #: the vehicle's own time of day is wanted: it is asked for until it is told
+        #: the vehicle's own time of day is wanted: it is asked for until it is told,
         self.asks_utc = False
+        #: and so long it is waited for before anything begins, once nothing else is missing
+        self.utc_patience_us = 0
         #: and the number that a boundary wants it to send back before, 0 for none
         self.asks_back: Callable[[], int] = int
         #: what else it is asked on the ground, and told of each of its messages
         self.asks: GroundQuestions | None = None
         self._asked_utc_us = 0
+        self._lacks_utc_us: int | None = None  # since when nothing else is missing
         #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
         self.resumes = False
         #: and what that run may have left it doing; None: nobody knows
@@ -203,7 +207,14 @@ class Driver:
             or mute
             or self.preflight.astray
         )
-        return waits or self.seen.unready or self.preflight.unready
+        return waits or self.seen.unready or self.preflight.unready or self._undated
+
+    @property
+    def _undated(self) -> str | None:
+        """That the time of day is still to come, in words: meanwhile the deadline of the first step would pass."""
+        since_us, now_us = self._lacks_utc_us, self.seen.now_us
+        waits = self.asks_utc and (since_us is None or now_us - since_us < self.utc_patience_us)
+        return _UNDATED if waits and self.utc_patience_us else None
 
     @property
     def _contradicted(self) -> str | None:
@@ -665,7 +676,12 @@ class Driver:
         answer, for a while the times of what it says are awaited, and then one report of each kind.
         """
         if not self._flies:
-            return self.unready is None and self.stream_requests.settled(now_us)
+            lacks = self.unready
+            if lacks != _UNDATED:
+                self._lacks_utc_us = None
+            elif self._lacks_utc_us is None:
+                self._lacks_utc_us = now_us
+            return lacks is None and self.stream_requests.settled(now_us)
         if self.link.crowd is not None or not self._watch.answers:
             return False
         if self._answers_us is None:

@@ -178,15 +178,16 @@ def test_what_the_operator_stated_holds_once_no_more_is_waited_for() -> None:
     own = Own(number=77)
     own.stated = Source.OPERATOR
     watch = UtcWatch(SystemClock(), 500, kernel_us=lambda: None)
-    assert watch.question() == 0
+    assert (watch.question(), watch.vehicle_may_tell) == (0, True)
     watch.follow(own)
-    assert watch.question() == 77
+    assert (watch.question(), watch.vehicle_may_tell) == (77, True)
     watch.settle()
-    assert (watch.bound.source, watch.question()) == ("operator", 0)
+    assert (watch.bound.source, watch.question(), watch.vehicle_may_tell) == ("operator", 0, False)
     unstated = UtcWatch(SystemClock(), None, kernel_us=lambda: None)
     unstated.follow(Own())
     unstated.settle()
     assert unstated.waits
+    assert not unstated.vehicle_may_tell, "the boundary draws no number, for the link has no key"
 
 
 def test_a_boundary_without_a_clock_or_that_is_gone_changes_nothing() -> None:

@@ -156,6 +156,29 @@ def test_without_a_clock_nothing_is_known_and_it_is_not_ready(autopilot: int) ->
 
 
 @BOTH
+def test_it_is_not_ready_before_the_time_of_day_is_known_or_was_waited_for(autopilot: int) -> None:
+    """The first step is released when the vehicle is ready, and its deadline runs from then on."""
+
+    def live(seconds: float) -> str:
+        for _ in range(round(seconds * 10)):
+            one.estimator(0x33F)
+            one.place()
+            one.health()
+            one.tick()
+        return one.driver.unready or ""
+
+    one = Bench(autopilot)
+    one.driver.asks_utc, one.driver.utc_patience_us = True, 3 * S
+    assert "on the ground" in live(4)
+    one.well()
+    assert "the time of day" in live(2), "the wait begins when nothing else is missing"
+    one.driver.asks_utc = False
+    assert not one.driver.unready
+    one.driver.asks_utc = True
+    assert not live(2)
+
+
+@BOTH
 def test_a_vehicle_that_signs_and_does_not_answer_asks_for_the_key(autopilot: int) -> None:
     def unready(*, deaf: bool, keyed: bool = False) -> str | None:
         one = Bench(autopilot, signs=True, keyed=keyed)

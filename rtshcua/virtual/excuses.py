@@ -9,6 +9,7 @@
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
 | `unseen` | motion after a takeover | ArduCopter's pause until it stands, or near an end; a velocity in its takeoff |
+| `unseen` | motion after a takeover | a go-to in its takeoff to where that ends |
 | `unseen` | motion after a takeover | sticks that nudge; PX4's pause in a stop, or a climb's end |
 | `unseen` | motion after a takeover | the mode is the one that our last frame asked for, which was lost |
 | `report` | standing down in the air | a HEARTBEAT or position is stuck, or a target is told no more |
@@ -58,6 +59,10 @@ _STANDS_US: Final = 4_000_000
 _NOTICED_US: Final = 3_000_000
 _FAR_MM: Final = 12_000
 _MOVED_MM_S: Final = 2_000
+#: us: by then a takeoff that rises no further counts as somebody's,
+_KEPT_US: Final = 13_000_000
+#: mm: but for one who sends it no further than this from its end
+_TOLD_MM: Final = 3_000
 _POSITION_TARGET: Final = (86).to_bytes(3, "little")  # SET_POSITION_TARGET_GLOBAL_INT
 _MM: Final = 11.132  # in 1e-7 degree
 _RANGES: Final = frozenset({"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"})
@@ -265,8 +270,8 @@ class Excuses:
         climb itself does, near the height of it.
         """
         since_us = failure.at_us - failure.amount - _TICK_US  # what a pilot told it before changed nothing
-        told = self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)
-        if any(fault.at_us >= since_us for fault in told):
+        told = [*self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)]
+        if any(fault.at_us >= since_us and not self._ends_the_climb(fault) for fault in told):
             return None
         if self._is_copter:
             return "unseen" if self._is_silent(failure) else None
@@ -285,11 +290,16 @@ class Excuses:
         """
         others = (faults.PilotPause, faults.PilotSpeed, faults.AgentFault)
         alone = all(isinstance(each.fault, others) for each in self._happened if each.at_us <= failure.at_us)
-        for fault in self._before(failure.at_us, faults.PilotPause, faults.PilotSticks, faults.PilotVelocity):
+        silent = (faults.PilotPause, faults.PilotSticks, faults.PilotVelocity, faults.PilotGoto)
+        for fault in self._before(failure.at_us, *silent):
+            if isinstance(fault, faults.PilotGoto):
+                if self._ends_the_climb(fault):
+                    return True
+                continue
             sample, left_mm = self._sample(fault.at_us), self._left_mm(fault.at_us + _STANDS_US)
             if isinstance(fault, faults.PilotVelocity):
-                if self._left_mm(failure.at_us - failure.amount) is None:
-                    return True  # in its takeoff it names no target that could vanish
+                if self._left_mm(failure.at_us - failure.amount) is None and failure.amount <= _KEPT_US:
+                    return True  # in its takeoff it names no target that could vanish, until it rises no further
                 continue
             far = left_mm is not None and left_mm > _FAR_MM
             moved = sample is not None and sample.speed_mm_s >= _MOVED_MM_S
@@ -297,6 +307,17 @@ class Excuses:
             if not shows or failure.at_us - fault.at_us <= _STANDS_US + _NOTICED_US:
                 return True
         return False
+
+    def _ends_the_climb(self, fault: Fault) -> bool:
+        """Whether a go-to in ArduCopter's takeoff names the place where that ends, as older ones do themselves."""
+        if not (isinstance(fault, faults.PilotGoto) and self._is_copter) or self._left_mm(fault.at_us) is not None:
+            return False
+        start, sample = self._flown.samples[0], self._sample(fault.at_us)
+        if sample is None or not any(abs(up - fault.up_mm) <= _TOLD_MM for up in self._climbs()):
+            return False
+        north = (sample.latitude - start.latitude) * _MM - fault.north_mm
+        east = (sample.longitude - start.longitude) * _MM * cos(radians(start.latitude / 1e7)) - fault.east_mm
+        return hypot(north, east) <= _TOLD_MM
 
     def _left_mm(self, at_us: int) -> float | None:
         """How far it was then from the place that ArduCopter was last sent to; None if it was sent nowhere."""

@@ -38,7 +38,7 @@ SAMPLES: dict[str, dict[str, Any]] = {
     "missions": {"SIZES": (15, 30), "ROUNDS": 1},
     "parse": {"LINES": 100, "MOST_LINES": 400, "ROUNDS": 1},
     "proofs": {"SIZE": 256, "BLOCKS": 1, "ROUNDS": 2},
-    "reaction": {"PROCESSES": 1, "IN_PROCESS": 2, "QUICK": 2},
+    "reaction": {"PROCESSES": 1, "IN_PROCESS": 2, "QUICK": 2, "MUTE": 1},
     "recall": {"RECALLS": 1, "RESTARTS": 1, "FLAVOURS": ("px4",)},
     "recorded_flights": {},
     "startup": {"ROUNDS": 1, "COMMANDS": (("--help",), ("check", "missions/short.rts"))},

@@ -11,10 +11,12 @@ from functools import cache
 from itertools import product
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.model.faults import Mode, PilotMode
+from rtshcua.codec.frames import Codec
+from rtshcua.model.faults import LinkDelay, Mode, PilotMode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Noted, TakenOver
+from rtshcua.onboard.ports import Noted, Sent, TakenOver
 from virtual.copying import copied
 from virtual.flyer import Flyer
 
@@ -136,6 +138,61 @@ def test_a_command_that_begins_before_a_takeover_is_confirmed_leaves_it_to_the_p
     """One report of it may have come by then: it is neither forgotten, nor taken for the mode of what flew before."""
     for after_ms in (*range(0, 140, 30), *range(140, 190, 10)):
         check_after(0, 0, after_ms, kind)
+
+
+def asks(frame: bytes) -> bool:
+    """Whether it is a question for a message."""
+    (received,) = Codec(1, 1).parse(frame)
+    return bool(getattr(received.message, "command", None) == mavlink.MAV_CMD_REQUEST_MESSAGE)
+
+
+@pytest.mark.parametrize("after_ms", [60, 100, 140])
+def test_a_question_that_is_lost_is_put_again_before_a_way_home_leaves(after_ms: int) -> None:
+    one = copied(flying(15 * MS))
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.lose = asks
+    one.wait(after_ms / 1_000)
+    one.begin(MotionKind.HOME)  # its question is lost too
+    one.vehicle.lose = lambda frame: False
+    one.wait(1)
+    assert one.truth.mode is Mode.POSITION
+    assert any(isinstance(event, TakenOver) for event in one.events)
+
+
+@cache
+def far_away() -> Flyer:
+    """A radio's round trip takes 150 ms."""
+    one = copied(flying(15 * MS))
+    one.vehicle.simulation.inject(LinkDelay(0, 75 * MS))
+    one.wait(10)
+    return one
+
+
+@pytest.mark.parametrize("kind", [MotionKind.HOME, MotionKind.LAND])
+@pytest.mark.parametrize("after_ms", range(180, 330, 50))
+def test_a_way_home_waits_for_the_round_trip_of_its_link(kind: MotionKind, after_ms: int) -> None:
+    """It left after 50 ms, on a report from before the pilot's, and undid what was chosen 320 ms before."""
+    one = copied(far_away())
+    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.wait(after_ms / 1_000)
+    begun_us = one.now_us
+    if not any(isinstance(event, TakenOver) for event in one.events):
+        one.begin(kind)
+    one.wait(1)
+    assert one.truth.mode is Mode.POSITION, begun_us
+    assert any(isinstance(event, TakenOver) for event in one.events)
+
+
+@pytest.mark.parametrize(("delay_ms", "most_ms"), [(0, 1), (20, 51), (75, 156)])
+def test_a_way_home_that_nobody_disputes_waits_for_one_round_trip_at_most(delay_ms: int, most_ms: int) -> None:
+    one = copied(far_away() if delay_ms == 75 else flying(15 * MS))
+    if delay_ms == 20:
+        one.vehicle.simulation.inject(LinkDelay(0, 20 * MS))
+        one.wait(10)
+    begun_us = one.now_us
+    one.begin(MotionKind.HOME)
+    sent = one.until(Sent, 1)
+    assert sent.at_us - begun_us <= most_ms * MS
 
 
 @pytest.mark.soak

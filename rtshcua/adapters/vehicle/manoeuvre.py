@@ -16,8 +16,6 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.adapters.vehicle.supervision import (
-    FAR,
-    FAR_BELOW,
     MODE_BEATS,
     NEVER,
     Brakes,
@@ -201,7 +199,8 @@ class WhoFliesQuery:
         self._target = False  # the frame waits for a target, too,
         self._twice = False  # and for two answers,
         self._first_us: int | None = None  # of which this is when the first came
-        self._asked = 0  # how often it was asked for the frame
+        self._asked = 0  # how often it was asked for the frame,
+        self._every_us = AGAIN_US  # and so often it is, where no answer comes
         self._commanded_us: int | None = None  # when somebody else was last seen to be obeyed
         self._doubts = False  # what was reported is to be confirmed
         #: how many questions for messages were put
@@ -222,14 +221,18 @@ class WhoFliesQuery:
             return False
         return self._tells_of_commanded(seen.heartbeat_us)
 
-    def is_newer(self, seen: ObservedVehicle, now_us: int, *, target: bool, twice: bool = False) -> bool:
+    def is_newer(
+        self, seen: ObservedVehicle, now_us: int, *, target: bool, twice: bool = False, again_us: int = AGAIN_US
+    ) -> bool:
         """Whether a mode report came since this was first asked for one frame, and with `target` a report of that too,
-        or none in good time: it will do for any frame. `twice`: two mode reports, so far apart as one may lag.
+        or none in good time: it will do for any frame. `twice`: two mode reports, so far apart as one may lag. Where
+        no answer comes it is asked again after `again_us`.
         """
         if self._came is None:
             self._came, self._first_us, self._asked = (seen.beats, seen.targets), None, 0
             self._asked_us, self.due_us = None, 0  # ask at once
         self._target, self._twice = target, twice and self._lag_us > 0
+        self._every_us = min(again_us, AGAIN_US)
         beats, targets = self._came
         if seen.beats == beats or seen.heartbeat_us is None or not self._tells_of_commanded(seen.heartbeat_us):
             return False
@@ -300,7 +303,7 @@ class WhoFliesQuery:
         """So long after the last question for a frame the next one is put."""
         commanded_us = self._commanded_us
         hurries = commanded_us is not None and now_us - commanded_us <= 2 * (self._lag_us + APART_US)
-        return self._lag_us + APART_US if hurries or (self._twice and self._asked == 1) else AGAIN_US
+        return self._lag_us + APART_US if hurries or (self._twice and self._asked == 1) else self._every_us
 
 
 # ---------------------------------------------------------------- a manoeuvre
@@ -309,6 +312,7 @@ class WhoFliesQuery:
 UNKNOWN: Final = "unknown/no-answer"
 #: It stands still, and is not where it was sent.
 STOPPED_SHORT: Final = "stopped-short"
+_GETS_NOWHERE: Final = (STOPPED_SHORT, "no-progress")
 #: what a command comes to, too, where a pilot flies and somebody goes on reporting our mode
 _AS_IF_OTHERS_FLEW: Final = frozenset(
     (UNKNOWN, STOPPED_SHORT, "no-mode-report", "no-progress", "no-effect", "did-not-stop", "did-not-hold")
@@ -326,8 +330,8 @@ _LEGS: Final = (MotionKind.FLY, MotionKind.COVER)
 #: a frame that stops the vehicle, or brings it home or down, waits no longer than this to know whether its target is
 #: its own still, in us
 UNNAMED_MOST_US: Final = 1_000_000
-#: so long a frame that brings it home or down waits for the answer to its own question, in us: then the last report
-#: will do, if that is young
+#: so long, and what a round trip takes, a frame that brings it home or down waits for a report of the mode that is of
+#: now, in us: then the last one will do, if that is young
 ANSWER_MOST_US: Final = 50_000
 
 
@@ -356,6 +360,14 @@ class Aids:
         """Whether a frame of ours may have undone by now what a report shows."""
         within_us = CROSSED_US * self.commander.slack + (self._clock.round_trip_us or 0)
         return self.sent_us is not None and up_us - self.sent_us <= within_us
+
+    @property
+    def answer_us(self) -> int:
+        """How long a frame that would undo a pilot's mode waits at most for the answer to its own question: what a
+        round trip takes, unless reports come later than would ever do, and `ANSWER_MOST_US`.
+        """
+        trip_us = min(self._clock.round_trip_us or 0, self.flavour.mode_within_us)
+        return ANSWER_MOST_US * self.commander.slack + trip_us
 
     def sure(self, found: tuple[str, str, int] | None, seen: ObservedVehicle) -> str | None:
         """What is sure of what shows that somebody else flies, or that the motors stopped: nobody can put in a frame
@@ -460,8 +472,8 @@ class Manoeuvre:
             self._left.pop(0)
             self._enter(seen)
         reason = self._failure(seen) if self._left else self._left_its_place(seen)
-        if reason == STOPPED_SHORT and self._names_target(seen) and stands_idly(seen, self._way_left(seen), now_us):
-            self.over = self._taken = True  # it never set off, though it says that it flies there
+        if reason in _GETS_NOWHERE and self._is_kept(seen, now_us):
+            self.over = self._taken = True
             return [], [TakenOver(now_us, "paused")]
         if reason in _AS_IF_OTHERS_FLEW and self._aids.contradictions.stand(now_us):
             self.over = self._taken = True
@@ -496,7 +508,7 @@ class Manoeuvre:
         leg = self._command.kind in _LEGS and stage.progress is not None
         climb = self._command.kind == MotionKind.CLIMB and stage.progress is not None
         watches = (leg or climb) and self._flavour.names_targets
-        self._pause = PauseWatch(FAR if leg else FAR_BELOW) if watches else None
+        self._pause = PauseWatch(climb=climb) if watches else None
         self._pace = SpeedWatch(self._command.speed) if leg else None
         if stage.stops and self._stop is None:
             self._stop = BrakingWatch(self._aids.brakes, seen)
@@ -516,7 +528,9 @@ class Manoeuvre:
                 return False
         if urgent and self._answers_late(seen, now_us) and query.is_young(seen, now_us):
             return True
-        return query.is_newer(seen, now_us, target=self._aids.targets.compares and not urgent, twice=not urgent)
+        again_us = AGAIN_US if self._asked_us is None else self._aids.answer_us // 2  # a question may be lost
+        targets = self._aids.targets.compares and not urgent
+        return query.is_newer(seen, now_us, target=targets, twice=not urgent, again_us=again_us)
 
     def _answers_late(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether a frame that names a mode, and so would undo one, waits no longer for the answer to its question."""
@@ -524,7 +538,7 @@ class Manoeuvre:
             return True
         if self._asked_us is None:
             self._asked_us = now_us
-        return now_us - self._asked_us >= ANSWER_MOST_US * self._commander.slack
+        return now_us - self._asked_us >= self._aids.answer_us
 
     def _is_unnamed(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether it goes on naming a target of ours as a rule, and did not for as long as a mode report may be old."""
@@ -586,7 +600,7 @@ class Manoeuvre:
             at_us = min(at_us, self._ends_us)
         due_us, answer_us = now_us + max(at_us - seen.up_us, 0), self._aids.query.ends_us
         if self._asked_us is not None:
-            due_us = min(due_us, max(self._asked_us + ANSWER_MOST_US * self._commander.slack, now_us))
+            due_us = min(due_us, max(self._asked_us + self._aids.answer_us, now_us))
         return due_us if answer_us is None else min(due_us, answer_us)
 
     @property
@@ -686,6 +700,17 @@ class Manoeuvre:
 
     def _is_paused(self, seen: ObservedVehicle, now_us: int) -> bool:
         return self._pause is not None and self._pause.is_paused(seen, self._way_left(seen), now_us)
+
+    def _is_kept(self, seen: ObservedVehicle, now_us: int) -> bool:
+        """Whether somebody keeps it where it is for longer than any reason of its own would: it never set off, though
+        it says that it flies there, or it rises no further, however little is missing. What never rose at all may be
+        without propellers, and is to be told to land.
+        """
+        if self._command.kind == MotionKind.CLIMB:
+            rose = self._progress is not None and self._progress.shown
+            kept = stands_idly(seen, self._way_left(seen), now_us, far=0, climb=True)
+            return rose and kept and self._flavour.names_targets
+        return self._names_target(seen) and stands_idly(seen, self._way_left(seen), now_us)
 
     def _way_left(self, seen: ObservedVehicle) -> tuple[int, ...] | None:
         progress = self._left[0].progress if self._left else None

@@ -312,11 +312,12 @@ class PauseWatch:
     """Whether a vehicle on its way to its target was stopped by somebody, who changed neither mode nor target.
 
     ArduCopter's DO_PAUSE_CONTINUE takes 3 s from 5.6 m/s (recorded). Wind makes it lean, an obstacle is seen ahead, at
-    the end of a leg it is near its target, and without a position nothing is known.
+    the end of a leg it is near its target, and without a position nothing is known. `climb`: it is to get higher, and
+    names no target, so somebody else's velocity is seen to be flown in the same way: it rises no further.
     """
 
-    def __init__(self, far: int = FAR) -> None:
-        self._far = far
+    def __init__(self, *, climb: bool = False) -> None:
+        self._far, self._climb = FAR_BELOW if climb else FAR, climb
         self._moved = False
         self._since_us: int | None = None
 
@@ -328,7 +329,7 @@ class PauseWatch:
     def is_paused(self, seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int) -> bool:
         """Whether it stands so since it moved; `left` is how far its target is."""
         self._moved = self._moved or (seen.speed is not None and seen.speed >= MOVED)
-        if not self._moved or not stands_idly(seen, left, now_us, self._far):
+        if not self._moved or not stands_idly(seen, left, now_us, self._far, climb=self._climb):
             self._since_us = None
             return False
         if self._since_us is None:
@@ -336,12 +337,18 @@ class PauseWatch:
         return seen.up_us - self._since_us >= STANDS_US
 
 
-def stands_idly(seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int, far: int = FAR) -> bool:
-    """Whether it stands still far from its target, and nothing that is seen keeps it there."""
-    if left is None or min(left) < far or not still(seen):
+def stands_idly(
+    seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int, far: int = FAR, *, climb: bool = False
+) -> bool:
+    """Whether it stands still far from its target, in a `climb` its height, and nothing that is seen keeps it there."""
+    if left is None or min(left) < far or not (_is_level(seen) if climb else still(seen)):
         return False
     blocked = seen.ahead is not None and seen.ahead < BLOCKED and now_us - seen.ahead_us <= BLOCKED_US
     return seen.tilt < LEANS and not blocked
+
+
+def _is_level(seen: ObservedVehicle) -> bool:
+    return seen.airborne and seen.speed is not None and abs(seen.descent) <= STOPPED
 
 
 #: us of link time that a leg must be flown steadily at less than `SLOWER` % of the speed that it was told

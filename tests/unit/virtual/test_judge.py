@@ -457,6 +457,32 @@ def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
     ]  # before the pause
 
 
+@pytest.mark.parametrize(
+    ("fault", "after_s", "seen"),
+    [
+        (faults.PilotGoto(0, 1_500, -1_500, 6_000), 5, False),
+        (faults.PilotGoto(0, 1_500, -3_500, 6_000), 5, True),
+        (faults.PilotGoto(0, 0, 0, 9_000), 5, True),
+        (faults.PilotVelocity(0, -2_000, 0, 40 * S), 12, False),
+        (faults.PilotVelocity(0, -2_000, 0, 40 * S), 14, True),
+    ],
+)
+def test_what_does_not_show_in_arducopters_takeoff(
+    good: ScenarioFlown, fault: Fault, after_s: int, *, seen: bool
+) -> None:
+    """A go-to to its end looks like the end itself; a velocity shows once it rises no further."""
+    frame = motion(good)[-1]
+    since_us = frame.sent_us - after_s * S
+    after = [each for each in good.samples if each.at_us > since_us]
+    samples = [
+        sample(0),
+        sample(since_us / S, up_m=2, mode=Mode.GUIDED),
+        *(each._replace(taken_over_us=since_us, taken_over_by="pilot") for each in after),
+    ]
+    found = judged(good, samples, replace(fault, at_us=since_us), frames=(frame,), flavour="ardupilot")
+    assert ("motion-after-takeover" in slugs(found)) is seen
+
+
 @pytest.mark.parametrize(("climb_mm_s", "cause"), [(600, "unseen"), (700, None), (800, None)])
 def test_a_pause_of_what_stops_already(good: ScenarioFlown, climb_mm_s: int, cause: str | None) -> None:
     """Told to stop, it still climbs when a pilot tells it the same: nothing shows that, while it slows down."""

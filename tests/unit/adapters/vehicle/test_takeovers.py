@@ -7,6 +7,7 @@ what we do.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from typing import Any
@@ -279,6 +280,27 @@ def test_a_takeover_in_a_climb_is_seen_and_not_fought(flavour: str, name: str, h
         return
     one.until(TakenOver, 0.4)
     one.wait(5)
+    assert sent.at_us == []
+
+
+SLOWLY_UP: dict[str, tuple[Fault, ...]] = {
+    "velocity": (PilotVelocity(0, -2_000, 0, 60 * S),),
+    "slow velocity": (PilotVelocity(0, 0, 1_000, 60 * S),),
+    "pause": (PilotPause(0),),
+    "slowed down, and paused": (PilotSpeed(0, 2_500), PilotPause(200 * MS)),
+}
+
+
+@pytest.mark.parametrize("name", SLOWLY_UP)
+@pytest.mark.parametrize(("height", "within_s"), [(500, 13), (5_000, 5), (15_000, 13)])
+def test_a_climb_that_somebody_keeps_down_is_left_to_him(name: str, height: int, within_s: float) -> None:
+    """ArduCopter names no target in a takeoff, so only its motion tells. 10 s later it was flown home against him."""
+    one = copied(climbing("ardupilot", height))
+    sent = Sent(one)
+    now_us = one.vehicle.simulation.now_us
+    for fault in SLOWLY_UP[name]:
+        one.vehicle.simulation.inject(replace(fault, at_us=now_us + fault.at_us))
+    assert isinstance(one.until((TakenOver, Failed, Succeeded), within_s), TakenOver)
     assert sent.at_us == []
 
 

@@ -50,7 +50,8 @@ def mcp(
     With --http it answers at http://127.0.0.1:PORT/mcp whoever sends the token in the file as `Authorization: Bearer`.
 
     Ends with 0 with the host, 2 where the command line is wrong or the extra is missing, 3 where a file cannot be read
-    or the port is taken, 4 for a key that is not an agent's, or a token that others may read.
+    or the port is taken, 4 for a key that is not an agent's, or a token that others may read, 74 where nothing can be
+    written.
     """
     try:
         with _loading():

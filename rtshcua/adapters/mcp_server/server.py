@@ -1,17 +1,14 @@
-"""The Model Context Protocol over standard streams and HTTP: tools, resources, progress and subscriptions. The only
-module that has the SDK.
+"""The Model Context Protocol over standard streams and HTTP: tools, resources, progress and subscriptions. This module
+and `stdio` alone have the SDK.
 """
 
-import json
 import logging
-import os
-import re
 import socket
 import threading
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
-from typing import Any, BinaryIO, Final, cast
+from typing import Any, Final
 
 import anyio
 import uvicorn
@@ -21,7 +18,6 @@ from mcp import types
 from mcp.server.lowlevel import Server
 from mcp.server.lowlevel.helper_types import ReadResourceContents
 from mcp.server.session import ServerSession
-from mcp.server.stdio import stdio_server
 from mcp.server.streamable_http_manager import StreamableHTTPSessionManager
 from mcp.shared.session import RequestResponder
 from pydantic import AnyUrl
@@ -30,7 +26,8 @@ from rtshcua import __version__
 from rtshcua.adapters.mcp_server.access import refusal
 from rtshcua.adapters.mcp_server.arguments import Unfit, fitted
 from rtshcua.adapters.mcp_server.connections import CONNECTION, MOST, Connection
-from rtshcua.ground.language.size import without_texts
+from rtshcua.adapters.mcp_server.messages import writable
+from rtshcua.adapters.mcp_server.stdio import streams
 
 INSTRUCTIONS: Final = (
     "Propose missions to a drone that waits. Read describe_policy first; check_mission costs nothing; a rejection "
@@ -59,14 +56,6 @@ _MOST_SESSIONS: Final = 8
 _IDLE_S: Final = 1_800.0
 #: how many resources may be followed at once, by all hosts together; one more takes the place of the oldest
 _MOST_FOLLOWED: Final = 32
-#: bytes and values (`without_texts`) of one line over stdio: a mission of any size that is read, however it is written
-MOST_LINE: Final = 16 << 20
-MOST_VALUES: Final = 1 << 16
-_NO_MESSAGE: Final = "too long\n"
-#: in place of a request whose number stands within its first bytes: the SDK answers that it is none
-_NO_REQUEST: Final = '{"jsonrpc":"2.0","id":%s,"method":"too-long"}\n'
-_ASKED: Final = re.compile(rb'"id" *: *([0-9]{1,15})[ ,}]')
-_BEGINNING: Final = 256
 
 
 def _tool(
@@ -147,18 +136,18 @@ class Opening:
 
 def serve(make: Callable[[], Any]) -> None:
     """Speak over the standard streams until the host ends. `make` gives the tools (`desk.Desk`)."""
-    logging.getLogger("mcp").setLevel(logging.CRITICAL)  # the standard error is the host's to show
+    _quieten()
     anyio.run(_speak, Opening(make))
 
 
+def _quieten() -> None:
+    """Keep from the standard error, which the host may show, what the SDK says there of each message that is wrong."""
+    logging.getLogger("mcp").setLevel(logging.CRITICAL)
+    logging.getLogger().addFilter(lambda _: False)  # of what is written to the root itself, as the SDK does
+
+
 async def _speak(opening: Opening) -> None:
-    # streams of its own: the SDK closes what it is given, and the command still has to end
-    stdin = Lines(os.fdopen(os.dup(0), "rb"))
-    stdout = anyio.wrap_file(os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace"))
-    async with (
-        stdio_server(cast("anyio.AsyncFile[str]", stdin), stdout) as (incoming, outgoing),
-        anyio.create_task_group() as others,
-    ):
+    async with streams(0, 1) as (incoming, outgoing), anyio.create_task_group() as others:
         others.start_soon(_warm, opening)
         server = made(opening, others)
         await server.run(incoming, outgoing, server.create_initialization_options())
@@ -167,7 +156,7 @@ async def _speak(opening: Opening) -> None:
 
 def serve_http(make: Callable[[], Any], listener: socket.socket, token: bytes) -> None:
     """Speak over streamable HTTP at a socket that listens on this machine alone, until a signal ends it."""
-    logging.getLogger("mcp").setLevel(logging.CRITICAL)
+    _quieten()
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)  # it warns of every stranger that speaks nonsense
     anyio.run(_speak_http, Opening(make), listener, token)
 
@@ -197,29 +186,6 @@ async def _speak_http(opening: Opening, listener: socket.socket, token: bytes) -
         async with manager.run():
             await uvicorn.Server(settings).serve(sockets=[listener])
         others.cancel_scope.cancel()
-
-
-class Lines:
-    """The lines of a host, as the SDK takes them. One that is too long, or of too many values, is not kept: what stands
-    for it is no message; the SDK answers that, by its number where the line begins with one.
-    """
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-
-    async def __aiter__(self) -> AsyncIterator[str]:
-        while line := await run_sync(self._next):
-            yield line
-
-    def _next(self) -> str:
-        line = rest = self._file.readline(MOST_LINE)
-        while len(rest) == MOST_LINE and not rest.endswith(b"\n"):
-            line = line[:_BEGINNING]
-            rest = self._file.readline(MOST_LINE)
-        if rest is line and without_texts(line, MOST_VALUES) is not None:
-            return line.decode("utf-8", "replace")
-        asked = _ASKED.search(line, 0, _BEGINNING)
-        return _NO_MESSAGE if asked is None else _NO_REQUEST % asked[1].decode()
 
 
 async def _warm(opening: Opening) -> None:
@@ -333,7 +299,7 @@ def made(opening: Opening, others: TaskGroup) -> "Server[Any, Any]":
         if name is None:
             raise ValueError("there is no such resource")
         desk = await run_sync(opening.get)
-        return [ReadResourceContents(json.dumps(await run_sync(getattr(desk, name))), "application/json")]
+        return [ReadResourceContents(writable(await run_sync(getattr(desk, name)))[1], "application/json")]
 
     async def subscribed(uri: AnyUrl) -> None:
         await subscriptions.begin(server.request_context.session, uri)
@@ -373,6 +339,6 @@ def _gist(told: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def _answer(told: dict[str, Any], *, wrong: bool = False) -> types.CallToolResult:
-    text = json.dumps(told, ensure_ascii=True)
+    told, text = writable(told)
     content: list[types.ContentBlock] = [types.TextContent(type="text", text=text)]
     return types.CallToolResult(content=content, structuredContent=told, isError=wrong)

@@ -111,13 +111,14 @@ class Telemetry:
         values: list[tuple[int, int | None]] = []
         instance = _instance(message)
         told: list[tuple[str, Where]] = []
+        charges: list[tuple[int, int | None]] = []
         for fields, slots, read, selected in carried:
             if selected and not _is_selected(selected, message):
                 continue
             if name == BATTERY and _is_charge(fields, selected):
                 if component == AUTOPILOT:
                     told.append((name, selected))
-                    values += self.batteries.take(message, read(message), now_us)
+                    charges += read(message)
                 continue
             if instance is not None and not self._is_first(name, instance, component, selected):
                 continue
@@ -126,6 +127,8 @@ class Telemetry:
                 values += [(slot, None) for slot in slots]
             else:
                 values += read(message)
+        if charges:
+            values += self.batteries.take(message, charges, now_us)
         if component == AUTOPILOT:
             if not self._told.issuperset(told):
                 self._told.update(told)
@@ -172,10 +175,11 @@ _AMONG: Final = 3
 
 @dataclass(slots=True)
 class _Charge:
-    """Of one battery: its charge, when it was told, and how many reports of others came since."""
+    """Of one battery: what it told last, by slot, when, whether it counts, and how many reports of others came since."""
 
-    value: int | None
+    values: Mapping[int, int | None]
     at_us: int
+    counts: bool
     since: int = 0
 
 
@@ -183,13 +187,15 @@ class Batteries:
     """The batteries that a vehicle flies by, of which the one with the least charge counts.
 
     Those are all but what is said to feed avionics or a payload; ArduPilot says of no battery what it feeds, so there
-    all count. One of them that does not know its charge, or is silent for as long as makes it stale, makes it unknown.
+    all count. A battery counts from its second report on, if it was not silent between the two: a single report with
+    another number is odd, or somebody else's. One that counts and does not know its charge, or is silent for as long
+    as makes it stale, makes the charge unknown.
     """
 
     def __init__(self, stale_us: int) -> None:
         self._stale_us = stale_us
-        self._charges: dict[int, dict[int, _Charge]] = {}  # by slot and number
-        #: of each battery that was reported: what it feeds (MAV_BATTERY_FUNCTION), and its charge in %
+        self._charges: dict[tuple[int, bool], _Charge] = {}  # by number, and whether it feeds motors
+        #: of each battery that was reported twice: what it feeds (MAV_BATTERY_FUNCTION), and its charge in %
         self.told: dict[int, tuple[int, int]] = {}
         #: what an operator should know, to be taken
         self.notes: list[str] = []
@@ -204,26 +210,31 @@ class Batteries:
     ) -> Sequence[tuple[int, int | None]]:
         """One BATTERY_STATUS and what it says by itself; the readings that count."""
         number, function = message.id, message.battery_function
+        flies, charges = self.flies(function), self._charges
+        before = charges.get((number, flies))
+        counts = before is not None and (before.counts or not self._is_silent(before, now_us))
+        charges[number, flies] = _Charge(dict(readings), now_us, counts)
+        if counts:
+            self._tell(number, function, message.battery_remaining)
+        if not flies:
+            return ()
+        for other, each in charges.items():
+            each.since += other != (number, flies)
+        if not counts:
+            return ()
+        counted = [each for (_, flying), each in charges.items() if flying and each.counts]
+        if any(self._is_silent(each, now_us) for each in counted):
+            return [(slot, None) for slot, _ in readings]
+        return [(slot, _least([each.values[slot] for each in counted])) for slot, _ in readings]
+
+    def _is_silent(self, battery: _Charge, now_us: int) -> bool:
+        return now_us - battery.at_us > self._stale_us and battery.since >= _AMONG
+
+    def _tell(self, number: int, function: int, remaining: int) -> None:
         new = number not in self.told
-        self.told[number] = function, message.battery_remaining
+        self.told[number] = function, remaining
         if new and len(self.told) > 1:
             self.notes.append(f"it has {len(self.told)} batteries: {self.summary}")
-        if not self.flies(function):
-            return ()
-        return [
-            (slot, self._worst(self._charges.setdefault(slot, {}), number, value, now_us)) for slot, value in readings
-        ]
-
-    def _worst(self, charges: dict[int, "_Charge"], number: int, value: int | None, now_us: int) -> int | None:
-        for other in charges.values():
-            other.since += 1
-        charges[number] = _Charge(value, now_us)
-        known = [
-            each.value
-            for each in charges.values()
-            if each.value is not None and (now_us - each.at_us <= self._stale_us or each.since < _AMONG)
-        ]
-        return min(known) if len(known) == len(charges) else None
 
     @property
     def summary(self) -> str:
@@ -236,6 +247,12 @@ class Batteries:
         ]  # fmt: skip
         counts = ", and the one with the least charge counts" if len(flying) > 1 else ""
         return ", ".join(words) + counts
+
+
+def _least(values: Sequence[int | None]) -> int | None:
+    """The least of several charges; None where one is not known."""
+    known = [value for value in values if value is not None]
+    return min(known) if len(known) == len(values) else None
 
 
 _FEEDS: Final = {MAV_BATTERY_FUNCTION_AVIONICS: "avionics", MAV_BATTERY_FUNCTION_PAYLOAD: "payload"}

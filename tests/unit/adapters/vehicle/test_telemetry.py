@@ -1,9 +1,12 @@
 """Telemetry becomes integers in canonical units, or "not known", never anything else."""
 
+from itertools import pairwise
 from math import inf, nan
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -53,7 +56,9 @@ def wind(north: float, east: float) -> Any:
     (mavlink.MAVLink_ping_message(0, 0, 0, 0), {}),
 ])  # fmt: skip
 def test_reads_what_the_policy_declares(message: Any, values: dict[int, int | None]) -> None:
-    read = dict(Telemetry(POLICY).read(message.get_type(), message))
+    telemetry = Telemetry(POLICY)
+    telemetry.read(message.get_type(), message)  # a battery counts from its second report on
+    read = dict(telemetry.read(message.get_type(), message))
     assert {slot: value and round(value, -1) for slot, value in read.items()} == {
         slot: value and round(value, -1) for slot, value in values.items()
     }
@@ -116,15 +121,21 @@ def one_of(number: int, percent: int, function: int = 0) -> Any:
     return mavlink.MAVLink_battery_status_message(number, function, 0, 0, [0] * 10, 0, 0, 0, percent)
 
 
+def charge(telemetry: Telemetry, number: int, percent: int, function: int = 0, at_us: int = 0) -> Any:
+    """What one report of a battery makes of the charge; () where it says nothing of it."""
+    return telemetry.read("BATTERY_STATUS", one_of(number, percent, function), now_us=at_us)
+
+
 def test_of_several_flight_batteries_the_one_with_the_least_charge_counts() -> None:
     for function in (mavlink.MAV_BATTERY_FUNCTION_UNKNOWN, mavlink.MAV_BATTERY_FUNCTION_ALL,
                      mavlink.MAV_BATTERY_FUNCTION_PROPULSION):  # fmt: skip
         telemetry = Telemetry(POLICY)
-        assert telemetry.read("BATTERY_STATUS", one_of(0, 80, function)) == ((BATTERY, 8_000),)
-        assert telemetry.read("BATTERY_STATUS", one_of(1, 20, function)) == ((BATTERY, 2_000),)
-        assert telemetry.read("BATTERY_STATUS", one_of(0, 79, function)) == ((BATTERY, 2_000),)
-        assert telemetry.read("BATTERY_STATUS", one_of(1, -1, function)) == ((BATTERY, None),)
-        assert telemetry.read("BATTERY_STATUS", one_of(0, 79, function)) == ((BATTERY, None),)
+        assert charge(telemetry, 0, 81, function) == charge(telemetry, 1, 21, function) == ()
+        assert charge(telemetry, 0, 80, function) == ((BATTERY, 8_000),)
+        assert charge(telemetry, 1, 20, function) == ((BATTERY, 2_000),)
+        assert charge(telemetry, 0, 79, function) == ((BATTERY, 2_000),)
+        assert charge(telemetry, 1, -1, function) == ((BATTERY, None),)
+        assert charge(telemetry, 0, 79, function) == ((BATTERY, None),)
         assert telemetry.batteries.notes == [
             "it has 2 batteries: 0 with 80 %, 1 with 20 %, and the one with the least charge counts"
         ]
@@ -132,28 +143,76 @@ def test_of_several_flight_batteries_the_one_with_the_least_charge_counts() -> N
 
 def test_a_battery_that_feeds_no_motor_does_not_count() -> None:
     telemetry = Telemetry(POLICY)
-    assert telemetry.read("BATTERY_STATUS", one_of(0, 5, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD)) == ()
-    assert telemetry.read("BATTERY_STATUS", one_of(1, 80, 1)) == ((BATTERY, 8_000),)
-    assert telemetry.read("BATTERY_STATUS", one_of(2, -1, mavlink.MAV_BATTERY_FUNCTION_AVIONICS)) == ()
+    for _ in range(2):
+        assert charge(telemetry, 0, 5, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD) == ()
+        flying = charge(telemetry, 1, 80, 1)
+        assert charge(telemetry, 2, -1, mavlink.MAV_BATTERY_FUNCTION_AVIONICS) == ()
+    assert flying == ((BATTERY, 8_000),)
     assert telemetry.batteries.summary == (
         "0 with 5 % (payload, which does not count), 1 with 80 %, 2 with an unknown charge (avionics, which does not "
         "count)"
     )
 
 
+STALE_US = next(each.stale_us for each in POLICY.signals if each.slot == BATTERY)
+
+
 def test_a_flight_battery_that_falls_silent_makes_the_charge_unknown() -> None:
     telemetry = Telemetry(POLICY)
-    stale_us = next(each.stale_us for each in POLICY.signals if each.slot == BATTERY)
+    for _ in range(2):
+        charge(telemetry, 0, 80)
+        charge(telemetry, 1, 70)
+    for _ in range(2):
+        assert charge(telemetry, 0, 79, at_us=STALE_US + 1) == ((BATTERY, 7_000),), "the other may still come"
+    assert charge(telemetry, 0, 79, at_us=STALE_US + 1) == ((BATTERY, None),)
+    assert charge(telemetry, 1, 60, at_us=STALE_US + 1) == ((BATTERY, 6_000),)
 
-    def read(number: int, percent: int, at_us: int) -> Any:
-        return telemetry.read("BATTERY_STATUS", one_of(number, percent), now_us=at_us)
 
-    read(0, 80, 0)
-    read(1, 70, 0)
-    later = stale_us + 1
-    assert read(0, 79, later) == read(0, 79, later) == ((BATTERY, 7_000),), "after a silence the other may still come"
-    assert read(0, 79, later) == ((BATTERY, None),)
-    assert read(1, 60, later) == ((BATTERY, 6_000),)
+@pytest.mark.parametrize("function", [mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD])
+def test_one_report_of_a_battery_with_a_new_number_counts_for_nothing(function: int) -> None:
+    """Somebody else's frame on a link without a key, or an odd one of the vehicle's; also of one that says that the
+    battery feeds no motor. Such a frame now and then is no battery either.
+    """
+    telemetry = Telemetry(POLICY)
+    charge(telemetry, 0, 80)
+    for second in range(1, 120):
+        if second % 20 == 5:
+            assert charge(telemetry, 7, 1, function, second * S) == ()
+            assert charge(telemetry, 0, 1, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD, second * S) == ()
+        assert charge(telemetry, 0, 80, 1, second * S) == ((BATTERY, 8_000),)
+    assert telemetry.batteries.notes == []
+
+
+def naive(reports: list[tuple[int, int, int | None]]) -> Any:
+    """What the last of these reports (when, battery, charge) says, by all of them: None where it says nothing."""
+
+    def silent(battery: int, heard: int, until: int) -> bool:
+        """Whether a battery whose report is the one at `heard` is silent when that at `until` comes."""
+        others = [each for each in reports[heard + 1 : until + 1] if each[1] != battery]
+        return len(others) >= 3 and reports[until][0] - reports[heard][0] > STALE_US
+
+    def counts(battery: int) -> bool:
+        own = [index for index, each in enumerate(reports) if each[1] == battery]
+        return any(not silent(battery, *pair) for pair in pairwise(own))
+
+    if not counts(reports[-1][1]):
+        return ()
+    last = {battery: index for index, (_, battery, _) in enumerate(reports) if counts(battery)}
+    charges = [reports[index][2] for index in last.values()]
+    if None in charges or any(silent(battery, index, len(reports) - 1) for battery, index in last.items()):
+        return ((BATTERY, None),)
+    return ((BATTERY, min(each * 100 for each in charges if each is not None)),)
+
+
+@given(st.lists(st.tuples(
+    st.sampled_from([0, S, 2 * S, STALE_US, STALE_US + 1]), st.integers(0, 3), st.sampled_from([None, 20, 50, 90]),
+), max_size=16))  # fmt: skip
+def test_the_charge_is_that_of_the_batteries_that_count(steps: list[tuple[int, int, int | None]]) -> None:
+    telemetry, reports, at_us = Telemetry(POLICY), list[tuple[int, int, int | None]](), 0
+    for later_us, number, percent in steps:
+        at_us += later_us
+        reports.append((at_us, number, percent))
+        assert charge(telemetry, number, -1 if percent is None else percent, at_us=at_us) == naive(reports)
 
 
 def test_a_signal_may_name_one_battery() -> None:
@@ -199,7 +258,9 @@ def test_a_source_that_is_no_number_is_refused_before_anything_flies(source: str
 def test_what_is_no_number_is_not_known() -> None:
     message = battery(50)
     message.battery_remaining = "50"
-    assert Telemetry(POLICY).read("BATTERY_STATUS", message) == ((BATTERY, None),)
+    telemetry = Telemetry(POLICY)
+    telemetry.read("BATTERY_STATUS", message)
+    assert telemetry.read("BATTERY_STATUS", message) == ((BATTERY, None),)
 
 
 def gps(fix: int, at_us: int) -> Any:

@@ -16,6 +16,7 @@ from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop, append_all
 from rtshcua.adapters.preparation import Preparations
 from rtshcua.adapters.utc import CLOCK, UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.drain import drained
 from rtshcua.cli.agents import Agents
 from rtshcua.cli.attesting import BoundarySession
 from rtshcua.cli.closing import close_log, keep_summary
@@ -390,6 +391,8 @@ class Flight:
         loaded, policy, mission = self._loaded, self._loaded.bundle.policy, self._loaded.bundle.mission
         flavour = self._vehicle.driver.flavour
         log = _short(self._run.path / LOG)
+        used = self._vehicle.driver.consumption
+        for_a_km, km_declared = used.for_a_km
         return Summary(
             mission=mission.name,
             policy=f"{policy.name}@{policy.version}",
@@ -408,6 +411,11 @@ class Flight:
             gaps_us=gaps_us,
             unconfirmed=tuple(self._teller.unconfirmed),
             may_fly=self._may_fly,
+            battery=used.summary,
+            drain_declared=drained(policy.vehicle),
+            drain_measured=used.in_a_minute,
+            km_declared=km_declared if for_a_km else 0,
+            km_measured=for_a_km,
             folder=str(self._run.path),
             log=log,
             next=f"rtshcua verify-log {'--audit ' if self._loaded.boundary.lost else ''}{shlex.quote(log)}",

@@ -1,10 +1,13 @@
 """A battery that is emptied much faster than its policy says: what is left on landing, by what really was."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from rtshcua.evidence.report import Verdict
+from rtshcua.simulation.config import OtherBattery, Purpose
+from rtshcua.simulation.surroundings import Wind
 from virtual import case
 from virtual.flight import Flight, Flown
 from virtual.shipped import sealed, simulated
@@ -57,10 +60,10 @@ RESERVE = 1_500
 FAST_US = 60 * 10_000 * case.S // 1_760
 
 
-def flown(folder: Path, flavour: str, without: str, hover_us: int) -> Flown:
+def flown(folder: Path, flavour: str, without: str, hover_us: int, *, battery: int = 10_000, **fields: Any) -> Flown:
     source = folder / f"{flavour}.rts"
     source.write_text(SOURCE.replace("WITHOUT", without), encoding="utf-8")
-    found = Flight(sealed(source), simulated(flavour, battery=10_000, hover_us=hover_us)).fly()
+    found = Flight(sealed(source), simulated(flavour, battery=battery, hover_us=hover_us, **fields)).fly()
     assert found.audit().report.verdict is Verdict.VERIFIED, "its audit derives each decision from what is recorded"
     assert not found.vehicle.simulation.truth().in_air
     return found
@@ -84,3 +87,33 @@ def test_a_battery_that_is_as_declared_finishes_its_mission(tmp_path: Path) -> N
     found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S)
     assert found.ending.name == "COMPLETED"
     assert not any("counted with what was measured" in str(each) for each in found.records)
+
+
+def refused(of: Flown) -> Any:
+    """The first decision that does not let a step fly."""
+    return next(each for each in of.records if each["type"] == "decision" and each["outcome"] not in ("allow", "defer"))
+
+
+def test_more_wind_than_declared_is_measured_by_distance_and_brings_it_home(tmp_path: Path) -> None:
+    """In 15 m/s it gets on at a third of its speed: a minute takes half as much again, a metre three times as much."""
+    found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S, battery=6_000, wind=Wind(15_000, 0, 0))
+    assert found.ending.name == "ABORTED"
+    notes = [each["detail"] for each in found.records if each.get("event") == "noted"]
+    assert any("of its charge for a km over ground" in each for each in notes)
+    assert (refused(found)["step"], refused(found)["reason"]) == (2, "safety/energy"), "the first wait"
+    minute, km = found.vehicle.driver.consumption.summary
+    assert ("a minute declared" in minute, "a km declared" in km) == (True, True)
+
+
+def test_a_second_battery_that_runs_low_brings_it_home_while_the_first_is_full(tmp_path: Path) -> None:
+    """Of two that feed the motors the one with less counts; it is not the one with the lower number."""
+    second = OtherBattery(Purpose.FLIGHT, 4_200)
+    found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S, other_batteries=(second,))
+    assert found.ending.name == "ABORTED"
+    assert found.vehicle.simulation.truth().battery > 9_000, "the first is as good as full"
+    assert (refused(found)["step"], refused(found)["reason"]) == (2, "safety/energy")
+    told, begun = (
+        next(number for number, each in enumerate(found.records) if each.get("event") == event and said in str(each))
+        for event, said in (("noted", "0 with 99 %, 1 with 41 %"), ("dispatched", "takeoff"))
+    )
+    assert told < begun, "nothing begins before it is known which of them counts"

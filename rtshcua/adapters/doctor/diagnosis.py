@@ -12,11 +12,11 @@ from rtshcua.adapters.doctor.settings import SETTINGS, Setting
 from rtshcua.adapters.qualification.identity import firmware_of, those_that_matter
 from rtshcua.adapters.qualification.standing import Standing
 from rtshcua.adapters.vehicle.bounds import Reach, reach_of
+from rtshcua.adapters.vehicle.drain import drained
 from rtshcua.adapters.vehicle.preflight import SAME_MM
 from rtshcua.adapters.vehicle.returns import ONLY_ZERO, Need
 from rtshcua.adapters.vehicle.source_time import VehicleClock
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
-from rtshcua.adapters.vehicle.telemetry import drained
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_TYPE_GCS as GROUND_STATION
 from rtshcua.mavlink.modes import is_another
@@ -471,6 +471,8 @@ def _signal(
     interval_us, stale_ms = told.interval_us, signal.stale_us // 1_000
     every = "came once" if interval_us is None else f"every {interval_us // 1_000} ms"
     found = f"`{signal.name}`: {heard} {every}, stale after {stale_ms} ms"
+    if signal.name == DRAIN:
+        found = "; ".join((found, *vehicle.consumption.summary))
     seldom = interval_us is None or interval_us * _TIMES > signal.stale_us
     return _graded(slug, found, f"twice within {stale_ms} ms", _ADVICE, warns=seldom)
 

@@ -18,7 +18,7 @@ from rtshcua.model.flat.policy import Policy, Vehicle
 class Setting(NamedTuple):
     """A parameter, what it is about, its values in words, and why some of them are worth a warning.
 
-    `better` is a value to set in place of those. For a number, `mm` is how many mm, or mm/s, one of it is, and `needs`
+    `better` is a value to set in place of those. For a number, `mm` is how many mm, mm/s or ms one is, and `needs`
     what a policy and the reach of a mission need of it; None where nothing does. Where it is 0, `otherwise` names the
     parameter that counts in its place. `limit` is the rule of a choice that a run refuses where it is not 0.
     """
@@ -39,7 +39,7 @@ class Setting(NamedTuple):
         """Of its number, for a person."""
         if not self.mm or "slope" in self.about:
             return ""
-        return " m/s" if "speed" in self.about else " m"
+        return " s" if "empty" in self.about else " m/s" if "speed" in self.about else " m"
 
 
 def _speed(policy: Policy, _: Reach) -> Need | None:
@@ -100,6 +100,12 @@ def _gains(slows: int) -> Callable[[Policy, Reach], Need | None]:
 def _returns(policy: Policy, _: Reach) -> Need | None:
     height = policy.vehicle.return_altitude
     return Need(height, height) if height else None
+
+
+def _lasts(policy: Policy, _: Reach) -> Need | None:
+    """For how long a full battery flies, ms."""
+    vehicle = policy.vehicle
+    return Need(-(-(vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us) // 1_000))
 
 
 def _of(needs: Callable[[Vehicle], Need | None]) -> Callable[[Policy, Reach], Need | None]:
@@ -175,6 +181,9 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
             {6: _MOTORS_OFF},
         ),
         Setting("COM_DISARM_PRFLT", "seconds until it disarms on the ground", {}, {}),
+        Setting(  # PX4's simulators alone have it (docs.px4.io/v1.16/en/simulation/failsafes): 60 as it is delivered
+            "SIM_BAT_DRAIN", "in its simulation a full battery is empty after (0: never)", mm=1_000, needs=_lasts,
+        ),
     ),
     "ardupilot": (
         Setting(

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages, observed, others, preflight
+from rtshcua.adapters.vehicle.drain import Consumption
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
 from rtshcua.adapters.vehicle.link import SILENT, UNANSWERED, Heard, LinkWatch, VehicleLink, is_radio, two_speak
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendings
@@ -171,6 +172,11 @@ class Driver:
     def batteries(self) -> Batteries:
         """The batteries that it told of."""
         return self._telemetry.batteries
+
+    @property
+    def consumption(self) -> Consumption:
+        """What flying takes of the charge, as measured."""
+        return self._telemetry.consumption
 
     def expect(self, steps: Sequence[Invocation]) -> None:
         """These are the mission's steps from now on: what they need more often is asked for anew."""
@@ -342,6 +348,7 @@ class Driver:
             return [ports.Failed(now_us, command.token, slug, str(error))], []
         self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before, doubted)
         self._left_mode = None  # it goes on as a suspicion of the manoeuvre
+        self.consumption.fly(command.speed)
         self._unsent = command.token
         events: list[Event] = []
         send: list[Message] = []

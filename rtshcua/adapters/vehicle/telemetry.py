@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final, NamedTuple, TypeAlias
 
-from rtshcua.adapters.vehicle.drain import DrainMeter
-from rtshcua.decision.flying import MINUTE
+from rtshcua.adapters.vehicle.drain import Consumption
 from rtshcua.decision.rates import Rate, rates
 from rtshcua.decision.tree import where
 from rtshcua.mavlink import dialect
@@ -14,8 +13,8 @@ from rtshcua.mavlink.enums import MAV_BATTERY_FUNCTION_AVIONICS, MAV_BATTERY_FUN
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.contract import Contract
-from rtshcua.model.flat.limits import FULL, MAX_VALUE
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import DRAIN, NUMBER, POSITION, Signal, SignalSource
 from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, Projection, project
 
@@ -47,7 +46,7 @@ class Telemetry:
     """
 
     def __init__(self, policy: Policy, contracts: Sequence[Contract] = ()) -> None:
-        vehicle = policy.vehicle
+        self._vehicle = vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
         self._told: set[tuple[str, Where]] = set()  # what came of the autopilot: of each, always the same slots
         self._first: dict[tuple[int, str, Where], Any] = {}
@@ -56,12 +55,14 @@ class Telemetry:
         self.batteries = Batteries(_battery_stale_us(policy))
         measured = next((each for each in policy.signals if each.name == DRAIN and each.kind == NUMBER), None)
         self._drain = -1 if measured is None else measured.slot
-        self._drain_from = frozenset(() if measured is None else (source.message for source in measured.sources))
-        self._meter = DrainMeter()
-        self._declared = drained(vehicle)
-        self._drain_told = self._declared
+        #: what flying takes of the charge, as measured
+        self.consumption = Consumption(vehicle)
+        self._height: int | None = None
+        slots = () if measured is None else (measured.slot, vehicle.position, vehicle.height)
+        self._measured = _carry(policy, *slots)
         #: what an operator should know, to be taken
         self.notes: list[str] = self.batteries.notes
+        self.consumption.notes = self.notes
         #: of these the autopilot's own carry all that such a message may carry, each time; where there are several
         #: instances, those of this one
         self._whole: dict[str, int | None] = {}
@@ -89,13 +90,17 @@ class Telemetry:
         here: see `source_time`.
         """
         values = self._read(name, message, component, doubtful, now_us)
-        if name not in self._drain_from:
-            return values
-        meter = self._meter
-        return tuple(
-            (slot, self._tell_drain(meter.take(value, now_us)) if slot == self._drain else value)
-            for slot, value in values
-        )
+        return self._measure(values, now_us) if name in self._measured else values
+
+    def _measure(self, values: tuple[tuple[int, int | None], ...], now_us: int) -> tuple[tuple[int, int | None], ...]:
+        """The same, with what flying takes of the charge in the slot of `battery.drain`."""
+        known, vehicle = dict(values), self._vehicle
+        self._height = known.get(vehicle.height, self._height)
+        if vehicle.position in known:
+            self.consumption.move(known[vehicle.position], known[vehicle.position + 1], self._height, now_us)
+        if self._drain in known:
+            known[self._drain] = self.consumption.take(known[self._drain], now_us)
+        return tuple(known.items())
 
     def _read(
         self, name: str, message: Any, component: int, doubtful: frozenset[str], now_us: int
@@ -138,15 +143,6 @@ class Telemetry:
             return tuple(values)
         return tuple((slot, value) for slot, value in values if slot not in self._own)
 
-    def _tell_drain(self, drain: int | None) -> int | None:
-        if drain is not None and drain * 10 > self._drain_told * 11:
-            self._drain_told = drain
-            self.notes.append(
-                f"the battery gives {_percent(drain)} of its charge a minute, and the policy's vehicle says "
-                f"{_percent(self._declared)} at the worst: the way home is counted with what was measured"
-            )
-        return drain
-
     def _is_first(self, name: str, instance: int, component: int, where: Where) -> bool:
         """Whether this is the lowest instance that the component was heard to have of a selected sensor."""
         key = component, name, where
@@ -154,15 +150,14 @@ class Telemetry:
         return bool(instance == first)
 
 
-def drained(vehicle: Vehicle) -> int:
-    """What the vehicle of a policy takes of a full charge in a minute, as declared at the worst, 1/10000, rounded."""
-    flight_us = vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us
-    return (MINUTE * FULL + flight_us // 2) // flight_us
-
-
-def _percent(part: int) -> str:
-    """A part of a full charge, 1/10000, in words."""
-    return f"{part / 100:.1f} %"
+def _carry(policy: Policy, *slots: int) -> frozenset[str]:
+    """The messages that carry one of these slots."""
+    return frozenset(
+        source.message
+        for signal in policy.signals
+        if not set(signal.slots).isdisjoint(slots)
+        for source in signal.sources
+    )
 
 
 #: the message that tells of each battery, and by which field what it holds
@@ -175,7 +170,7 @@ _AMONG: Final = 3
 
 @dataclass(slots=True)
 class _Charge:
-    """Of one battery: what it told last, by slot, when, whether it counts, and how many reports of others came since."""
+    """Of one battery: what it told last, by slot, when, whether it counts, how many reports of others came since."""
 
     values: Mapping[int, int | None]
     at_us: int
@@ -188,13 +183,15 @@ class Batteries:
 
     Those are all but what is said to feed avionics or a payload; ArduPilot says of no battery what it feeds, so there
     all count. A battery counts from its second report on, if it was not silent between the two: a single report with
-    another number is odd, or somebody else's. One that counts and does not know its charge, or is silent for as long
+    another number is odd, or somebody else's. Nothing is told before it is known of all that were heard whether they
+    count. One that counts and does not know its charge, or is silent for as long
     as makes it stale, makes the charge unknown.
     """
 
     def __init__(self, stale_us: int) -> None:
         self._stale_us = stale_us
         self._charges: dict[tuple[int, bool], _Charge] = {}  # by number, and whether it feeds motors
+        self._known = False
         #: of each battery that was reported twice: what it feeds (MAV_BATTERY_FUNCTION), and its charge in %
         self.told: dict[int, tuple[int, int]] = {}
         #: what an operator should know, to be taken
@@ -220,12 +217,19 @@ class Batteries:
             return ()
         for other, each in charges.items():
             each.since += other != (number, flies)
-        if not counts:
+        if not counts or not self._are_known(now_us):
             return ()
         counted = [each for (_, flying), each in charges.items() if flying and each.counts]
         if any(self._is_silent(each, now_us) for each in counted):
             return [(slot, None) for slot, _ in readings]
         return [(slot, _least([each.values[slot] for each in counted])) for slot, _ in readings]
+
+    def _are_known(self, now_us: int) -> bool:
+        """Whether each battery that was heard counts, or was heard once and no more; once so, that is what is known."""
+        if not self._known:
+            heard = (each for (_, flying), each in self._charges.items() if flying)
+            self._known = all(each.counts or self._is_silent(each, now_us) for each in heard)
+        return self._known
 
     def _is_silent(self, battery: _Charge, now_us: int) -> bool:
         return now_us - battery.at_us > self._stale_us and battery.since >= _AMONG

@@ -120,6 +120,7 @@ def _ending(summary: Summary) -> Iterable[str]:
     yield from (f"  unseen   {what}: {UNCONFIRMED}" for what in summary.unconfirmed)
     if summary.may_fly:
         yield f"  vehicle  {summary.may_fly}"
+    yield from (f"  battery  {what}" for what in summary.battery)
     yield f"  log      {summary.log} ({many(summary.records, 'record')}, {whole})"
     yield from (f"  missing  {what}" for what in summary.missing)
     yield f"  next     {summary.next}"

@@ -104,6 +104,8 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     `whole`: all evidence is on the disk, and the log was read back and verifies; else `missing` says what does not.
     `gaps_us`: for how long the log has nothing, for the computer stood still. `unconfirmed`: the fallbacks that were
     sent, and ended without a landing being seen. `may_fly`: that the vehicle may be flying, and why nothing watches it.
+    `drain_declared`, `drain_measured`: what a minute takes of the charge at the worst, 1/10000, and `km_declared`,
+    `km_measured` what a km over ground takes; 0 measured: it was not. `battery` says it in words.
     """
 
     mission: str
@@ -126,6 +128,11 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     gaps_us: int = 0
     unconfirmed: tuple[str, ...] = ()
     may_fly: str = ""
+    battery: tuple[str, ...] = ()
+    drain_declared: int = 0
+    drain_measured: int = 0
+    km_declared: int = 0
+    km_measured: int = 0
 
 
 Message = Plan | Snapshot | Happened | Note | Summary

@@ -9,8 +9,17 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
+from rtshcua.adapters.doctor.diagnosis import (
+    MissionVerdict,
+    VehicleFinding,
+    diagnose,
+    settings_told,
+    settled,
+    settling,
+    told_apart,
+)
 from rtshcua.adapters.doctor.examination import ExaminingDriver
+from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.mavlink.signing import SignedLink, State
@@ -326,6 +335,16 @@ def test_what_settles_by_itself_is_named_until_it_has() -> None:
     assert seen[-1] is None
     assert settled("a 3D fix", 12, None).found == "it had to settle: 12 s were waited for a 3D fix"
     assert settled("a 3D fix", 60, "a 3D fix").verdict is MissionVerdict.WARN
+
+
+@rows(("seconds", "needed"), [(60.0, "at least 1080 s"), (1_079.0, "at least 1080 s"), (1_080.0, ""), (0.0, "")])
+def test_a_simulation_of_px4_that_empties_its_battery_faster_than_declared_is_told(seconds: float, needed: str) -> None:
+    """As it is delivered in a minute (`SIM_BAT_DRAIN`): each flight there would turn home soon."""
+    (found,) = settings_told("px4", {"SIM_BAT_DRAIN": seconds}, case.policy(), Reach())
+    assert (found.slug, found.needed) == ("settings/sim_bat_drain", needed)
+    assert found.verdict is (MissionVerdict.WARN if needed else MissionVerdict.OK)
+    if needed:
+        assert found.advice == "set `SIM_BAT_DRAIN` to 1080"
 
 
 def test_of_several_batteries_it_says_the_one_that_a_run_would_use() -> None:

@@ -185,6 +185,13 @@ def test_a_fallback_of_which_no_landing_was_seen_is_in_the_summary_of_run_and_au
     assert "not confirmed" not in capsys.readouterr().out, "without an audit no record is read"
 
 
+def test_the_summary_says_what_the_battery_gave_beside_what_is_declared() -> None:
+    told = "6.3 % a minute declared, 17.6 % measured", "100.0 % a km declared, 100.0 % measured"
+    lines = list(ending(Summary(**SUMMARY | {"battery": told})))
+    assert [line for line in lines if "measured" in line] == [f"  battery  {each}" for each in told]
+    assert not any("battery" in line for line in ending(Summary(**SUMMARY)))
+
+
 SUMMARY: dict[str, Any] = {
     **dict.fromkeys(("mission", "policy", "vehicle", "flavour", "mode", "ending", "folder", "log", "next"), ""),
     **dict.fromkeys(("exit_code", "steps", "steps_done", "flight_us", "records"), 0),

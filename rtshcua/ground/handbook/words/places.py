@@ -3,9 +3,12 @@
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
+from rtshcua.decision.flying import MINUTE
 from rtshcua.ground.checker import time_zones
+from rtshcua.ground.compiler.speeds import speeds_of
 from rtshcua.ground.handbook.words.values import coordinates, on_days, quantity, time_of_day, whole_day
 from rtshcua.ground.handbook.words.vocabulary import listed, name, named
+from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import (
     Circle,
@@ -122,6 +125,8 @@ def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     yield "Position error", f"at most {quantity(vehicle.position_error)}; every planned path is widened by this"
     flight = "" if vehicle.flight is None else f", {quantity(vehicle.flight)} of flight at the worst"
     yield "Full charge", f"{quantity(vehicle.endurance)} of hovering{flight}"
+    minute = display(-(-MINUTE * FULL // speeds_of(vehicle).flight_us), Dimension.RATIO)
+    yield "Drain", f"at most {minute} of it a minute, as declared; more counts where it is measured (`battery.drain`)"
     yield "Reserve", f"{quantity(vehicle.reserve)} of a full charge must be left after landing at home"
     if vehicle.cells is not None:
         yield "Battery", f"{vehicle.cells.value} cells in series"

@@ -3,14 +3,28 @@
 from random import Random
 from typing import Any
 
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.vehicle.drain import LEAST_CHANGES, WINDOW_US, DrainMeter
-from rtshcua.adapters.vehicle.telemetry import Telemetry, drained
-from rtshcua.decision.flying import MINUTE, MOST_DRAIN
+from reference import flat_case
+from rtshcua.adapters.vehicle.drain import (
+    LEAST_CHANGES,
+    WINDOW_US,
+    Consumption,
+    DrainMeter,
+    PaceMeter,
+    drained,
+    for_a_km,
+)
+from rtshcua.adapters.vehicle.telemetry import Telemetry
+from rtshcua.decision.contracts import Energy
+from rtshcua.decision.flying import MINUTE, MOST_DRAIN, over_ground
+from rtshcua.model.flat.policy import Speeds
 from rtshcua.model.flat.signal import DRAIN, NUMBER, Signal, SignalSource
-from virtual.policy import BATTERY, POLICY
+from virtual.policy import BATTERY, POLICY, PROJECTION
 
 S = 1_000_000
 
@@ -50,6 +64,37 @@ def test_a_drain_that_ends_is_believed_to_have_ended() -> None:
     assert found[-1] is None, "what is older than the window counts no more"
 
 
+@given(st.integers(20, 190), st.integers(0, 99), st.sampled_from([100, 200, 500]))
+def test_a_slow_drain_is_measured_once_the_charge_changed_often_enough(rate: int, start: int, step: int) -> None:
+    """From 0.2 % a minute on, in whatever steps it is told: within a tenth of it at the end, and known from then on."""
+    meter, known = DrainMeter(), 0
+    each_s = step * 60 // rate + 1
+    for second in range(0, 8 * each_s, max(1, each_s // 40)):
+        left = 10_000 - start - rate * second // 60
+        found = meter.take(left // step * step, second * S)
+        known += found is not None
+        assert found is not None or not known, "and stays known"
+        assert found is None or found <= rate * 11 // 10 + 1
+    assert found is not None
+    assert abs(found - rate) * 10 <= rate + 10, (rate, found)
+
+
+@given(st.integers(1, 12), st.integers(3, 20))
+def test_what_was_taken_and_one_step_more_bounds_a_drain_that_ends(changes_s: int, count: int) -> None:
+    meter = DrainMeter()
+    for number in range(count + 1):
+        meter.take(10_000 - 100 * number, number * changes_s * S)
+    ended, left = count * changes_s, 10_000 - 100 * count
+    for later in range(1, 61):
+        found = meter.take(left, (ended + later) * S)
+        in_window = [n * changes_s for n in range(1, count + 1) if ended + later - n * changes_s <= 60]
+        first = min([*in_window, (count - 2) * changes_s])
+        steps = (ended - first) // changes_s + 1
+        assert found is not None
+        assert found <= -(-100 * steps * 60 // (ended + later - first))
+    assert meter.take(left, (ended + 61) * S) is None
+
+
 def test_a_fall_at_once_is_a_finding_and_no_drain() -> None:
     meter = DrainMeter()
     measured(1_000, 50, meter=meter)
@@ -82,6 +127,94 @@ def test_reports_that_come_late_or_together_make_no_number_too_great() -> None:
     assert LEAST_CHANGES * S < WINDOW_US
 
 
+def legs(meter: PaceMeter, *speeds: int, seconds: int = 60, climb: int = 0) -> tuple[int, int]:
+    """What is known of flight at these speeds over ground (mm/s), one after the other, told ten times a second."""
+    x = at_us = 0
+    for speed in speeds:
+        for _ in range(seconds * 10):
+            meter.move(x, 0, climb * at_us // S, at_us)
+            x, at_us = x + speed // 10, at_us + S // 10
+    return meter.flown(0)
+
+
+def test_only_steady_level_flight_tells_how_it_gets_on() -> None:
+    time_us, way = legs(PaceMeter(), 0, 5_000, 0, 4_000)
+    assert 100 * S <= time_us <= 120 * S
+    assert 4_400 <= way * S // time_us <= 4_600
+    assert legs(PaceMeter(), 900) == (0, 1), "drifting is no leg"
+    assert legs(PaceMeter(), 5_000, climb=1_000) == (0, 1)
+    up_and_down = [1_000, 2_500, 4_000, 2_500] * 20
+    assert legs(PaceMeter(), *up_and_down, seconds=1) == (0, 1), "nor is setting off and arriving"
+    assert legs(PaceMeter(), 5_000, seconds=10) == (0, 1), "and that is too short"
+
+
+def test_a_place_that_is_not_known_or_too_old_begins_anew() -> None:
+    for lost in (None, 0):
+        meter = PaceMeter()
+        legs(meter, 5_000, seconds=20)
+        flown = meter.flown(0)
+        meter.move(lost, lost, lost, 40 * S)
+        meter.move(900_000, 0, 0, 41 * S)
+        meter.move(905_000, 0, 0, 42 * S)
+        meter.move(0, 0, 0, 30 * S)  # came late
+        assert meter.flown(0) == flown
+
+
+def flown_with(
+    policy: Any, speed: int, rate: int, *, seconds: int = 120, asked: int = 0
+) -> tuple[Consumption, int | None]:
+    """After a leg at a speed over ground of which a minute takes `rate`; the charge is told in whole percent."""
+    of, found = Consumption(policy.vehicle), None
+    of.fly(asked)
+    for second in range(seconds):
+        of.move(second * speed, 0, 20_000, second * S)
+        found = of.take((10_000 - rate * second // 60) // 100 * 100, second * S)
+    return of, found
+
+
+SPEEDS = Speeds(
+    cruise=8_000, flight_us=16 * 60 * S, air=10_000, wind=5_000, homeward=8_000, acceleration=2_000,
+    climb=2_000, descent=1_500, landing=500, landing_below=10_000,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("asked", "counted_at"), [(0, 5_000), (3_000, 3_000), (6_000, 5_000)])
+def test_a_vehicle_that_gets_on_slower_than_counted_takes_more_for_its_way_home(asked: int, counted_at: int) -> None:
+    """Against more wind than declared. What a minute takes is as declared; what a metre takes is not."""
+    policy = replace(POLICY, vehicle=replace(POLICY.vehicle, speeds=SPEEDS))
+    assert over_ground(SPEEDS, asked or SPEEDS.homeward) == counted_at
+    declared = drained(policy.vehicle)
+    of, found = flown_with(policy, counted_at, declared, asked=asked)
+    assert found is not None
+    assert found * 10 <= declared * 11, "as declared"
+    assert of.notes == []
+    assert Consumption(policy.vehicle).summary == ()
+    slow = counted_at * 2 // 5
+    of, found = flown_with(policy, slow, declared, asked=asked)
+    assert found is not None
+    assert abs(found * 2 - declared * 5) * 10 <= declared * 5
+    per_km = for_a_km(policy.vehicle, slow)
+    assert abs(of.for_a_km[0] - per_km) * 5 <= per_km
+    assert len(of.notes) == 1
+    assert "of its charge for a km over ground" in of.notes[0]
+    minute, km = of.summary
+    assert minute.startswith(f"{declared / 100:.1f} % a minute declared, ")
+    assert km.startswith(f"{for_a_km(policy.vehicle, counted_at) / 100:.1f} % a km declared, ")
+    assert km.endswith(f"{of.for_a_km[0] / 100:.1f} % measured")
+    assert all(len(line) <= 69 for line in of.summary)
+    energy = Energy(flat_case.CONTRACTS[flat_case.GOTO], policy.vehicle, asked)
+    for distance in (0, 100_000, 2_000_000):
+        assert energy.way_home(distance, (0, 0), found) >= distance * per_km * 9 // 10 // 1_000_000
+
+
+def test_a_vehicle_that_gets_on_faster_than_counted_takes_what_a_minute_does() -> None:
+    policy = replace(POLICY, vehicle=replace(POLICY.vehicle, speeds=SPEEDS))
+    of, found = flown_with(policy, 9_000, 1_760)
+    assert found is not None
+    assert abs(found - 1_760) * 10 <= 1_760
+    assert "of its charge a minute" in of.notes[-1]
+
+
 def drained_policy() -> Any:
     source = SignalSource("BATTERY_STATUS", ("battery_remaining",), 100, 1, (-1,))
     signal = Signal(DRAIN, POLICY.slots, NUMBER, "ratio", 5 * S, (), (source,))
@@ -100,3 +233,20 @@ def test_telemetry_tells_the_drain_beside_the_charge_and_says_when_it_is_more_th
     assert abs((values[slot] or 0) - 3 * declared) * 10 <= 3 * declared
     assert telemetry.notes
     assert "the way home is counted with what was measured" in telemetry.notes[-1]
+
+
+def test_telemetry_counts_the_way_over_ground_too() -> None:
+    policy = drained_policy()
+    vehicle = replace(policy.vehicle, speeds=SPEEDS)
+    telemetry, slot = Telemetry(replace(policy, vehicle=vehicle)), policy.slots - 1
+    declared, north = drained(vehicle), PROJECTION.latitude
+    for second in range(120):
+        where = mavlink.MAVLink_global_position_int_message(
+            0, north + second * 180, PROJECTION.longitude, 0, 20_000, 0, 0, 0, 0
+        )  # about 2 m/s where 5 m/s are declared
+        telemetry.read("GLOBAL_POSITION_INT", where, now_us=second * S)
+        left = 100 - second * declared // 6_000
+        message = mavlink.MAVLink_battery_status_message(0, 1, 1, 0, [0] * 10, 0, 0, 0, left)
+        values = dict(telemetry.read("BATTERY_STATUS", message, now_us=second * S + 10))
+    assert abs((values[slot] or 0) * 2 - 5 * declared) * 5 <= 5 * declared
+    assert "for a km over ground" in telemetry.notes[-1]

@@ -131,7 +131,7 @@ def test_of_several_flight_batteries_the_one_with_the_least_charge_counts() -> N
                      mavlink.MAV_BATTERY_FUNCTION_PROPULSION):  # fmt: skip
         telemetry = Telemetry(POLICY)
         assert charge(telemetry, 0, 81, function) == charge(telemetry, 1, 21, function) == ()
-        assert charge(telemetry, 0, 80, function) == ((BATTERY, 8_000),)
+        assert charge(telemetry, 0, 80, function) == (), "it is not known yet whether there is another"
         assert charge(telemetry, 1, 20, function) == ((BATTERY, 2_000),)
         assert charge(telemetry, 0, 79, function) == ((BATTERY, 2_000),)
         assert charge(telemetry, 1, -1, function) == ((BATTERY, None),)
@@ -183,8 +183,10 @@ def test_one_report_of_a_battery_with_a_new_number_counts_for_nothing(function: 
     assert telemetry.batteries.notes == []
 
 
-def naive(reports: list[tuple[int, int, int | None]]) -> Any:
-    """What the last of these reports (when, battery, charge) says, by all of them: None where it says nothing."""
+def naive(reports: list[tuple[int, int, int | None]], *, begun: bool) -> Any:
+    """What the last of these reports (when, battery, charge) says, by all of them: () where it says nothing. `begun`:
+    one before said something.
+    """
 
     def silent(battery: int, heard: int, until: int) -> bool:
         """Whether a battery whose report is the one at `heard` is silent when that at `until` comes."""
@@ -195,7 +197,12 @@ def naive(reports: list[tuple[int, int, int | None]]) -> Any:
         own = [index for index, each in enumerate(reports) if each[1] == battery]
         return any(not silent(battery, *pair) for pair in pairwise(own))
 
-    if not counts(reports[-1][1]):
+    def known() -> bool:
+        """Whether of each that was heard it is known whether it counts."""
+        heard = {each: index for index, (_, each, _) in enumerate(reports)}
+        return all(counts(each) or silent(each, index, len(reports) - 1) for each, index in heard.items())
+
+    if not counts(reports[-1][1]) or not (begun or known()):
         return ()
     last = {battery: index for index, (_, battery, _) in enumerate(reports) if counts(battery)}
     charges = [reports[index][2] for index in last.values()]
@@ -208,11 +215,13 @@ def naive(reports: list[tuple[int, int, int | None]]) -> Any:
     st.sampled_from([0, S, 2 * S, STALE_US, STALE_US + 1]), st.integers(0, 3), st.sampled_from([None, 20, 50, 90]),
 ), max_size=16))  # fmt: skip
 def test_the_charge_is_that_of_the_batteries_that_count(steps: list[tuple[int, int, int | None]]) -> None:
-    telemetry, reports, at_us = Telemetry(POLICY), list[tuple[int, int, int | None]](), 0
+    telemetry, reports, at_us, begun = Telemetry(POLICY), list[tuple[int, int, int | None]](), 0, False
     for later_us, number, percent in steps:
         at_us += later_us
         reports.append((at_us, number, percent))
-        assert charge(telemetry, number, -1 if percent is None else percent, at_us=at_us) == naive(reports)
+        said = charge(telemetry, number, -1 if percent is None else percent, at_us=at_us)
+        assert said == naive(reports, begun=begun)
+        begun = begun or said != ()
 
 
 def test_a_signal_may_name_one_battery() -> None:

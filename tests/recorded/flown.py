@@ -17,14 +17,16 @@ from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import tlog
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import State
 from rtshcua.model.flat.zone import SHIFT, Projection
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
 from rtshcua.onboard.ports import Command, Event, Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.wire import bundle as bundles
 from rtshcua.wire import cose, names
-from virtual.shipped import equipped
+from virtual.shipped import equipped, shipped
 
 TRACES = Path(__file__).resolve().parents[1] / "traces"
 SECOND = 1_000_000
@@ -45,6 +47,13 @@ def shipped_policy() -> Policy:
     """The policy of the shipped missions, with all the signals that one of them needs."""
     policy, _ = (cose.unverified(envelope).payload for envelope in bundles.envelopes(equipped("one_bridge")))
     return bundles.parse(names.POLICY, policy, Policy)
+
+
+@cache
+def stock() -> tuple[Policy, Mission]:
+    """The policy of the shipped missions for a stock copter, and a mission."""
+    policy, mission = (cose.unverified(envelope).payload for envelope in bundles.envelopes(shipped("short")))
+    return bundles.parse(names.POLICY, policy, Policy), bundles.parse(names.MISSION, mission, Mission)
 
 
 def at_home(latitude: int, longitude: int) -> Policy:
@@ -74,6 +83,7 @@ class Recorded:
     until_s: float = inf
     events: list[tuple[float, Event]] = field(default_factory=list)
     states: list[dict[str, int | None]] = field(default_factory=list)
+    monitored: list[State] = field(default_factory=list)  # the same, as the decision takes it
     sent: list[tuple[float, Received]] = field(default_factory=list)
     round_trip_us: int = 20_000
 
@@ -153,6 +163,7 @@ class Recorded:
 
     def _state(self) -> dict[str, int | None]:
         state = self._monitor.state(self._now_us)
+        self.monitored.append(state)
         return {
             signal.name: state.values[signal.slot] if state.ages[signal.slot] <= signal.stale_us else None
             for signal in self.policy.signals

@@ -154,11 +154,15 @@ class Compiler:
         assert not isinstance(node, str), node
         return node
 
-    def monitored(self, monitor: Monitor, number: int) -> Condition:
-        """The condition that the temporal monitor of this number looks at."""
+    def monitor_node(self, monitor: Monitor, number: int) -> Node:
+        """The tree of what the temporal monitor of this number looks at."""
         node = parse(monitor.when.code, self._scope.inside_monitor(number))
         assert not isinstance(node, str), node
-        return build(node, self.tables)
+        return node
+
+    def monitored(self, monitor: Monitor, number: int) -> Condition:
+        """The condition that the temporal monitor of this number looks at."""
+        return build(self.monitor_node(monitor, number), self.tables)
 
     def guards(self, clauses: tuple[Clause, ...], contract: Contract) -> Guards:
         """The clauses of a contract. Those that stand in the policy are compiled once: most steps have no others."""

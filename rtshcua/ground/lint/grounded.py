@@ -3,13 +3,13 @@
 Both autopilots estimate the wind only in the air (docs/flying/vehicles.md). A `forbid`, `confirm` or `degrade` whose
 condition is then unknown defers the take-off until its deadline is over, and so does an `assume` or `require` of the
 skill that climbs; a `permit` that is unknown permits nothing. Told where it is proved that the condition has no truth
-that lets a take-off through while the vehicle stands on the ground and does not report such a signal.
+that lets a take-off through while the vehicle stands on the ground and does not report such a signal, over time too.
 """
 
 from collections.abc import Iterator
 
 from rtshcua.decision.tree import Node, slots_read
-from rtshcua.decision.values import FALSE, MISSING, TRUE, Truth
+from rtshcua.decision.values import AND, FALSE, MISSING, NOT, TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Span
@@ -21,7 +21,7 @@ from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.lint.subject import Subject
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind
 from rtshcua.model.flat.signal import Signal
 
 #: messages that both autopilots fill only in the air
@@ -52,7 +52,7 @@ def _unknown_on_the_ground(signal: Signal) -> bool:
 def _of(ground: Ground, rules: Ruleset, skill: int, signals: tuple[Signal, ...]) -> Iterator[Diagnostic]:
     policy = ground.prepared.policy
     contract, slots = policy.contracts[skill], {each.slot for each in signals}
-    space = _standing(policy, rules.space(skill), slots)
+    space = _looked_at(ground, skill, _standing(policy, rules.space(skill), slots))
 
     def stuck(clause: Clause | None, node: Node, lets: Truth) -> bool:
         """Whether a condition reads such a signal, and has no truth that lets the take-off through."""
@@ -85,6 +85,28 @@ def _standing(policy: Policy, space: Space, unknown: set[int]) -> Space:
     if height >= 0:
         slots[height] = clipped(slots[height], -_ON_THE_GROUND, _ON_THE_GROUND) or slots[height]
     return space._replace(slots=tuple(slots))
+
+
+def _looked_at(ground: Ground, skill: int, space: Space) -> Space:
+    """The same, with what conditions over time may say there. What one says of a window is what its condition was at
+    some moment of it, or UNKNOWN; one that rises or falls was UNKNOWN, or what it may be, at the observation before.
+    """
+    prepared = ground.prepared
+    for number, monitor in enumerate(prepared.policy.monitors):
+        node = prepared.compiler.monitor_node(monitor, number)
+        now = sum(truth for truth in (FALSE, TRUE, UNKNOWN) if _may_be(ground, (skill, number), node, truth, space))
+        says = before = now | UNKNOWN
+        if monitor.kind == MonitorKind.RISING:
+            says = AND[NOT[before]][now]
+        elif monitor.kind == MonitorKind.FALLING:
+            says = AND[before][NOT[now]]
+        space = space._replace(monitors=(*space.monitors[:number], says, *space.monitors[number + 1 :]))
+    return space
+
+
+def _may_be(ground: Ground, of: tuple[int, int], node: Node, truth: Truth, space: Space) -> bool:
+    """Whether what a monitor looks at may have a truth there; `of`: about which skill, and the monitor's number."""
+    return not isinstance(ground.questions.ask(("looked at", *of, truth), lambda: [(node, truth)], space), No)
 
 
 def _found(span: Span, skill: str, what: str, signals: tuple[Signal, ...]) -> Diagnostic:

@@ -247,6 +247,31 @@ ON = "vehicle equipped"  # tuned to estimate the wind
         ("permit takeoff by role operator when wind.speed < 8 m/s permit takeoff by role supervisor", False),
         ("permit takeoff by role operator when wind.speed < 8 m/s or battery > 50 %", False),
         ("permit goto by role operator when wind.speed < 8 m/s", False),
+        ("permit takeoff by role operator forbid takeoff by any when wind.speed > 8 m/s for the last 5 s", True),
+        ("permit takeoff by role operator forbid takeoff by any when wind.speed > 8 m/s within the last 5 s", True),
+        ("permit takeoff by role operator when not wind.speed > 8 m/s within the last 5 s", True),
+        ("permit takeoff by role operator when rising wind.speed > 8 m/s", True),
+        ("permit takeoff by role operator forbid takeoff by any when falling wind.speed > 8 m/s", True),
+        (
+            "permit takeoff by role operator "
+            "forbid takeoff by any when (wind.speed > 8 m/s for the last 5 s) within the last 20 s",
+            True,
+        ),
+        ("permit takeoff by role operator forbid takeoff by any when battery < 50 % for the last 5 s", False),
+        (
+            "permit takeoff by role operator "
+            "forbid takeoff by any when wind.speed > 8 m/s and height > 10 m for the last 5 s",
+            False,
+        ),
+        (
+            "permit takeoff by role operator "
+            "forbid takeoff by any when (wind.speed > 8 m/s and height > 10 m) for the last 5 s",
+            False,
+        ),
+        (
+            "permit takeoff by role operator forbid takeoff by any when rising (wind.speed > 8 m/s and height > 10 m)",
+            False,
+        ),
     ],
 )
 def test_what_waits_on_the_ground_for_the_wind(rules: str, grounded: bool) -> None:

@@ -1,4 +1,5 @@
-"""E0804, E0814: each step, and each link of its chains, is done in the time and with the charge that its skill allows.
+"""E0804, E0814, E0815: each step, and each link of its chains, is done in the time that its skill allows; each step,
+and each return of its chains, with the charge.
 
 Durations are those of `decision.flying`: the speeds that the vehicle declares, against the most wind that it is flown
 in, and no more than what the step assumes of the wind. Of a return, the speed of the slowest step before it counts too,
@@ -87,10 +88,14 @@ def prove(
         fits = min(fits, contract.duration_us or fits)
         nearer = _nearer(ground, step, invocation, starts[0].height, takes, fits)
         _too_much(ground, step, "the step", contract, energy, nearer)
+    returns: list[tuple[Contract, int]] = []
     if len(ground.context.report.found) == before:
-        _links(ground, step, invocation, starts, slowest)
+        returns = _links(ground, step, invocation, starts, slowest)
     if len(ground.context.report.found) > before:
         return None
+    for link, needed in returns:
+        if not _is_told(ground, link):
+            _too_much(ground, step, "the return, a link of this step's chains,", link, needed, code=codes.RETURN_ENERGY)
     if home and energy > contract.energy:
         _too_much(ground, step, "the return", contract, energy, code=codes.RETURN_ENERGY)
     return StepBound(contract.name, time_us, energy)
@@ -180,10 +185,21 @@ def _step_us(
     return BEGINS + sum(leg_us(speeds, length(a, b) + 1, speed) for a, b in pairwise(points)) + height + SETTLES
 
 
-def _links(ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: int) -> None:
-    """Report the first link that may take longer, or more, than it may, wherever in the step it begins."""
+def _is_told(ground: Ground, contract: Contract) -> bool:
+    """Whether it was said already of another step that this return may take more than its skill says."""
+    written = f"`{contract.name}` takes at most"
+    return any(each.code is codes.RETURN_ENERGY and written in each.message for each in ground.context.report.found)
+
+
+def _links(
+    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: int
+) -> list[tuple[Contract, int]]:
+    """Report the first link that may take longer than it may, wherever in the step it begins. Given are the returns
+    that may take more charge than their skill says, and how much; none is refused for that.
+    """
+    returns: list[tuple[Contract, int]] = []
     if invocation.invocation.plan.kind in (MotionKind.HOME, MotionKind.LAND):
-        return  # what follows it lands
+        return returns  # what follows it lands
     volumes = [planned(ground, invocation, start)[1] for start in starts]
     distance = max(volume.farthest[1] for volume in volumes)
     low = min(volume.height[0] for volume in volumes)
@@ -202,7 +218,11 @@ def _links(ground: Ground, step: Step, invocation: PreparedInvocation, starts: S
                 declared = ground.context.symbols.skills[contract.name].duration
                 limit = ground.span(link.link) if link.link.limit_us or declared is None else declared.span
                 _too_long(ground, step, name, contract, time_us, allowed, limit, slowest=slowest)
-                return
+                return []
+            needed = charge(_speeds(ground), time_us)
+            if link.motion == MotionKind.HOME and needed > contract.energy:
+                returns.append((contract, needed))
+    return returns
 
 
 def _link_us(
@@ -276,8 +296,8 @@ def _too_much(
     nearer: _Fix | None = None,
     code: Code = codes.STEP_ENERGY,
 ) -> None:
-    skill = ground.context.symbols.skills[step.skill.text]
-    own = None if step.overrides is None else step.overrides.energy
+    skill = ground.context.symbols.skills[contract.name]
+    own = None if step.overrides is None or contract.name != step.skill.text else step.overrides.energy
     declared = own or skill.energy
     assert declared is not None
     needed = -(-energy // 10) * 10  # to a tenth of a percent

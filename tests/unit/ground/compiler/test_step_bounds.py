@@ -6,6 +6,7 @@ import pytest
 
 from reference.sources import LIBRARY, findings, found, mission, policy, program, skill
 from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
+from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.compiler.proofs.durations import StepBound
@@ -111,6 +112,23 @@ def test_a_return_counts_the_speed_of_the_link_before_it(speed: int, expected: l
     late = [(code, message) for code, message in found(text) if code == "E0804"]
     assert [code for code, _ in late] == expected
     assert all(message.startswith("`return_home`, a link of this step's chains") for _, message in late)
+
+
+@pytest.mark.parametrize(("energy", "told"), [(2, True), (11, False)])
+def test_a_return_in_a_chain_that_takes_more_than_its_skill_says_is_told_once(energy: int, told: bool) -> None:
+    """It is never refused for want of charge, and the mission flies all the same."""
+    back = skill(
+        "back()", motion="home", fallback="emergency_land", lasts="at most 5 min", energy=f"at most {energy} %"
+    )
+    away = skill(f"away({EAST})", motion="fly to aim at top", fallback="back, emergency_land", **LONG)
+    steps = mission(UP, f"away({NORTH}, 20 m)", f"away({NORTH}, 20 m)", HOME)
+    made = compiled(back, away, policy("permit back by any"), steps)
+    assert made.bounds is not None
+    warned = [each.message for each in made.diagnostics if each.code is codes.RETURN_ENERGY]
+    assert len(warned) == told
+    assert all(each.startswith("the return, a link of this step's chains, takes up to 10.6 %") for each in warned), (
+        warned
+    )
 
 
 @pytest.mark.parametrize("top", ["6 m", "45 m"])

@@ -235,7 +235,8 @@ def test_the_climb_and_the_descent_of_the_way_home_keep_the_airspace() -> None:
     roof = "zone roof = circle(47.39950 N, 8.54559 E, 15 m)  floor 24 m ceiling 50 m above home\n"
     vehicle = other(12).replace("reserve 15 %", "reserve 15 %  return at 55 m")
     under = mission(UP, goto("47.39950 N, 8.54559 E"), HOME).replace("on quad", "on other")
-    ((_, message), *_) = found(program(vehicle, roof, policy("airspace inside city outside roof"), under))
+    told = found(program(vehicle, roof, policy("airspace inside city outside roof"), under))
+    message, *_ = [message for code, message in told if code != "E0815"]
     assert message == (
         "the climb before the way home from this step, which begins 196 m north of home, would enter `roof`, near "
         "47.39937 N, 8.54559 E"

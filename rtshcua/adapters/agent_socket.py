@@ -393,12 +393,13 @@ def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
 
 class FlightFollower:
     """A connection that stays: what the flight at `path` tells, and what is handed in to it. Raises OSError where none
-    listens, or it does not say which flight it is.
+    listens, or it does not say which flight it is, for so long. From then on it waits for nothing.
     """
 
     def __init__(self, path: Path, *, patience_s: float = 10.0) -> None:
         self._number = 0
         self._path = path
+        self._unsent = bytearray()
         self._link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._waiting = b""
         self._ahead: list[bytes | Answered] = []
@@ -412,6 +413,7 @@ class FlightFollower:
                 if told is None:
                     raise ConnectionResetError(errno.ECONNRESET, "the flight hung up", str(path))
                 self._ahead += told
+            self._link.setblocking(False)
         except BaseException:
             self._link.close()
             raise
@@ -429,6 +431,8 @@ class FlightFollower:
             return ahead
         try:
             chunk = self._link.recv(_CHUNK)
+        except BlockingIOError:
+            return []
         except ConnectionResetError:
             return None
         if not chunk:
@@ -447,15 +451,34 @@ class FlightFollower:
         return found
 
     def hand_in(self, document: bytes) -> None:
-        """Hand a document in; what becomes of it comes with `receive`. Raises OSError."""
+        """Hand a document in; what becomes of it comes with `receive`. Raises OSError where the flight hung up."""
         self._number += 1
-        self._link.sendall(msgspec.json.encode({"id": self._number, "document": b64encode(document).decode()}) + b"\n")
+        self._unsent += msgspec.json.encode({"id": self._number, "document": b64encode(document).decode()}) + b"\n"
+        self.flush()
+
+    @property
+    def unsent(self) -> bool:
+        """Whether something waits until the flight reads: `flush` once the descriptor can be written."""
+        return bool(self._unsent)
+
+    def flush(self) -> None:
+        """Send what waits, as far as the flight takes it now. Raises OSError where it hung up."""
+        while self._unsent:
+            try:
+                sent = self._link.send(self._unsent)
+            except BlockingIOError:
+                return
+            del self._unsent[:sent]
+
+    def close(self) -> None:
+        """Hang up. Twice does nothing."""
+        self._link.close()
 
     def __enter__(self) -> "FlightFollower":
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._link.close()
+        self.close()
 
 
 def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s: float) -> _Line:

@@ -6,7 +6,7 @@ import select
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import typer
 
@@ -19,13 +19,14 @@ from rtshcua.cli.faults import refuse, untrusted
 from rtshcua.cli.recalling import GOOD_S, HELP, Recalled
 from rtshcua.cli.showing.bundle import Claimed
 from rtshcua.cli.showing.log import Names
-from rtshcua.cli.stdout import out, out_json
+from rtshcua.cli.stdout import NewestLines
 from rtshcua.cli.unlock import unlock_person
-from rtshcua.diagnostics.excerpt import visible
+from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Decision, Effect
+from rtshcua.evidence.records import Close, Decision, Effect
+from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.untrusted import Untrusted
 
@@ -52,69 +53,183 @@ def operator(
 ) -> ExitCode:  # fmt: skip
     """Follow a flight, and hold its recall ready: `recall` and Enter calls it home within milliseconds.
 
-    The key is unlocked at the start, and held in memory until the end. The flight goes on when this ends.
+    The key is unlocked at the start, and held in memory until the end. The flight goes on when this ends. A connection
+    that is lost is made again for a minute, and a recall that was not answered is sent again then.
+
+    Ends with 0 where the flight closed its log or somebody left it, 5 where it refused the last recall, 8 where a
+    recall was not answered, or the connection was lost and stayed so.
     """
     try:
         flying = subject(bundle, [], root, time.time_ns() // 1000, stops=True)
         key = unlock_person(KeyStore(data_folder()), person, None, path=approval_key, passphrase_file=passphrase_file)
     except Untrusted as error:
         return refuse(untrusted(error))
-    with FlightFollower(to) as follower:
-        console = _Console(follower, Recalled(flying, follower.flight), key, seconds, as_json=as_json)
-        try:
-            return console.follow()
-        except KeyboardInterrupt:
-            console.tell("left", "the flight goes on")
-            return ExitCode.OK
+    console = OperatorConsole(
+        to, FlightFollower(to), flying, key, seconds, typing=None if sys.stdin is None else sys.stdin.fileno(),
+        output=sys.stdout.fileno(), as_json=as_json,
+    )  # fmt: skip
+    try:
+        return console.follow()
+    except KeyboardInterrupt:
+        return console.leave()
+    finally:
+        console.close()
 
 
-class _Console:
-    """What a person sees and types. `seconds`: how long a recall that is sent is good."""
+class Patience(NamedTuple):
+    """How long the console waits, in seconds."""
+
+    #: between two tries to connect again, and for each
+    again_s: float = 0.5
+    #: until a connection that is lost is given up; a run that is begun again after a kill is there in some seconds
+    lost_s: float = 60.0
+    #: for the answer to a recall, until that is told
+    answer_s: float = 2.0
+    #: for anything at all, until that is told: a flight seals its log each 10 s
+    silent_s: float = 30.0
+    #: for whoever reads what is told, at the end
+    drain_s: float = 1.0
+
+
+class OperatorConsole:
+    """What a person sees at the descriptor `output` and types at `typing`. `seconds`: how long a recall that is sent is
+    good.
+
+    Nothing in it waits for one thing alone: neither a flight nor a terminal that does not read keeps a recall back.
+    """
 
     def __init__(
-        self, follower: FlightFollower, recalled: Recalled, key: SigningKey, seconds: int, *, as_json: bool
-    ) -> None:
-        self._follower = follower
-        self._recalled = recalled
+        self, to: Path, follower: FlightFollower, flying: Bundle, key: SigningKey, seconds: int, *, typing: int | None,
+        output: int, as_json: bool, patience: Patience = Patience(),
+    ) -> None:  # fmt: skip
+        self._to = to
+        self._flying = flying
         self._key = key
         self._seconds = seconds
         self._as_json = as_json
+        self._patience = patience
+        self._follower: FlightFollower | None = follower
+        self._flight = follower.flight
+        self._output = NewestLines(
+            output, lambda count: self._line("left-out", f"{count} lines: nobody read them in time")
+        )
+        self._typing = typing
         self._names: Names | None = None  # until the flight tells its mission
         self._typed = b""
         self._code = ExitCode.OK
+        #: a recall that was not answered yet: whether it is for all under the policy
+        self._unanswered: bool | None = None
+        self._sent_s = self._heard_s = self._lost_s = time.monotonic()
+        self._told_silence = self._told_unanswered = False
 
     def follow(self) -> ExitCode:
-        """Until the flight is over, or somebody leaves it."""
-        self.tell("following", f"{self._recalled.name}, flight {self._follower.flight.hex()}")
+        """Until the flight is over, somebody leaves it, or the connection is lost for too long."""
+        self._greet()
         self.tell("ready", _HELP)
-        watched = [self._follower.fileno(), *([] if sys.stdin is None else [sys.stdin.fileno()])]
-        while True:
-            ready = select.select(watched, [], [])[0]
-            if watched[0] in ready and not self._hear():
-                self.tell("over", "the flight hung up: it is over, or its run ended")
-                return self._code
-            if len(ready) > (watched[0] in ready):
-                data = os.read(watched[1], _CHUNK)
-                if not data:
-                    del watched[1]
-                    self.tell("ready", "nobody types any more: the flight is followed to its end")
-                self._typed += data or (b"\n" if self._typed else b"")
-                *lines, self._typed = self._typed.split(b"\n")
-                for line in lines:
-                    if not self._obey(line.decode(errors="replace").strip().lower()):
-                        self.tell("left", "the flight goes on")
-                        return self._code
+        code: ExitCode | None = None
+        while code is None:
+            self._output.write()
+            code = self._turn()
+        self._output.drain(self._patience.drain_s)
+        return code
 
-    def _hear(self) -> bool:
-        """Tell what the flight says; False where it hung up."""
-        lines = self._follower.receive()
-        for line in lines or ():
+    def leave(self) -> ExitCode:
+        """Somebody leaves the flight."""
+        self.tell("left", "the flight goes on")
+        self._output.drain(self._patience.drain_s)
+        return self._left()
+
+    def close(self) -> None:
+        """Hang up."""
+        if self._follower is not None:
+            self._follower.close()
+
+    def _left(self) -> ExitCode:
+        return self._code if self._unanswered is None else ExitCode.LINK
+
+    def _turn(self) -> ExitCode | None:
+        """Wait for what comes first, and do what is to be done; how it ended, once it did."""
+        follower = self._follower
+        reads = [each for each in (self._typing, follower) if each is not None]
+        writes: list[NewestLines | FlightFollower] = [self._output] if self._output.waiting else []
+        if follower is not None and follower.unsent:
+            writes.append(follower)
+        readable, writable, _ = select.select(reads, writes, [], self._patience.again_s)
+        if follower is None:
+            self._connect()
+        else:
+            try:
+                if follower in writable:
+                    follower.flush()
+                over = follower in readable and self._hear(follower)
+            except OSError as error:
+                if isinstance(error, ConnectionError) and error.errno is None:
+                    raise  # it is no flight
+                over = self._lose()
+            if over:
+                return self._left()
+        if self._typing in readable and self._type():
+            self.tell("left", "the flight goes on")
+            return self._left()
+        return self._wait()
+
+    def _wait(self) -> ExitCode | None:
+        """Tell what is waited for in vain; how it ended, where that was too long."""
+        now_s = time.monotonic()
+        if self._follower is None:
+            if now_s - self._lost_s < self._patience.lost_s:
+                return None
+            self.tell("gone", "the flight was not reached again: it is not known whether it is over")
+            return ExitCode.LINK
+        if now_s - self._heard_s >= self._patience.silent_s and not self._told_silence:
+            self._told_silence = True
+            self.tell("silent", f"nothing was heard of the flight for {now_s - self._heard_s:.0f} s")
+        waits = self._unanswered is not None and now_s - self._sent_s >= self._patience.answer_s
+        if waits and not self._told_unanswered:
+            self._told_unanswered = True
+            self.tell("unanswered", "the flight does not answer the recall: bring it home by other means if it must be")
+        return None
+
+    def _connect(self) -> None:
+        """Try once to reach the flight again."""
+        try:
+            self._follower = FlightFollower(self._to, patience_s=self._patience.again_s)
+        except (ConnectionError, FileNotFoundError, TimeoutError, BlockingIOError) as error:
+            if isinstance(error, ConnectionError) and error.errno is None:
+                raise
+            return
+        self._heard_s = time.monotonic()
+        self._told_silence = False
+        self._names = None
+        self._flight = self._follower.flight
+        self._greet()
+        if self._unanswered is not None:
+            self._recall(under_policy=self._unanswered)
+
+    def _greet(self) -> None:
+        self.tell("following", f"{self._recalled().name}, flight {self._flight.hex()}")
+
+    def _recalled(self, *, under_policy: bool = False) -> Recalled:
+        return Recalled(self._flying, b"" if under_policy else self._flight)
+
+    def _lose(self) -> bool:
+        assert self._follower is not None
+        self._follower.close()
+        self._follower = None
+        self._lost_s = time.monotonic()
+        self.tell("lost", "the flight hung up, and did not say that it is over: it is tried again")
+        return False
+
+    def _hear(self, follower: FlightFollower) -> bool:
+        """Tell what the flight says; whether it is over."""
+        lines = follower.receive()
+        if lines is None:
+            return self._lose()
+        self._heard_s = time.monotonic()
+        self._told_silence = False
+        for line in lines:
             if isinstance(line, Answered):
-                accepted = line.slug == "accepted"
-                self._code = ExitCode.OK if accepted else ExitCode.REFUSED
-                help = HELP.get(line.slug)
-                text = line.text if accepted or help is None else f"{line.text}; {help}"
-                self.tell("accepted" if accepted else "refused", text if accepted else f"{text} ({line.slug})")
+                self._answered(line)
                 continue
             record = read(line)
             if isinstance(record, Flaw):
@@ -123,7 +238,19 @@ class _Console:
                 names = self._names or Names(None)
                 names.follow(record)
                 self.tell(record.event if isinstance(record, Effect) else record.outcome, names.tell(record))
-        return lines is not None
+            elif isinstance(record, Close):
+                self.tell("over", f"the flight is over: {record.ending}")
+                return True
+        return False
+
+    def _answered(self, answer: Answered) -> None:
+        accepted = answer.slug == "accepted"
+        # one that was sent again finds the flight recalled by the first, whose answer was lost
+        self._code = ExitCode.OK if accepted or answer.slug == "recalled" else ExitCode.REFUSED
+        self._unanswered = None
+        help = HELP.get(answer.slug)
+        text = answer.text if accepted or help is None else f"{answer.text}; {help}"
+        self.tell("accepted" if accepted else "refused", text if accepted else f"{text} ({answer.slug})")
 
     def _meet(self, line: bytes) -> None:
         """The mission that flies first, which need not be the bundle's: an agent may have handed in one of its own."""
@@ -135,7 +262,7 @@ class _Console:
             raise ConnectionError("what listens there is no flight: it says what no flight says") from None
         if not isinstance(told, dict) or told.get("type") != "mission":
             return
-        flying = self._recalled.flying
+        flying = self._flying
         if told.get("digest") == flying.mission_digest.hex():
             keys = flying.policy_key.kid, flying.mission_key.kid
             self._names = Names(Claimed(flying.policy, flying.mission, flying.digest, flying.policy_digest, *keys))
@@ -143,34 +270,57 @@ class _Console:
             self._names = Names(None)
             self.tell("other", "another mission than the bundle's flies: `policy` calls that home")
 
-    def _obey(self, word: str) -> bool:
-        """Do what was typed; False to leave."""
+    def _type(self) -> bool:
+        """Do what was typed; whether that is to leave."""
+        assert self._typing is not None
+        data = os.read(self._typing, _CHUNK)
+        if not data:
+            self._typing = None
+            self.tell("ready", "nobody types any more: the flight is followed to its end")
+        self._typed += data or (b"\n" if self._typed else b"")
+        *lines, self._typed = self._typed.split(b"\n")
+        self._typed = self._typed[-_CHUNK:]
+        return any(self._leaves(line.decode(errors="replace").strip().lower()) for line in lines)
+
+    def _leaves(self, word: str) -> bool:
+        """Do what was typed in a line; whether that is to leave."""
         if word in _QUITS:
-            return False
+            return True
         under_policy = _RECALLS.get(word)
         if under_policy is None:
             self.tell("ready", _HELP)
-            return True
-        recalled = self._recalled._replace(flight=b"") if under_policy else self._recalled
+        else:
+            self._recall(under_policy=under_policy)
+        return False
+
+    def _recall(self, *, under_policy: bool) -> None:
+        """Sign a recall and send it; it is sent again where the connection is lost before it was answered."""
+        self._unanswered, self._sent_s, self._told_unanswered = under_policy, time.monotonic(), False
+        recalled = self._recalled(under_policy=under_policy)
+        if self._follower is None:
+            self.tell("kept", f"the recall of {recalled.name}: it is sent once the flight is reached again")
+            return
         document = recalled.sign(self._key, time.time_ns() // 1000, self._seconds)
         try:
             self._follower.hand_in(document)
         except OSError:
-            self._code = ExitCode.REFUSED
-            self.tell("not-sent", "the flight hung up before the recall was sent")
-            return True
-        self.tell("sent", f"the recall of {recalled.name}")
-        return True
+            self._lose()
+            return
+        if self._follower.unsent:
+            self.tell("kept", f"the recall of {recalled.name}: it is sent once the flight reads")
+        else:
+            self.tell("sent", f"the recall of {recalled.name}")
 
     def tell(self, event: str, text: str) -> None:
         """One event, in a line."""
+        self._output.tell(self._line(event, text))
+
+    def _line(self, event: str, text: str) -> str:
         if self._as_json:
-            out_json(json.dumps({"event": event, "text": text}, ensure_ascii=False), flush=True)
-        else:
-            out(
-                visible(text) if text.startswith("·") or event in _OUTCOMES else f"{event:<11} {visible(text)}",
-                flush=True,
-            )
+            return escaped(json.dumps({"event": event, "text": text}, ensure_ascii=False))
+        if text.startswith("·") or event in _OUTCOMES:
+            return visible(text)
+        return f"{event:<11} {visible(text)}"
 
 
 _OUTCOMES: Final = frozenset({"allow", "deny", "defer", "fallback"})

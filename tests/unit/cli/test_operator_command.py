@@ -1,0 +1,265 @@
+"""`rtshcua operator` over real sockets: a flight that hangs up, comes again, does not read, or says that it is over."""
+
+import json
+import os
+import socket
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.agent_socket import FlightFollower
+from rtshcua.adapters.files.folders import data_folder
+from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.cli.app import main
+from rtshcua.cli.documents import subject
+from rtshcua.cli.operator import OperatorConsole, Patience
+from rtshcua.cli.stdout import MOST_LINES, NewestLines
+from rtshcua.cli.unlock import unlock_person
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.records import Close, Effect, encode
+from rtshcua.wire.bundle import Bundle
+from rtshcua.wire.keys import SigningKey
+
+MISSION = Path(__file__).resolve().parents[3] / "missions/short.rts"
+QUICK = Patience(again_s=0.02, lost_s=0.3, answer_s=0.1, silent_s=0.3, drain_s=0.3)
+
+
+@pytest.fixture(scope="module")
+def flying(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bundle, SigningKey]]:
+    folder = tmp_path_factory.mktemp("operator")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setenv("RTSHCUA_DATA_DIR", str(folder / "data"))
+        assert main(["keys", "init"]) == ExitCode.OK
+        assert main(["compile", str(MISSION), "-o", "m.bundle"]) == ExitCode.OK
+        yield (
+            subject(Path("m.bundle"), [], None, 10**15, stops=True),
+            unlock_person(KeyStore(data_folder()), None, None, path=None, passphrase_file=None),
+        )
+
+
+class Flight:
+    """What listens where a flight does, and does with each connection what a test says: the next one of `turns`."""
+
+    def __init__(self, path: Path, *turns: Callable[[socket.socket], None]) -> None:
+        self.path = path
+        self.documents: list[bytes] = []
+        self.over = threading.Event()
+        self._turns = turns
+        self._listener = socket.socket(socket.AF_UNIX)
+        self._listener.bind(str(path))
+        self._listener.listen()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        with self._listener:
+            for turn in self._turns:
+                link, _ = self._listener.accept()
+                with link:
+                    link.sendall(b'{"type":"hello","flight":"' + b"ab" * 16 + b'"}\n')
+                    turn(link)
+
+    def end(self) -> None:
+        self.over.set()
+        self._thread.join()
+
+
+class Seat:
+    """A person at the console: what they type, and the events that they see once it ended."""
+
+    def __init__(self, flying: tuple[Bundle, SigningKey]) -> None:
+        self._flying = flying
+        self.typing, self.types = os.pipe()
+        self.reads, self.output = os.pipe()
+        self._heard = b""
+
+    def until(self, event: str) -> None:
+        """Read what is told until there was such an event."""
+        while f'"event": "{event}"'.encode() not in self._heard:
+            self._heard += os.read(self.reads, 1 << 16)
+
+    def type(self, words: str) -> None:
+        os.write(self.types, words.encode())
+
+    def sits(self, path: Path, **changed: float) -> ExitCode:
+        bundle, key = self._flying
+        patience = QUICK._replace(**changed)
+        console = OperatorConsole(
+            path, FlightFollower(path), bundle, key, 300, typing=self.typing, output=self.output, as_json=True,
+            patience=patience,
+        )  # fmt: skip
+        try:
+            return console.follow()
+        finally:
+            console.close()
+
+    def events(self) -> list[str]:
+        return [each["event"] for each in self.told()]
+
+    def told(self) -> list[dict[str, Any]]:
+        if self.output >= 0:
+            os.close(self.output)
+            self.output = -1
+            self._heard += b"".join(iter(lambda: os.read(self.reads, 1 << 16), b""))
+        return [json.loads(line) for line in self._heard.splitlines()]
+
+    def end(self) -> None:
+        for each in (self.typing, self.types, self.reads, self.output):
+            if each >= 0:
+                os.close(each)
+
+
+@pytest.fixture
+def seat(flying: tuple[Bundle, SigningKey]) -> Iterator[Seat]:
+    made = Seat(flying)
+    yield made
+    made.end()
+
+
+@pytest.fixture
+def place() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        yield Path(name) / "s"
+
+
+def hangs_up(link: socket.socket) -> None:
+    pass
+
+
+def closes(link: socket.socket) -> None:
+    link.sendall(encode(Close("0" * 64, 0, 0, None, "0" * 64, "completed", 0, 0, 1, None, "close", 0, 0)))
+
+
+def effect(number: int) -> bytes:
+    return encode(Effect("0" * 64, 0, "", "buffered", "noted", 0, -1, number, -1, -1, "effect", 0, 0))
+
+
+def documents(link: socket.socket) -> bytes:
+    return link.recv(1 << 16)
+
+
+def test_a_flight_that_closes_its_log_is_over(seat: Seat, place: Path) -> None:
+    flight = Flight(place, closes)
+    assert seat.sits(place) == ExitCode.OK
+    flight.end()
+    assert seat.events() == ["following", "ready", "over"]
+    assert seat.told()[-1]["text"].endswith("completed")
+
+
+def test_a_connection_that_is_lost_is_made_again(seat: Seat, place: Path) -> None:
+    flight = Flight(place, hangs_up, hangs_up, closes)
+    assert seat.sits(place) == ExitCode.OK
+    flight.end()
+    assert seat.events() == ["following", "ready", "lost", "following", "lost", "following", "over"]
+
+
+def test_a_flight_that_is_not_reached_again_is_not_said_to_be_over(seat: Seat, place: Path) -> None:
+    flight = Flight(place, hangs_up)
+    assert seat.sits(place) == ExitCode.LINK
+    flight.end()
+    assert seat.events() == ["following", "ready", "lost", "gone"]
+
+
+def test_a_recall_that_was_not_answered_is_told_and_sent_again(seat: Seat, place: Path) -> None:
+    told: list[bytes] = []
+
+    def takes_it_and_hangs_up(link: socket.socket) -> None:
+        told.append(documents(link))
+        over.wait(0.3)  # longer than a recall waits for its answer
+
+    def answers(link: socket.socket) -> None:
+        told.append(documents(link))
+        link.sendall(b'{"type":"answer","id":1,"slug":"recalled","text":"t"}\n')
+        closes(link)
+
+    over = threading.Event()
+    flight = Flight(place, takes_it_and_hangs_up, answers)
+    seat.type("recall\n")
+    assert seat.sits(place) == ExitCode.OK
+    flight.end()
+    assert seat.events() == [
+        "following", "ready", "sent", "unanswered", "lost", "following", "sent", "refused", "over",
+    ]  # fmt: skip
+    assert [b'"document"' in each for each in told] == [True, True]
+
+
+def test_a_recall_that_is_typed_while_the_flight_is_lost_is_kept(seat: Seat, place: Path) -> None:
+    def hangs_up_and_is_recalled(link: socket.socket) -> None:
+        place.rename(place.with_name("gone"))  # who connects finds nobody
+        link.close()
+        seat.until("lost")
+        seat.type("p\n")
+        seat.until("kept")
+        place.with_name("gone").rename(place)
+
+    def accepts(link: socket.socket) -> None:
+        documents(link)
+        link.sendall(b'{"type":"answer","id":1,"slug":"accepted","text":"t"}\n')
+        closes(link)
+
+    flight = Flight(place, hangs_up_and_is_recalled, accepts)
+    assert seat.sits(place, lost_s=10) == ExitCode.OK
+    flight.end()
+    assert seat.events() == ["following", "ready", "lost", "kept", "following", "sent", "accepted", "over"]
+
+
+def test_a_flight_that_does_not_read_keeps_nobody_from_leaving(seat: Seat, place: Path) -> None:
+    flight = Flight(place, lambda _: flight.over.wait(30) and None)  # type: ignore[func-returns-value]
+    seat.type("recall\n" * 500 + "quit\n")
+    assert seat.sits(place) == ExitCode.LINK, "no recall was answered"
+    flight.end()
+    events = seat.events()
+    assert events[2] == "sent"
+    assert events[-2:] == ["kept", "left"]
+
+
+def test_who_does_not_read_what_is_told_can_still_recall_and_is_told_the_newest(seat: Seat, place: Path) -> None:
+    def is_recalled(link: socket.socket) -> None:
+        for number in range(2 * MOST_LINES):
+            link.sendall(effect(number))
+        seat.type("recall\n")
+        told.append(documents(link))
+        closes(link)
+
+    told: list[bytes] = []
+    flight = Flight(place, is_recalled)
+    assert seat.sits(place) == ExitCode.LINK
+    flight.end()
+    assert b'"document"' in told[0]
+    events = seat.events()
+    assert events[:2] == ["following", "ready"]
+    assert events.count("noted") < 2 * MOST_LINES, "the pipe has no room for all"
+
+
+def test_silence_is_told_once(seat: Seat, place: Path) -> None:
+    def is_silent(link: socket.socket) -> None:
+        flight.over.wait(0.8)
+        closes(link)
+
+    flight = Flight(place, is_silent)
+    assert seat.sits(place) == ExitCode.OK
+    flight.end()
+    assert seat.events() == ["following", "ready", "silent", "over"]
+
+
+def test_the_newest_lines_are_kept(seat: Seat) -> None:
+    output = NewestLines(seat.output, lambda count: f"without {count}")
+    for number in range(5 * MOST_LINES):
+        output.tell(f"{number:099}")
+        output.write()
+    assert output.waiting
+    taken = b""
+    while output.waiting:
+        taken += os.read(seat.reads, 1 << 16)
+        output.drain(0.01)
+    os.set_blocking(seat.reads, False)
+    lines = (taken + os.read(seat.reads, 1 << 16)).split()
+    assert lines[-1] == f"{5 * MOST_LINES - 1:099}".encode()
+    without = int(lines[lines.index(b"without") + 1])
+    assert len(lines) - 2 == 5 * MOST_LINES - without
+    assert without > 2 * MOST_LINES

@@ -111,6 +111,13 @@ void rt_decide_step(rt_session *session, int64_t step, const rt_state *state, co
         consume(session, step);
 }
 
+bool rt_session_give_back(rt_session *session, int64_t step) {
+    if (step != session->latest || !rt_is_consumed(session, step)) return false;
+    session->consumed[step / 8] = (uint8_t)(session->consumed[step / 8] & ~(1 << step % 8));
+    if (session->allowed >= step) session->allowed = step - 1;
+    return true;
+}
+
 /* The link of a chain of this number; there is one. */
 static rt_link link_at(rt_list chain, int64_t number) {
     rt_link link;

@@ -72,6 +72,10 @@ void rt_decide_step(rt_session *session, int64_t step, const rt_state *state, co
 void rt_decide_link(rt_session *session, int64_t kind, int64_t step, int64_t link, rt_bytes binding, const rt_state *state,
                     const rt_now *now, rt_decision *decision);
 
+/* Of a step that was admitted nothing was sent, and nothing will be: its id is unused again. False where it is not the last that was
+   asked for, or its id is not used up. */
+bool rt_session_give_back(rt_session *session, int64_t step);
+
 /* What became of a document: `refused` is why it was not accepted, NULL where it was; the others as in a receipt. */
 typedef struct {
     int64_t kind;

@@ -161,7 +161,8 @@ static uint32_t answer_preparation(rt_boundary *boundary, int64_t kind, reader *
     rt_refusal refused = NULL;
     int64_t now_us = kind == RT_CALL_PREPARED ? 0 : take(left, 8);
     if (left->short_ || !is_time(now_us)) return refuse("malformed", out);
-    if (kind != RT_CALL_PREPARED && rt_is_apart(now_us, own_us)) return refuse("time-apart", out);
+    if (kind != RT_CALL_PREPARED && rt_is_apart(now_us, own_us))
+        return refuse(kind == RT_CALL_PREPARE ? rt_prepare_apart(&boundary->executor) : "time-apart", out);
     if (kind == RT_CALL_PERMIT)
         refused = rt_permit_preparation(&boundary->issuer, boundary->executor.key, rest_of(left), now_us, out + 1, &size);
     else if (kind == RT_CALL_PREPARE) refused = rt_executor_prepare(&boundary->executor, rest_of(left), now_us);
@@ -182,7 +183,13 @@ static uint32_t answer_executor(rt_boundary *boundary, int64_t kind, reader *lef
     else {
         int64_t now_us = take(left, 8);
         if (left->short_ || !is_time(now_us)) return refuse("malformed", out);
-        if (rt_is_apart(now_us, own_us)) return refuse("time-apart", out);
+        if (rt_is_apart(now_us, own_us)) return refuse(rt_dispatch_apart(executor, now_us), out);
+        if (kind == RT_CALL_WITHDRAW) {
+            rt_refusal refused = rt_withdraw(executor, &boundary->session, rest_of(left), now_us);
+            if (refused != NULL) return refuse(refused, out);
+            out[0] = 0;
+            return 1;
+        }
         if (kind == RT_CALL_DISPATCH) return permitted(rt_dispatch(executor, rest_of(left), now_us, &permit), &permit, out);
         int64_t what = take(left, 1), link = take(left, 1);
         return permitted(rt_stand_in(executor, rest_of(left), what, link, now_us, &permit), &permit, out);
@@ -245,6 +252,7 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
     case RT_CALL_ENDED:
     case RT_CALL_LANDED:
     case RT_CALL_RELEASE:
+    case RT_CALL_WITHDRAW:
         return boundary->loaded ? answer_executor(boundary, kind, &left, own_us, out) : refuse("not-loaded", out);
     case RT_CALL_PERMIT:
     case RT_CALL_PREPARE:

@@ -31,8 +31,9 @@ enum {
                            -> the serial of the link's permit (8), then the signature of each frame (13) if the link has a key */
     RT_CALL_FLIGHT = 20, /* -> the id of the flight that the next bundle begins (16) */
     RT_CALL_LOG = 21,    /* the checkpoint that begins the log of the flight -> its signature by the log's key (64) */
-    RT_CALL_TIME = 22    /* whether no more is waited for (1) -> where the time of day is from (1), now by it (24), and the number that
+    RT_CALL_TIME = 22,   /* whether no more is waited for (1) -> where the time of day is from (1), now by it (24), and the number that
                             the vehicle is to send back in TIMESYNC (8), 0 for none */
+    RT_CALL_WITHDRAW = 23 /* now (8), the permit of a step, of which nothing was sent: it may be decided again */
 };
 
 #define RT_MAX_PART 60000 /* octets */

@@ -21,7 +21,7 @@ void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], c
     executor->policy = policy;
     executor->mission = mission;
     executor->first = first;
-    executor->step = executor->fallback_step = -1;
+    executor->step = executor->before = executor->fallback_step = -1;
     executor->fallback_link = executor->contingency = UNTOUCHED;
 }
 
@@ -168,6 +168,8 @@ static rt_refusal dispatch(rt_executor *executor, const rt_permit *permit, int64
         return refused;
     use(executor, permit->serial);
     if (permit->kind == RT_STEP) {
+        executor->before = executor->step;
+        executor->before_serial = executor->serial;
         executor->step = permit->step;
         executor->serial = permit->serial;
         executor->running = true;
@@ -217,8 +219,9 @@ static rt_refusal standing_for(const rt_executor *executor, rt_bytes sealed, int
     bool fallback = kind == RT_FALLBACK_LINK;
     if (link < 0 || link >= (fallback ? standing.fallbacks : standing.contingencies))
         return "permit/not-covered";
-    /* not sent, followed by another step, or landed since */
-    bool lapsed = !executor->flies || !is_used(executor, standing.serial) || standing.serial < executor->flight;
+    /* not sent, or withdrawn, followed by another step, or landed since */
+    bool lapsed = !executor->flies || !is_used(executor, standing.serial) || standing.serial < executor->flight ||
+                  standing.serial > executor->serial;
     if (standing.kind != RT_STEP || lapsed || (fallback && standing.serial != executor->serial))
         return "permit/lapsed";
     uint64_t serial = standing.serial + 1 + (uint64_t)link + (fallback ? 0 : (uint64_t)standing.fallbacks);
@@ -240,6 +243,34 @@ rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int
     return chained(executor, stand_in(executor, sealed, kind, link, now_us, permit), now_us);
 }
 
+rt_refusal rt_dispatch_apart(rt_executor *executor, int64_t now_us) { return chained(executor, "time-apart", now_us); }
+
+static rt_refusal withdraw(rt_executor *executor, rt_session *session, const rt_permit *permit) {
+    if (executor->gate.chain->over) return "permit/session-over";
+    if (permit->kind != RT_STEP) return "permit/sent";
+    bool used = is_used(executor, permit->serial);
+    if (used && (permit->serial != executor->serial || permit->serial != executor->last)) return "permit/sent";
+    if (used ? executor->gate.let_out : permit->step <= executor->step) return "permit/sent";
+    if (executor->used_count == RT_MAX_DISPATCHED || !rt_session_give_back(session, permit->step)) return "permit/sent";
+    if (!used) {
+        use(executor, permit->serial);
+        return NULL;
+    }
+    executor->step = executor->before;
+    executor->serial = executor->before_serial;
+    executor->running = false;
+    if (executor->flight == permit->serial) executor->flies = false;
+    rt_gate_close(&executor->gate);
+    return NULL;
+}
+
+rt_refusal rt_withdraw(rt_executor *executor, rt_session *session, rt_bytes sealed, int64_t now_us) {
+    rt_permit permit;
+    rt_refusal refused = is_ours(executor, sealed, &permit) ? withdraw(executor, session, &permit) : "permit/forged";
+    chained(executor, refused == NULL ? "permit/unsent" : refused, now_us);
+    return refused;
+}
+
 static rt_refusal unprepared(const rt_executor *executor, const rt_preparation *permit, int64_t now_us) {
     if (executor->gate.chain->over) return "permit/session-over";
     if (executor->prepared[permit->serial / 8] >> permit->serial % 8 & 1) return "permit/used";
@@ -247,15 +278,19 @@ static rt_refusal unprepared(const rt_executor *executor, const rt_preparation *
     return rt_gate_stands(&executor->gate, now_us) ? NULL : "permit/not-down";
 }
 
+static rt_refusal chained_unprepared(rt_executor *executor, rt_refusal refused) {
+    rt_chain_add(executor->gate.chain, RT_TAG_UNPREPARED, rt_words(refused), (rt_bytes){NULL, 0});
+    return refused;
+}
+
+rt_refusal rt_prepare_apart(rt_executor *executor) { return chained_unprepared(executor, "time-apart"); }
+
 rt_refusal rt_executor_prepare(rt_executor *executor, rt_bytes sealed, int64_t now_us) {
     rt_preparation permit;
     const rt_bytes nothing = {NULL, 0};
     const bool ours = rt_open_preparation(sealed, executor->key, &permit) && permit.serial < RT_MOST_PREPARATIONS;
     rt_refusal refused = ours ? unprepared(executor, &permit, now_us) : "permit/forged";
-    if (refused != NULL) {
-        rt_chain_add(executor->gate.chain, RT_TAG_UNPREPARED, rt_words(refused), nothing);
-        return refused;
-    }
+    if (refused != NULL) return chained_unprepared(executor, refused);
     uint8_t payload[2 + RT_MAX_WRITES * 24], *at = payload;
     rt_put(&at, permit.restoring, 1);
     rt_put(&at, permit.count, 1);

@@ -2,6 +2,7 @@
 #ifndef RT_ENFORCEMENT_EXECUTOR_H
 #define RT_ENFORCEMENT_EXECUTOR_H
 
+#include "decision/session.h"
 #include "frames.h"
 #include "preparation.h"
 #include "wire/permit.h"
@@ -19,6 +20,8 @@ typedef struct {
     int64_t step; /* the last step that was sent, -1 before, */
     uint64_t serial;
     bool running;
+    int64_t before; /* the step that was sent before it, */
+    uint64_t before_serial;
     uint64_t last; /* the permit that was dispatched last */
     bool flies;
     uint64_t flight; /* the first step permit of this flight, while it flies */
@@ -34,6 +37,14 @@ void rt_executor_begin(rt_executor *executor, const uint8_t key[RT_KEY_BYTES], c
    Answer why not, or NULL and what is permitted. */
 rt_refusal rt_dispatch(rt_executor *executor, rt_bytes sealed, int64_t now_us, rt_permit *permit);
 rt_refusal rt_stand_in(rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, int64_t now_us, rt_permit *permit);
+
+/* By a permit, or a preparation, nothing is sent or set: its caller's time is not ours. That is told as any refusal of one is. */
+rt_refusal rt_dispatch_apart(rt_executor *executor, int64_t now_us);
+rt_refusal rt_prepare_apart(rt_executor *executor);
+
+/* Give the permit of a step up of which no frame left, nor may one have: its step may be decided again then, in this session. Why it
+   is not given up, or NULL. */
+rt_refusal rt_withdraw(rt_executor *executor, rt_session *session, rt_bytes sealed, int64_t now_us);
 
 /* What may be set of the vehicle from now on, by a preparation permit, or why nothing may. It is good once, on the ground, until
    `rt_gate_prepared`, a dispatch, or its time is over. */

@@ -8,7 +8,7 @@ void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us
     gate->open = gate->started = true;
     gate->command = *command;
     gate->not_after_us = not_after_us;
-    gate->begun = false;
+    gate->begun = gate->let_out = false;
     gate->leg = -1;
     rt_gate_prepared(gate);
     if (!gate->settled_known || command->kind == RT_CLIMB) {
@@ -109,7 +109,7 @@ static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t no
             return "frame/out-of-order";
         }
     }
-    gate->begun = true;
+    gate->begun = gate->let_out = true;
     return NULL;
 }
 
@@ -200,6 +200,7 @@ rt_refusal rt_gate_sign_ahead(rt_gate *gate, const rt_command *command, rt_bytes
             return "frame/too-many-ahead";
         memcpy(out, octets + whole, RT_SIGNATURE);
         rt_chain_sign_ahead(gate->chain, frame);
+        gate->let_out = true;
     }
     return NULL;
 }

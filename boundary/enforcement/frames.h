@@ -18,6 +18,7 @@ typedef struct {
     int64_t leg;          /* the last point of its path that was sent, -1 before */
     bool here_known;
     rt_point here;
+    bool let_out; /* a frame left, or was signed ahead, since a command was permitted last */
     bool started; /* a session was opened: fences stay as they are */
     uint8_t system, autopilot, kind; /* of its heartbeat */
     bool armed;

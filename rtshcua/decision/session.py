@@ -311,6 +311,16 @@ class Session:
             self._consumed.add(step)
         return decision
 
+    def give_back(self, step: int) -> bool:
+        """Of a step that was admitted nothing was sent, and nothing will be: its id is unused again, so it may be asked
+        for once more, within its deadline. False where it is not the last that was asked for, or its id is not used up.
+        """
+        if step != self._latest or step not in self._consumed:
+            return False
+        self._consumed.discard(step)
+        self._allowed = min(self._allowed, step - 1)
+        return True
+
     def decide_link(self, ref: Ref, binding: bytes, state: State, now: Now) -> Decision:
         """Decide on a link that may be asked for (`refusal`), under the binding presented: its step's, or for the
         contingency the policy's digest. Steps 2 to 5 are skipped, and nothing is remembered.

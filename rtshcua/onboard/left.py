@@ -18,6 +18,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Command
+from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import DEGRADE, FALLBACK_LINK, Ref
 
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
@@ -109,6 +110,8 @@ class _Following:
             case "dispatched":
                 self._told = [told for told in self._told if told.sent or told.ref != ref]
                 self._add(ref, record.detail, sent=True)
+            case "refused" if record.detail == WITHDRAWN:  # nothing of it was sent
+                self._told = [told for told in self._told if told.ref != ref]
             case "obeyed":
                 self._obeyed(ref, _target(record.detail))
             case "succeeded":

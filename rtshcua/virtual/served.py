@@ -13,7 +13,7 @@ from typing import Final
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement import isolated as calls
-from rtshcua.onboard.enforcement.executor import Executor
+from rtshcua.onboard.enforcement.executor import UNSENT, Executor
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
 from rtshcua.onboard.enforcement.preparation import Owed
@@ -145,6 +145,9 @@ def _executed(executor: Executor, kind: int, rest: bytes) -> bytes | Refusal:
             return _permitted((what, step, link), executor.stand_in(sealed, what, link, now_us))
         case calls.AHEAD:
             return _ahead(executor, rest)
+        case calls.WITHDRAW:
+            refused = executor.withdraw(rest[_TIME.size :], *_TIME.unpack_from(rest))
+            return _NONE if refused is UNSENT else refused
         case calls.PREPARE:
             found = executor.prepare(rest[_TIME.size :], *_TIME.unpack_from(rest))
             return found if isinstance(found, Refusal) else _NONE

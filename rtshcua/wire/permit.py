@@ -25,6 +25,8 @@ LINK_VALID_US = 1_000_000
 #: How often a standing permit lets the last link of the contingency be sent again, each under a serial of its own:
 #: landing twice harms nothing, and nothing else is left to a vehicle whose boundary does not answer any more.
 AGAIN = 16
+#: Why nothing is sent by a permit that was given up, of which nothing was sent: its step may be decided again.
+WITHDRAWN = "permit/unsent"
 
 
 class Permit(msgspec.Struct, frozen=True):

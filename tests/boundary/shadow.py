@@ -15,6 +15,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import load as loading
+from rtshcua.onboard.enforcement.executor import UNSENT
 from rtshcua.onboard.enforcement.frames import OURS
 from rtshcua.onboard.enforcement.isolated import (
     Caller,
@@ -239,6 +240,13 @@ class BothExecutors:
         there = self._there.stand_in(sealed, kind, link, now_us)
         return self._both("stand_in", self._here.stand_in(sealed, kind, link, now_us), there)
 
+    def withdraw(self, sealed: bytes, now_us: int) -> Refusal:
+        one: Refusal = self._here.withdraw(sealed, now_us)
+        same("withdraw", one, self._there.withdraw(sealed, now_us))
+        self._counts["withdrawn"] += one is UNSENT
+        self._look_ahead()
+        return one
+
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
         one: Preparation | Refusal = self._here.prepare(sealed, now_us)
         same(f"prepare {sealed.hex()}", one, self._there.prepare(sealed, now_us))
@@ -270,6 +278,7 @@ class Shadow:
                 "refused permits",
                 "preparations",
                 "ahead",
+                "withdrawn",
             ),
             0,
         )

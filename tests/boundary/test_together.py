@@ -28,6 +28,7 @@ def test_both_answer_the_same(tmp_path: Path) -> None:
         *("documents accepted", "documents refused", "frames", "refused frames", "believed", "statements", "logs"),
         *("bundles", "bundles opened again", "bundles refused", "sessions", "ended", "killed"),
         *("settings", "refused settings", "preparations", "restorations", "refused preparations", "parameters set"),
+        *("withdrawals permit/unsent", "withdrawals permit/sent", "withdrawals permit/forged"),
         *("ahead", "ahead permit/forged", "ahead permit/lapsed", "ahead permit/backwards", "ahead frame/not-covered"),
     }
     assert wanted <= counts.keys(), wanted - counts.keys()

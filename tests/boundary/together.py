@@ -148,7 +148,8 @@ class Together:
         weights: dict[Callable[[], None], int] = {
             self.enforce: 60, self.dispatch: 14, self.stand_in: 5, self.tell: 12, self.present: 4, self.observe: 6,
             self.seal: 12, self.state: 2, self.ahead: 6, self.begin_session: 2, self.sign_log: 1, self.load: 1,
-            self.stand: 1, self.ask_to_set: 2, self.prepare: 2, self.set_parameter: 2, self.prepared: 1,
+            self.withdraw: 4, self.stand: 1, self.ask_to_set: 2, self.prepare: 2, self.set_parameter: 2,
+            self.prepared: 1,
         }  # fmt: skip
         if self._on_ground:
             weights |= {
@@ -431,6 +432,14 @@ class Together:
         kind, link = self.random.choice((FALLBACK_LINK, CONTINGENCY_LINK)), self.random.randrange(5)
         here = self.here.executor.stand_in(one, kind, link, self.us)
         self._sent(here, self.there.executor.stand_in(other, kind, link, self.us))
+
+    def withdraw(self) -> None:
+        one, other = self.standing if self.standing and self.random.random() < 0.6 else self.permit()
+        if len(other) != SIZE:
+            return
+        here = self.here.executor.withdraw(one, self.us)
+        same("a withdrawal", here, self.there.executor.withdraw(other, self.us))
+        self.counts[f"withdrawals {here.slug}"] += 1
 
     def _sent(self, one: Command | Refusal, other: Command | Refusal) -> None:
         same("a dispatch", one, other)

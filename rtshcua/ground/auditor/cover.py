@@ -33,6 +33,11 @@ class Cover:
         if record.kind == STEP:
             self._standing.add(record.step)
 
+    def withdrawn(self, record: Effect) -> None:
+        """Takes note of a step of which nothing was sent: its permit is good for nothing any more."""
+        self._until_us.pop(record.ref, None)
+        self._standing.discard(record.step)
+
     def check(self, record: Effect) -> Flaw | None:
         """What is wrong with an effect, or None."""
         if record.event != DISPATCHED:

@@ -23,6 +23,7 @@ from typing import Final, NamedTuple
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.auditor.cover import DISPATCHED
+from rtshcua.ground.auditor.named import is_withdrawn
 from rtshcua.ground.auditor.obeyed import Home, Target, obeyed, of_link, of_step
 from rtshcua.ground.auditor.preparations import Listed
 from rtshcua.ground.auditor.sent import Frame, Nature, name, nature, read, switches_fence_on
@@ -166,6 +167,7 @@ class Frames:
         self._types: dict[int, float] = {}  # FENCE_TYPE
         self._listed: tuple[Listed, ...] = ()  # the parameters that may be written
         self._running: _Running | None = None
+        self._left: _Suspect | None = None  # the first frame that carries out what was dispatched last
         self.begun = False
         self._changed_us = -1  # when the last record was made,
         self._before = _Allowed()  # and what was allowed until that moment, or since then until a later record of it
@@ -190,7 +192,9 @@ class Frames:
         self._changed_us = record.utc_us
         self._listed = listed
         running = self._running
-        if record.event == DISPATCHED:
+        if is_withdrawn(record):
+            self._withdrawn(record)
+        elif record.event == DISPATCHED:
             self._dispatched(record)
         elif running is not None and record.token == running.token:
             self._running = None
@@ -216,6 +220,13 @@ class Frames:
         now = _Allowed(() if self._running is None else self._running.targets, self._listed, not self.begun)
         return now.or_as(self._before) if at_us == self._changed_us else now
 
+    def _withdrawn(self, record: Effect) -> None:
+        """Nothing was sent of it, says the record; what would be, from this moment on, is not allowed."""
+        self._before = _Allowed()
+        if self._left is not None:
+            text = "a frame carries out a step of which the log says that nothing was sent"
+            self._finding = Flaw("frames/was-sent", text, _found(self._left)).at(record.seq)
+
     def _dispatched(self, record: Effect) -> None:
         targets = self._targets(record)
         suspect = self._suspect
@@ -223,6 +234,7 @@ class Frames:
             early = self._any(suspect.frame, targets)
             self._finding = _early(suspect, record.utc_us, record.seq) if early else _unrecorded(suspect)
         self._running = _Running(targets, record.token, record.utc_us, record.seq)
+        self._left = None
         self.begun = True
 
     def _targets(self, record: Effect) -> tuple[Target, ...]:
@@ -287,6 +299,8 @@ class Frames:
             self._suspect = suspect
         elif running is not None and entry.at_us < running.since_us:  # frames do not stand in the order of their times
             self._finding = _early(suspect, running.since_us, running.record)
+        elif running is not None and entry.at_us > running.since_us and self._left is None:
+            self._left = suspect if self._any(frame, running.targets) else None
 
     def _set(self, frame: Frame, entry: _Entry, allowed: _Allowed) -> None:
         """Judges a write of a parameter: it is listed, and the vehicle stands; or it switches a fence on, before."""

@@ -7,6 +7,7 @@ from rtshcua.ground.auditor.cover import Cover
 from rtshcua.ground.auditor.derive import Deriver
 from rtshcua.ground.auditor.documents import Documents
 from rtshcua.ground.auditor.frames import Frames
+from rtshcua.ground.auditor.named import is_withdrawn, ref_words
 from rtshcua.ground.auditor.preparations import ListedParameters
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.ground.auditor.turns import Turns
@@ -23,7 +24,7 @@ class Meaning:
         if frames is not None:
             frames.begin(basis)
         self.derived = 0
-        session = Session(basis.in_force, enforced=mode != UNENFORCED)
+        session = self._session = Session(basis.in_force, enforced=mode != UNENFORCED)
         self._deriver = Deriver(basis, session)
         self._documents = Documents(session, basis.root)
         self._cover = Cover()
@@ -69,6 +70,17 @@ class Meaning:
             self._cover.recalled = self._documents.counts["recall"] > 0
             self._cover.cancelled = self._documents.counts["cancellation"] > 0
             flaw = self._cover.check(record) or self._turns.check(record)
+            if flaw is None and is_withdrawn(record):
+                flaw = self._withdrawn(record)
         if flaw is None and self._frames is not None:
             self._frames.happened(record, self.preparations.listed)
+        return flaw
+
+    def _withdrawn(self, record: Effect) -> Flaw | None:
+        flaw = self._turns.withdrawn(record)
+        if flaw is None and not self._session.give_back(record.step):
+            text = "a step may come again that is not the one that was admitted last"
+            flaw = Flaw("dispatch/was-sent", text, ref_words(record.ref))
+        if flaw is None:
+            self._cover.withdrawn(record)
         return flaw

@@ -1,6 +1,8 @@
 """What a record is about, in words: a step by its number, a link of a chain by its place, both from 1."""
 
+from rtshcua.evidence.records import Effect
 from rtshcua.model.step_number import step_words
+from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
 
 
@@ -17,3 +19,8 @@ def ref_words(ref: Ref) -> str:
             return f"link {link + 1} of the contingency"
         case _:
             return f"neither a step nor a link: kind {ref.kind}, index {ref.step}, link {ref.link}"
+
+
+def is_withdrawn(record: Effect) -> bool:
+    """Whether an effect says that nothing was sent of a step that was admitted, so that it may come again."""
+    return record.event == "refused" and record.detail == WITHDRAWN

@@ -1,7 +1,8 @@
 """The order of dispatches: what the executor refuses whatever was decided, no log may hold (design 4.5).
 
-One step runs at a time and none comes back; no step follows a return or a landing that a fallback began; chains go
-forward only, and a chain lapses when another step was sent. A dispatch names a skill of the bundle, where it stands.
+One step runs at a time and none comes back, but for one that was withdrawn, of which nothing was sent; no step follows
+a return or a landing that a fallback began; chains go forward only, and a chain lapses when another step was sent. A
+dispatch names a skill of the bundle, where it stands.
 """
 
 from rtshcua.evidence.finding import Flaw
@@ -10,8 +11,10 @@ from rtshcua.ground.auditor.cover import DISPATCHED
 from rtshcua.ground.auditor.named import ref_words
 from rtshcua.ground.auditor.trust import Basis
 from rtshcua.model.flat.contract import Link, MotionKind
-from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
+from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
 
+#: effects that show that a command was sent
+_SHOWS = ("obeyed", "succeeded")
 _REPLACED = "replaced"  # how a command ends in whose place another is sent; no step is sent in the place of a step
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 
@@ -23,6 +26,9 @@ class Turns:
         self._basis = basis
         self._step = -1  # the last that was sent,
         self._running: int | None = None  # and its token, while it runs
+        self._before = -1  # the one that was sent before it
+        self._last: Ref | None = None  # what was dispatched last,
+        self._shown = False  # and whether anything shows that it was sent
         self._fallback = (-1, DEGRADE - 1)  # the step whose chain was last in use, and the last link sent
         self._contingency = -1
         self._homeward = False  # a link began a return or a landing,
@@ -33,6 +39,8 @@ class Turns:
         if record.event != DISPATCHED:
             if record.token == self._running and record.event != _REPLACED:
                 self._running = None
+            if record.event in _SHOWS and record.ref == self._last:
+                self._shown = True
             return None
         if record.detail not in self._skills(record):
             text = "what was sent is not what stands there in the bundle"
@@ -41,6 +49,17 @@ class Turns:
         if flaw is None:
             self._follow(record)
         return flaw
+
+    def withdrawn(self, record: Effect) -> Flaw | None:
+        """What is wrong with an effect that says that nothing was sent of a step, or None: then it may come again."""
+        dispatched = record.ref == self._last
+        unsent = not self._shown and self._running is None if dispatched else record.step > self._step
+        if record.kind != STEP or not unsent:
+            text = "a step may come again of which something may have been sent"
+            return Flaw("dispatch/was-sent", text, _name(record))
+        if dispatched:
+            self._step, self._last = self._before, None
+        return None
 
     def _check_step(self, record: Effect) -> Flaw | None:
         if self._homeward:
@@ -61,8 +80,9 @@ class Turns:
         return Flaw("dispatch/backwards", text, _name(record)) if backwards else None
 
     def _follow(self, record: Effect) -> None:
+        self._last, self._shown = record.ref, False
         if record.kind == STEP:
-            self._step, self._running = record.step, record.token
+            self._before, self._step, self._running = self._step, record.step, record.token
             return
         self._running = None
         kinds = [each.motion.kind for each in self._basis.policy.policy.contracts if each.name == record.detail]

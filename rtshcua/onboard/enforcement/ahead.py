@@ -79,6 +79,7 @@ class FramesAhead:
         self._sign = sign
         self._standing: tuple[bytes, int] | None = None  # the permit of the step, and its number
         self._links: list[_Link] = []
+        self._before: tuple[bytes, int] | None = None  # that of the step before it
         self._due_us = 0
         self._tried_us = 0  # when it was last tried to sign
         self._begins = False  # nothing was signed yet of what stands behind the step
@@ -93,7 +94,13 @@ class FramesAhead:
 
     def stands(self, sealed: bytes, step: int) -> None:
         """A step was sent by this permit: what stands behind it is signed as soon as can be."""
+        self._before = self._standing
         self._standing, self._due_us, self._begins = (sealed, step), 0, True
+
+    def withdrawn(self, sealed: bytes) -> None:
+        """Nothing was sent of a step by this permit, and nothing will be: what stood before it stands."""
+        if self._standing is not None and self._standing[0] == sealed:
+            self._standing, self._due_us, self._begins = self._before, 0, False
 
     def flown(self) -> None:
         """A link was sent: those behind it are signed anew."""

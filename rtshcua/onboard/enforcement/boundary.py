@@ -135,6 +135,10 @@ class SoftwareBoundary:
                 return self._chain.repeat(payload)
         return self._chain.add(Tag.DECIDED, payload)
 
+    def give_back(self, step: int) -> bool:
+        """For the executor, which knows that nothing was sent of a step: see `Session.give_back`."""
+        return self._session.give_back(step)
+
     def consider(self, document: bytes, now: Now) -> Untrusted | None:
         """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick.
 

@@ -5,10 +5,11 @@ checks, in this order: the MAC; that the permit was not used; that it is not lat
 still the one that flies; that a step waits for its turn, and never follows a recall, or a return or a landing that a
 fallback began; that chains go forward only; and that fewer than `MAX_DISPATCHED` were sent. A standing permit is good
 for each of its links once, and for the contingency's last `AGAIN` times more. What it sends, and what it refuses, it
-chains (`wire.boundary_chain`).
+chains (`wire.boundary_chain`). A step of which no frame left may be withdrawn: then it may be decided again, and its
+permit is good for nothing any more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.refusal import Refusal
@@ -21,7 +22,7 @@ from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import ALWAYS, Command
 from rtshcua.wire import boundary_chain
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
-from rtshcua.wire.permit import AGAIN, Permit, open_permit
+from rtshcua.wire.permit import AGAIN, WITHDRAWN, Permit, open_permit
 from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
@@ -42,6 +43,9 @@ OUT_OF_TURN: Final = Refusal("permit/out-of-turn", "it is for a step while anoth
 MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing began, or the mission was called off")
 NOT_DOWN: Final = Refusal("permit/not-down", "the vehicle is not known to stand on the ground, disarmed")
 BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one that was flown")
+# what becomes of one that is given up
+UNSENT: Final = Refusal(WITHDRAWN, "nothing was sent by it, and nothing will be: its step may be decided again")
+SENT: Final = Refusal("permit/sent", "something may have been sent by it, or it is not the turn of its step any more")
 
 
 class Ahead(NamedTuple):
@@ -123,11 +127,16 @@ class Executor:
     """Checks permits under the session key and remembers what was sent.
 
     `frames` is the gate that the vehicle's adapter sends through: the frames of what was dispatched last may pass it.
+    `give_back` gives the id of a step back of which nothing was sent (`Session.give_back`); by default none is.
     """
 
-    def __init__(self, key: bytes, commands: Commands, chain: BoundaryChain | None = None) -> None:
+    def __init__(
+        self, key: bytes, commands: Commands, chain: BoundaryChain | None = None,
+        give_back: Callable[[int], bool] = lambda _: False,
+    ) -> None:  # fmt: skip
         self._key = key
         self._commands = commands
+        self._give_back = give_back
         self._chain = chain or BoundaryChain()
         self._frames = FrameSession()
         self._frames.chain = self._chain
@@ -136,6 +145,7 @@ class Executor:
         self._step = -1  # the last step that was sent,
         self._serial = 0  # its permit,
         self._running = False  # and whether it still runs
+        self._before = (-1, 0)  # the step that was sent before it, and its permit
         self._last = 0  # the permit that was dispatched last, for a step or a link
         self._flight: int | None = None  # the first step permit of this flight
         self._fallback = (-1, _UNTOUCHED)  # the step whose chain was last in use, and the last link sent
@@ -162,6 +172,35 @@ class Executor:
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
         """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
         return self._chained(self._stand_in(sealed, kind, link, now_us), now_us)
+
+    def withdraw(self, sealed: bytes, now_us: int) -> Refusal:
+        """Give the permit of a step up: `UNSENT` where no frame left by it, nor may one have, else why it is not given
+        up. Its step may be decided again then, and nothing stands behind the permit.
+        """
+        permit = open_permit(sealed, self._key)
+        refused = FORGED if permit is None else self._withdraw(permit)
+        self._chain.add(Tag.REFUSED, boundary_chain.refused(refused.slug, now_us))
+        return refused
+
+    def _withdraw(self, permit: Permit) -> Refusal:
+        if self._chain.over:
+            return SESSION_OVER
+        if permit.kind != STEP:
+            return SENT
+        used = permit.serial in self._used
+        if used and not permit.serial == self._serial == self._last:
+            return SENT
+        if (self._frames.let_out if used else permit.step <= self._step) or len(self._used) == MAX_DISPATCHED:
+            return SENT
+        if not self._give_back(permit.step):
+            return SENT
+        self._used.add(permit.serial)
+        if used:
+            self._step, self._serial = self._before
+            self._running = False
+            self._flight = None if self._flight == permit.serial else self._flight
+            self._frames.close()
+        return UNSENT
 
     def _chained(self, found: Command | Refusal, now_us: int) -> Command | Refusal:
         if isinstance(found, Refusal):
@@ -256,6 +295,7 @@ class Executor:
         command = self._commands.command(permit.kind, permit.step, permit.link, permit.serial, until_us)
         self._used.add(permit.serial)
         if permit.kind == STEP:
+            self._before = self._step, self._serial
             self._step, self._serial, self._running = permit.step, permit.serial, True
             self._flight = permit.serial if self._flight is None else self._flight
         else:
@@ -302,10 +342,12 @@ class Executor:
         return None
 
     def _lapsed(self, permit: Permit, *, fallback: bool) -> bool:
-        """Whether nothing stands behind a step's permit: not sent, followed by another step, or landed since."""
-        if self._flight is None or permit.serial not in self._used or permit.serial < self._flight:
+        """Whether nothing stands behind a step's permit: not sent, or withdrawn, followed by another step, or landed
+        since.
+        """
+        if self._flight is None or permit.serial not in self._used:
             return True
-        return fallback and permit.serial != self._serial
+        return not self._flight <= permit.serial <= self._serial or (fallback and permit.serial != self._serial)
 
     def _refuse_link(self, permit: Permit) -> Refusal | None:
         if permit.kind == CONTINGENCY_LINK:

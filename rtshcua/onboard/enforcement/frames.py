@@ -121,6 +121,8 @@ class FrameSession:
         self.chain = BoundaryChain()
         self._signer: SignedLink | None = None
         self._session: _Session | None = None
+        #: whether a frame left, or was signed ahead, since a command was permitted last
+        self.let_out = False
         self._here: tuple[int, int] | None = None  # 1e-7 degree
         self._started = False  # a session was opened: fences stay as they are
         self._system = 0
@@ -143,7 +145,7 @@ class FrameSession:
 
     def open(self, command: Command) -> None:
         """Let out the frames of one command, in place of whatever was let out before."""
-        self._session, self._started = _Session(command), True
+        self._session, self._started, self.let_out = _Session(command), True, False
         self.prepared()
         if self._settled_amsl is None or command.kind == MotionKind.CLIMB:
             self._settled_amsl = self._home_amsl
@@ -221,6 +223,7 @@ class FrameSession:
         if signed is None:
             return TOO_MANY_AHEAD
         self.chain.sign_ahead(frame)
+        self.let_out = True
         return signed[-SIGNATURE:]
 
     def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
@@ -291,5 +294,5 @@ class FrameSession:
             if not turn:
                 return OUT_OF_ORDER
             session.leg = turn[0]
-        session.begun = True
+        session.begun = self.let_out = True
         return None

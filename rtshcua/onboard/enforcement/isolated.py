@@ -38,8 +38,8 @@ Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
-    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG, TIME,
-) = range(1, 23)  # fmt: skip
+    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG, TIME, WITHDRAW,
+) = range(1, 24)  # fmt: skip
 #: octets of a bundle or a document that go in one call
 MAX_PART: Final = 60_000
 
@@ -331,6 +331,14 @@ class IsolatedExecutor:
         else:
             self.frames.ahead.flown()
         return command
+
+    def withdraw(self, sealed: bytes, now_us: int) -> Refusal:
+        """Give the permit of a step up: `UNSENT`, or why it is not given up."""
+        refused = self._caller(WITHDRAW, _TIME.pack(now_us), sealed)
+        if isinstance(refused, Refusal):
+            return refused
+        self.frames.ahead.withdrawn(sealed)
+        return executor.UNSENT
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
         """What may be set of the vehicle from now on, by a preparation permit, or why nothing may."""

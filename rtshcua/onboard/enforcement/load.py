@@ -146,8 +146,9 @@ def session(
     enforced = mode is not Mode.NONE
     chain = BoundaryChain()
     boundary = SoftwareBoundary(in_force, commands, session_key, chain, enforced=enforced)
+    given_back = boundary.give_back if enforced else lambda _: False
     issuer = issuer or PreparationIssuer(session_key, {})
     attestation = Attestation(chain, in_force.flight, bundle, enforced=enforced)
-    executor = Executor(session_key, commands, chain)
+    executor = Executor(session_key, commands, chain, given_back)
     policy, vehicle = in_force.policy, in_force.vehicle
     return Loaded(boundary, executor, in_force, policy, vehicle, mode, issuer, attestation)

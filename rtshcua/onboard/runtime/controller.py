@@ -17,6 +17,7 @@ from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
+from rtshcua.onboard.enforcement import executor, frames
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Expect, Failed, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
@@ -35,6 +36,10 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 REPLAN: Final = "replan"
 #: why a command was not sent that was `late`
 LATE: Final = "nothing was sent: this computer was too busy, or its disk too slow, to send it in its permit's time"
+#: what is `late`: the permit's time was over when it was to be sent, or when its first frame was
+_LATE: Final = ("late", frames.LATE.slug)
+#: and why no command came of a permit in time
+_OVERDUE: Final = (executor.LATE.slug, "time-apart")
 #: what ends a run matters more the further down it stands
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 _UP = LinkState.UP  # an enumeration's attributes are slow to find
@@ -62,6 +67,7 @@ class MissionController:
         self._began_us: int | None = None
         self._recording = True  # records are kept, or the policy does not ask
         self._alone = False  # the boundary is lost
+        self._overdue = False  # the step that is waited for was admitted, and its permit came too late
         self._stopping = False  # somebody asked this program to stop
         self.vehicle = VehicleStatus()
         self.monitor = StateMonitor(loaded.policy)
@@ -192,6 +198,10 @@ class MissionController:
             if now.monotonic_us < released_us + invocation.contract.deadline_us:
                 return self._bide(now, invocation, state)
             return self._come_down(now, cause=Ending.EVIDENCE_LOST)
+        if self._overdue:
+            self._overdue = False
+            if not self.dispatcher.withdraw(now):
+                return self._inadmissible(now, invocation)
         answer = self.admission.ask(now, state, Ref(STEP, invocation.step, -1))
         if answer is None or (answer.outcome is Outcome.DENY and not answer.permit):
             return self._come_down(now)
@@ -227,7 +237,8 @@ class MissionController:
 
     def _start(self, now: Now, invocation: Invocation, answer: Decision) -> bool:
         if not self.dispatcher.fly(now, answer.permit, Ref(STEP, invocation.step, -1), None):
-            return self._inadmissible(now, invocation)
+            self._overdue = self.dispatcher.refused in _OVERDUE
+            return not self._overdue and self._inadmissible(now, invocation)
         prepared = self._loaded.invocations[invocation.step]
         self._supervisor = Supervisor(
             prepared, self._loaded.policy, now.monotonic_us, self.link.away_us(now.monotonic_us)
@@ -311,12 +322,15 @@ class MissionController:
         """A command was refused, its effect did not come, or it was not sent."""
         if self.dispatcher.flying(event.token) is None:
             return
-        text = LATE if event.reason == "late" and not event.text else event.text
+        text = LATE if event.reason in _LATE and not event.text else event.text
         detail = f"{event.reason}: {text}" if text else event.reason
         if self.link.down:
             detail += "; the link is silent: what the vehicle does is not known"
         self.dispatcher.end(now, "failed", detail)
-        if self.stage is _DECIDING and self.aloft:
+        if self.stage is _RUNNING and event.reason in _LATE and self.dispatcher.withdraw(now):
+            self._supervisor = None
+            self.stage = _DECIDING
+        elif self.stage is _DECIDING and self.aloft:
             # It was a hold: whatever the vehicle does, it does not wait where it should.
             self.fall_back(FALLBACK_LINK, holds=False)
         elif self.stage is not _RUNNING:

@@ -1,7 +1,7 @@
 """The dispatcher: hands permits to the executor, keeps the one command that flies, and measures how long that takes."""
 
 from collections import deque
-from typing import Final
+from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
@@ -10,6 +10,7 @@ from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.isolated import IsolatedExecutor
 from rtshcua.onboard.ports import Command, Frozen, Hindered, Obeyed, Release
 from rtshcua.onboard.runtime.journal import Detail, Journal
+from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
 #: Assumed until enough was measured, in us: an order above anything seen on the machines this was built on.
@@ -58,6 +59,15 @@ class Active(Frozen):
         return self.command.kind in (MotionKind.HOME, MotionKind.LAND)
 
 
+class _Tried(NamedTuple):
+    """A step's permit, and how it was before that was dispatched."""
+
+    ref: Ref
+    permit: bytes
+    standing: tuple[int, bytes] | None
+    dispatched: bool
+
+
 class Dispatcher:
     """At most one command flies; a new one replaces it."""
 
@@ -71,16 +81,34 @@ class Dispatcher:
         self.used = False  # and in this run, as its log tells: it stays after a landing
         self.hindrance = ""  # what is known to keep the command that flies from getting on
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
+        self._tried: _Tried | None = None  # the last step that was to be sent
+        self.refused = ""  # why nothing was sent by the last permit; empty where something was
 
     def fly(self, now: Now, permit: bytes, ref: Ref, lasting_us: int | None) -> bool:
         """Dispatch what the permit is for, for at most `lasting_us` (None: until it succeeds or fails).
 
         False if the executor refused, and then nothing is sent.
         """
+        if ref.kind == STEP:
+            self._tried = _Tried(ref, permit, self._standing, self.dispatched)
         sent = self._send(now, self._executor.dispatch(permit, now.monotonic_us), ref, lasting_us)
         if sent and ref.kind == STEP:
             self._standing = (ref.step, permit)
         return sent
+
+    def withdraw(self, now: Now) -> bool:
+        """Give the permit of the last step up, which came too late: whether the boundary found that nothing was sent by
+        it. Then all is as before, and the step may be asked for again.
+        """
+        tried, self._tried = self._tried, None
+        if tried is None:
+            return False
+        refused = self._executor.withdraw(tried.permit, now.monotonic_us)
+        self._journal.effect(now, "refused", tried.ref, detail=refused.slug)
+        if refused.slug != WITHDRAWN:
+            return False
+        self._standing, self.dispatched, self.used = tried.standing, tried.dispatched, True
+        return True
 
     def stand_in(self, now: Now, ref: Ref, lasting_us: int) -> bool:
         """As `fly`, for a link, by the permit of the last step that was sent, which stands for it."""
@@ -90,6 +118,7 @@ class Dispatcher:
         return self._send(now, self._executor.stand_in(permit, ref.kind, ref.link, now.monotonic_us), ref, lasting_us)
 
     def _send(self, now: Now, command: Command | Refusal, ref: Ref, lasting_us: int | None) -> bool:
+        self.refused = command.slug if isinstance(command, Refusal) else ""
         if isinstance(command, Refusal):
             self._journal.effect(now, "refused", ref, detail=command.slug)
             return False

@@ -128,6 +128,45 @@ def test_what_uses_an_id_up(
     assert (of.turns(), of.used()) == (turns, used)
 
 
+@rows(
+    ("asked", "step", "given", "turns", "used"),
+    [
+        ((), 0, False, [0], []),  # nothing was admitted
+        ((0,), 0, True, [0, 1], []),
+        ((0,), 1, False, [0, 1], [0]),
+        ((0,), -1, False, [0, 1], [0]),
+        ((0, 1), 1, True, [0, 1, 2], [0]),
+        ((0, 1), 0, False, [0, 1, 2], [0, 1]),  # its turn is over
+        ((0, 1, 0), 1, True, [0, 1, 2], [0]),  # a replay changes nothing
+    ],
+)
+def test_the_id_of_the_last_step_is_given_back(
+    asked: tuple[int, ...], step: int, given: bool, turns: list[int], used: list[int]
+) -> None:
+    of = Asked()
+    for each in asked:
+        of.step(each)
+    assert of.session.give_back(step) is given
+    assert not of.session.give_back(step), "once"
+    assert (of.turns(), of.used()) == (turns, used)
+    if given:
+        assert of.step(step) is ALLOW
+
+
+def test_a_step_that_only_waits_has_no_id_to_be_given_back() -> None:
+    of = Asked()
+    assert of.step(0, EMPTY) is DEFER
+    assert not of.session.give_back(0)
+
+
+def test_a_step_that_was_given_back_is_not_admitted_after_its_deadline() -> None:
+    of = Asked()
+    of.step(0)
+    assert of.session.give_back(0)
+    assert of.step(0, **LATE) is FALLBACK
+    assert of.used() == [0]
+
+
 def test_a_step_that_was_passed_over_has_no_turn_any_more() -> None:
     of = Asked()
     assert of.step(0, {BATTERY: None}) is DEFER
@@ -307,6 +346,17 @@ def test_only_a_step_that_waits_to_be_replaced_is_replaced_though_it_was_asked_f
     if slug == "accepted":
         assert (asked.turns()[:1], asked.used()) == ([0], [])
         assert asked.step(0) is ALLOW
+
+
+def test_a_step_that_was_given_back_may_be_replaced() -> None:
+    of = with_mission(OnInadmissible.REPLAN)
+    asked = Asked(of)
+    asked.step(0)
+    anew = replace(of.bundle.mission, issued_at_us=of.bundle.mission.issued_at_us + 1)
+    paper = documents.replacement(of, 0, anew)
+    assert asked.session.take(paper, NOW).slug == "already-released"
+    assert asked.session.give_back(0)
+    assert asked.session.take(paper, NOW).slug == "accepted"
 
 
 def test_a_replacement_brings_steps_that_were_never_used() -> None:

@@ -1,6 +1,7 @@
 """Whole runs over a fake vehicle: what the mission does on each outcome (design section 4.4)."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -23,9 +24,11 @@ from reference.flat_case import (
     S,
 )
 from reference.world import TICK, FakeVehicle, Run, assert_audited, loaded
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import QUANTITY, Motion, MotionKind, Parameter
 from rtshcua.model.flat.mission import Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import AirState, Ending, Failed, Hindered, Readings, Ready, Succeeded
 from rtshcua.onboard.runtime.limits import Limits
@@ -462,10 +465,86 @@ def test_words_about_commands_that_are_over_mean_nothing() -> None:
     assert run.until_over().ending is Ending.COMPLETED
 
 
-def test_a_command_that_was_not_sent_in_time_falls_back() -> None:
-    run = start().until_flies("goto")
+@pytest.mark.parametrize("reason", ["late", "frame/late"])
+@pytest.mark.parametrize("skill", ["takeoff", "goto"])
+def test_a_step_of_which_nothing_was_sent_in_time_is_tried_again(skill: str, reason: str) -> None:
+    run = start().until_flies(skill)
+    step, released_us = run.runtime.view(run.clock.now()).step, released(run)
+    run.tick(Failed(0, run.vehicle.commands[-1].token, reason))
+    assert run.flown[-2:] == [skill, skill]
+    assert run.decisions[-2:] == [(0, step, -1, "allow", "admitted")] * 2
+    assert [each["detail"] for each in run.records if each.get("event") == "refused"] == ["permit/unsent"]
+    assert released(run) == released_us, "its deadline stays"
+    assert run.until_over().ending is Ending.COMPLETED
+
+
+def released(run: Run) -> int:
+    """When the step that was decided last was released."""
+    context = [record["context"] for record in run.records if record["type"] == "decision"][-1]
+    assert isinstance(context, dict)
+    return int(context["released_us"])
+
+
+@pytest.mark.parametrize(("skill", "flown", "ending"), [
+    ("takeoff", ["takeoff"], Ending.REFUSED), ("goto", ["takeoff", "goto", "hover"], Ending.ABORTED),
+])  # fmt: skip
+def test_a_step_that_is_late_again_and_again_is_tried_up_to_its_deadline(
+    skill: str, flown: list[str], ending: Ending
+) -> None:
+    run = start().until_flies(skill)
+    began_us, tries = run.clock.now().monotonic_us, 0
+    while run.ending is None and run.flown[-1] == skill:
+        tries += 1
+        run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+    waited_us = run.clock.now().monotonic_us - began_us
+    assert waited_us <= INVOCATIONS[0].contract.deadline_us + TICK
+    assert 2 < tries <= waited_us // TICK + 1
+    (last,) = run.decisions[-1:] if ending is Ending.REFUSED else run.decisions[-2:-1]
+    assert last[3:] == ("fallback", "timing/no-slack"), run.decisions
+    assert list(dict.fromkeys(run.flown)) == flown
+    assert run.until_over().ending is ending
+
+
+@pytest.mark.parametrize("skill", ["takeoff", "goto"])
+def test_a_step_of_which_a_frame_left_does_not_come_again(skill: str) -> None:
+    run = start().until_flies(skill)
+    assert isinstance(run.loaded.executor, Executor)
+    run.loaded.executor.frames.let_out = True
     run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
-    assert run.flown[-1] == "hover"
+    assert run.flown.count(skill) == 1
+    assert [each["detail"] for each in run.records if each.get("event") == "refused"] == ["permit/sent"]
+    run.until_over()
+
+
+def test_a_hold_that_was_late_is_none_of_a_step() -> None:
+    run = start().until_flies("goto")
+    run.vehicle.values[WIND] = 12 * M
+    run.until_flies("hover")
+    run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+    assert "refused" not in run.events
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_permit_that_comes_too_late_by_the_boundarys_clock_is_given_up_later(again: bool) -> None:
+    """The process stood still between decision and dispatch: in the same moment nothing can be done about it."""
+    run = start(ready=False)
+    executor: Any = run.loaded.executor
+    dispatch, slow = executor.dispatch, [Refusal("time-apart", "")]
+
+    def apart(sealed: bytes, now_us: int) -> Any:
+        return slow.pop() if slow else dispatch(sealed, now_us)
+
+    executor.dispatch = apart
+    if not again:
+        executor.withdraw = lambda *_: Refusal("permit/sent", "")
+    run.step(AirState(0, False, False), *run.vehicle.poll(run.clock.now().monotonic_us), Ready(0))
+    assert (run.flown, run.ending) == ([], None)
+    run.tick()
+    assert run.flown == ["takeoff"] * again
+    assert [each["detail"] for each in run.records if each.get("event") == "refused"] == [
+        "time-apart", "permit/unsent" if again else "permit/sent",
+    ]  # fmt: skip
+    assert run.until_over().ending is (Ending.COMPLETED if again else Ending.REFUSED)
 
 
 def test_readings_that_make_no_sense_are_unknown_or_ignored() -> None:

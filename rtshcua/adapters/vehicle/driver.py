@@ -282,13 +282,15 @@ class Driver:
             events.append(ports.Ready(now_us, self._flown_by_others()))
         if not self._was_ready and self._unfit_us is not None:
             self._judge_fitness(now_us, events)
-        if self._gate_may_be_lost:
-            self._renew_ahead(now_us, events, begins=False)
         if seen.notes or self.stream_requests.notes or self.preflight.notes or self._telemetry.notes:
             self._tell_notes(now_us, events)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         frames = self._pack(send, now_us, events) if send else []
+        if self._gate_may_be_lost:
+            if self._flies_without_frame:
+                self._renew_ahead(now_us, events, begins=True)
+            self._renew_ahead(now_us, events, begins=False)
         if self.settings.outstanding:
             frames += self._set_parameters(now_us)
         return events, frames
@@ -352,8 +354,6 @@ class Driver:
         self._unsent = command.token
         events: list[Event] = []
         send: list[Message] = []
-        if self._gate_may_be_lost:
-            self._renew_ahead(now_us, events, begins=True)  # what brings it down is there before it sets off
         self._advance(now_us, send, events)
         return events, self._pack(send, now_us, events)
 
@@ -366,6 +366,14 @@ class Driver:
     def _renew_ahead(self, now_us: int, events: list[Event], *, begins: bool) -> None:
         notes = self.link.renew_ahead(self._encoded, now_us, begins=begins)
         events += [ports.Noted(now_us, text) for text in notes]
+
+    @property
+    def _flies_without_frame(self) -> bool:
+        """Whether a step is under way that needed no frame so far."""
+        of = self._manoeuvre
+        if of is None or not of.command.needs_record or self._unsent != of.token:
+            return False
+        return not (of.over or of.awaits_frame)
 
     def _encoded(self, command: Command) -> Sequence[Message]:
         """What a command would be flown by from here, retries included; nothing where that is not known."""
@@ -706,6 +714,10 @@ class Driver:
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary lets out. A manoeuvre that it stops has failed."""
+        of = self._manoeuvre
+        begins = self._gate_may_be_lost and self._moving and self._unsent is not None and of is not None
+        if begins and of is not None and now_us <= of.command.not_after_us:
+            self._renew_ahead(now_us, events, begins=True)  # what brings it down is there before it sets off
         frames, refused = self.link.pack(send, now_us)
         moving, self._moving = self._moving, False
         if moving and frames:

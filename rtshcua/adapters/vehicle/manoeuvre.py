@@ -392,7 +392,7 @@ class Manoeuvre:
         self, command: Command, aids: Aids, seen: ObservedVehicle, stages: list[Stage], before: frozenset[int],
         doubted: str | None = None,
     ) -> None:  # fmt: skip
-        self._command = command
+        self.command = command
         self.token = command.token
         self._aids = aids
         self._flavour = aids.flavour
@@ -437,6 +437,11 @@ class Manoeuvre:
             named.asks, self._aids.query.wants_target = False, True
             return True
         return self._waits and not self.over
+
+    @property
+    def awaits_frame(self) -> bool:
+        """Whether the frame of its stage was not sent yet."""
+        return self._waits
 
     @property
     def modes(self) -> frozenset[int]:
@@ -491,7 +496,7 @@ class Manoeuvre:
         pace = self._pace
         if pace is None or not self._aids.targets.shown or not pace.look(seen, self._way_left(seen)):
             return ()
-        told = f"it flies at {(pace.slow or 0) / 1_000:.1f} m/s where {self._command.speed / 1_000:.1f} m/s were told"
+        told = f"it flies at {(pace.slow or 0) / 1_000:.1f} m/s where {self.command.speed / 1_000:.1f} m/s were told"
         return [Hindered(now_us, self.token, f"{told}: somebody else may have set its speed")]
 
     # -------------------------------------------------------- what is sent
@@ -505,11 +510,11 @@ class Manoeuvre:
         stage = self._left[0]
         self._before, self._modes = self.modes, stage.modes
         self._progress = None if stage.progress is None else StageProgress(stage.progress)
-        leg = self._command.kind in _LEGS and stage.progress is not None
-        climb = self._command.kind == MotionKind.CLIMB and stage.progress is not None
+        leg = self.command.kind in _LEGS and stage.progress is not None
+        climb = self.command.kind == MotionKind.CLIMB and stage.progress is not None
         watches = (leg or climb) and self._flavour.names_targets
         self._pause = PauseWatch(climb=climb) if watches else None
-        self._pace = SpeedWatch(self._command.speed) if leg else None
+        self._pace = SpeedWatch(self.command.speed) if leg else None
         if stage.stops and self._stop is None:
             self._stop = BrakingWatch(self._aids.brakes, seen)
         self._waits = stage.message is not None
@@ -518,7 +523,7 @@ class Manoeuvre:
 
     def _may_send(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether it is known well enough who flies, for a frame that moves the vehicle (docs/adr/0034)."""
-        query, urgent = self._aids.query, self._command.kind in _URGENT
+        query, urgent = self._aids.query, self.command.kind in _URGENT
         if self._aids.suspicion.stands or self._aids.contradictions.stand(now_us):
             return False
         if self._is_unnamed(seen, now_us):
@@ -534,7 +539,7 @@ class Manoeuvre:
 
     def _answers_late(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether a frame that names a mode, and so would undo one, waits no longer for the answer to its question."""
-        if self._command.kind not in _HOMEWARD:
+        if self.command.kind not in _HOMEWARD:
             return True
         if self._asked_us is None:
             self._asked_us = now_us
@@ -555,7 +560,7 @@ class Manoeuvre:
         self._waits, self._entered_us, self._changed, self._asked_us = False, seen.up_us, True, None
         self._doubted = self._suspected = None
         target = self._left[0].target
-        if target is not None or self._command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
+        if target is not None or self.command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
             self._aids.targets.expect(target, seen)
             self._aimed = True
         if self._left[0].spare and self._is_done(seen):
@@ -607,8 +612,8 @@ class Manoeuvre:
     def _ends_us(self) -> int:
         """When, in link time, the present stage may be over, or have failed, with nothing more seen."""
         if not self._left:
-            ends = self._held_us is not None and self._command.hold_us
-            return (self._held_us or 0) + self._command.hold_us if ends else NEVER
+            ends = self._held_us is not None and self.command.hold_us
+            return (self._held_us or 0) + self.command.hold_us if ends else NEVER
         if self._waits:
             return self._entered_us + MODE_UNKNOWN_US
         at_us = self._shows_us if self._is_followed else min(self._commander.due_us, self._shows_us)
@@ -634,16 +639,16 @@ class Manoeuvre:
 
     def _has_held(self, seen: ObservedVehicle) -> bool:
         """Whether a vehicle that came to stand has done so for the time of a HOLD, and stands still now."""
-        if self._command.kind != MotionKind.HOLD:
+        if self.command.kind != MotionKind.HOLD:
             return True
         if self._held_us is None:
             self._held_us = seen.up_us
-        over = bool(self._command.hold_us) and seen.up_us - self._held_us >= self._command.hold_us
+        over = bool(self.command.hold_us) and seen.up_us - self._held_us >= self.command.hold_us
         return over and still(seen)
 
     def _left_its_place(self, seen: ObservedVehicle) -> str | None:
         """Why a vehicle that came to stand for a HOLD does not hold, as a slug."""
-        if self._command.kind != MotionKind.HOLD:
+        if self.command.kind != MotionKind.HOLD:
             return None
         if seen.down:
             return "disarmed"
@@ -669,7 +674,7 @@ class Manoeuvre:
         return found
 
     def _found(self, seen: ObservedVehicle) -> tuple[str, str, int] | None:
-        homeward = self._command.kind in _HOMEWARD and self._doubted is None
+        homeward = self.command.kind in _HOMEWARD and self._doubted is None
         if homeward and seen.may_rest:  # it is done: no flight is left
             return None
         if seen.mode in self._modes and seen.mode != self._suspected:
@@ -692,7 +697,7 @@ class Manoeuvre:
         if self._taken or self._aids.suspicion.stands or seen.mode not in self.modes:
             return None
         if not self._names_target(seen):  # in a climb it names none
-            paused = self._command.kind == MotionKind.CLIMB and self._is_paused(seen, now_us)
+            paused = self.command.kind == MotionKind.CLIMB and self._is_paused(seen, now_us)
             return "paused" if paused else None
         if self._aids.named.is_gone(seen, now_us, self._aids.query.asked):
             return "no target"
@@ -706,7 +711,7 @@ class Manoeuvre:
         it says that it flies there, or it rises no further, however little is missing. What never rose at all may be
         without propellers, and is to be told to land.
         """
-        if self._command.kind == MotionKind.CLIMB:
+        if self.command.kind == MotionKind.CLIMB:
             rose = self._progress is not None and self._progress.shown
             kept = stands_idly(seen, self._way_left(seen), now_us, far=0, climb=True)
             return rose and kept and self._flavour.names_targets

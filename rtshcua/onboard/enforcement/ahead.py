@@ -93,7 +93,9 @@ class FramesAhead:
     # -------------------------------------------------------- while the boundary is there
 
     def stands(self, sealed: bytes, step: int) -> None:
-        """A step was sent by this permit: what stands behind it is signed as soon as can be."""
+        """A step was sent by this permit: what stands behind it is signed when it begins. Not before, for a step that
+        comes too late is decided again only if nothing that may be sent was signed by then.
+        """
         self._before = self._standing
         self._standing, self._due_us, self._begins = (sealed, step), 0, True
 
@@ -104,7 +106,7 @@ class FramesAhead:
 
     def flown(self) -> None:
         """A link was sent: those behind it are signed anew."""
-        self._due_us = 0
+        self._due_us, self._begins = 0, False
 
     def lapse(self) -> None:
         """The vehicle landed: nothing stands any more."""
@@ -116,10 +118,10 @@ class FramesAhead:
         self._latest = timestamp_in(octets)
 
     def renew(self, encode: Encode, now_us: int, *, begins: bool = False) -> Sequence[str]:
-        """Have signed what is due; of links that could not be, why, in words. `begins`: nothing but what a step needs
-        that is about to begin.
+        """Have signed what is due; of links that could not be, why, in words. `begins`: a step is about to begin, and
+        nothing but what it needs is signed; else nothing before it did.
         """
-        if self._standing is None or (begins and not self._begins):
+        if self._standing is None or begins is not self._begins:
             return ()
         is_short = self._is_short() and now_us >= self._tried_us + _AGAIN_US
         if now_us < self._due_us and not is_short:

@@ -73,7 +73,7 @@ def frame(skill: str, confirmation: int = 0, height: float = 0.0) -> Frame:
 def made(boundary: Boundary | None = None) -> FramesAhead:
     of = FramesAhead(Commands(POLICY, MISSION), (boundary or Boundary()).sign)
     of.stands(PERMIT, STEP)
-    assert of.renew(encode, 0) == []
+    assert of.renew(encode, 0, begins=True) == []
     return of
 
 
@@ -180,7 +180,7 @@ def test_what_home_and_our_time_make_of_a_frame_is_no_other_frame(kind_of_place:
 
     of = FramesAhead(Commands(POLICY, MISSION), Boundary().sign)
     of.stands(PERMIT, STEP)
-    of.renew(lambda _: [target(500.0)], 0)
+    of.renew(lambda _: [target(500.0)], 0, begins=True)
     of.begin(FALLBACK_LINK, 0)
     again, elsewhere = read_frame(target(500.7, 9)), read_frame(pack(messages.reposition_amsl(1, 5, 7, 500.0, 4_000)))
     assert again is not None
@@ -237,7 +237,32 @@ def test_another_step_takes_the_place_of_the_one_before() -> None:
     assert of.begin(FALLBACK_LINK, 0) is None, "until its own chain is signed"
     assert of.begin(CONTINGENCY_LINK, 0) is not None
     of.renew(encode, 1)
+    assert of.begin(FALLBACK_LINK, 0) is None, "nothing is signed before it begins"
+    of.renew(encode, 1, begins=True)
     assert of.begin(FALLBACK_LINK, 0) is not None
+
+
+@pytest.mark.parametrize("permit", [PERMIT, b"another"])
+def test_what_stood_before_a_step_that_was_withdrawn_stands_again(permit: bytes) -> None:
+    boundary = Boundary()
+    of = made(boundary)
+    signed = len(boundary.asked)
+    of.stands(b"another", STEP + 1)
+    of.withdrawn(permit)
+    of.renew(encode, 1)
+    assert len(boundary.asked) == signed * (1 if permit == PERMIT else 2)
+    assert (of.begin(FALLBACK_LINK, 0) is None) is (permit == PERMIT)
+
+
+def test_nothing_stands_once_the_first_step_was_withdrawn() -> None:
+    boundary = Boundary()
+    of = FramesAhead(Commands(POLICY, MISSION), boundary.sign)
+    of.withdrawn(PERMIT)
+    of.stands(PERMIT, STEP)
+    of.withdrawn(PERMIT)
+    for begins in (True, False):
+        assert of.renew(encode, 1, begins=begins) == ()
+    assert boundary.asked == []
 
 
 def test_a_step_that_begins_waits_for_what_stands_behind_it_and_a_link_for_nothing() -> None:
@@ -274,7 +299,7 @@ def test_what_cannot_be_signed_is_told() -> None:
     boundary.refused = {CHAIN[0]: "frame/not-covered"}
     of = FramesAhead(Commands(POLICY, MISSION), boundary.sign)
     of.stands(PERMIT, STEP)
-    assert of.renew(encode, 0) == ["`hover` cannot be signed ahead: frame/not-covered"]
+    assert of.renew(encode, 0, begins=True) == ["`hover` cannot be signed ahead: frame/not-covered"]
     of.flown()
     assert len(of.renew(lambda command: () if command.skill == "emergency_land" else encode(command), 1)) == 3
 
@@ -315,7 +340,7 @@ def test_a_link_with_more_frames_than_a_call_takes_is_left_out_with_a_note(longe
         return [frames[0]] * (ahead.MOST + 1) if command.skill == longest else frames
 
     note = f"`{longest}` cannot be signed ahead: {ahead.MOST + 1} frames, {ahead.MOST} at most"
-    assert of.renew(many, 0) == [note] * 2
+    assert of.renew(many, 0, begins=True) == [note] * 2
     left = [number for number, skill in enumerate(MODES) if skill != longest]
     assert boundary.asked == [(kind, number) for kind in (FALLBACK_LINK, CONTINGENCY_LINK) for number in left]
     assert of.renew(many, 1) == ()
@@ -343,6 +368,6 @@ def test_no_call_has_more_frames_than_the_boundary_takes() -> None:
 
     of = FramesAhead(Commands(POLICY, MISSION), sign)
     of.stands(PERMIT, STEP)
-    of.renew(lambda command: [*encode(command)] * 4, 0)
+    of.renew(lambda command: [*encode(command)] * 4, 0, begins=True)
     assert max(sizes) <= ahead.MOST
     assert sizes[-1] > sizes[0]

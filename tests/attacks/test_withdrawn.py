@@ -1,0 +1,208 @@
+"""Threat: a runtime that was taken over says that nothing was sent of a step, to have it admitted and flown again; or
+who has the log's keys writes so, to hide that it flew twice, or that it came again.
+
+Outcomes: the boundary gives the id of a step back by what it let out itself, and by nobody's word. In a log it is
+noticed by what shows that the step was flown, by the frames beside it, and by what the boundary signed.
+"""
+
+import ctypes
+import struct
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import pytest
+
+from attacks.test_frames_ahead import Thief, pack
+from boundary.conftest import boundary as boundary
+from boundary.losing import KEY, Apart
+from boundary.test_lost import apart as apart
+from boundary.test_lost import config
+from reference.forgery import ROOT_KEY, edit, expect, read, signed, sound
+from reference.kept_frames import Entries, kept
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.flavour import Stage
+from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.ground.auditor.frames import OURS, Frames
+from rtshcua.ground.auditor.sent import Nature, nature
+from rtshcua.ground.auditor.sent import read as read_frame
+from rtshcua.mavlink.modes import Px4Mode
+from rtshcua.onboard.enforcement.isolated import AHEAD, WITHDRAW
+from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.ports import Ending
+from rtshcua.wire.permit import SIZE
+from rtshcua.wire.request import CONTINGENCY_LINK
+from virtual.flight import Flight
+from virtual.late import bundle, flight, late
+
+Lines = tuple[bytes, ...]
+
+
+# ---------------------------------------------------------------- the runtime
+
+
+def withdrawn(thief: Thief, permit: bytes) -> str:
+    """What the boundary says to a runtime that says that nothing was sent by a permit."""
+    answer = thief.of._answer(bytes([WITHDRAW]) + struct.pack(">q", thief.of.flight.clock.monotonic_us) + permit)
+    return answer[1:].decode() if answer[0] else "unsent"
+
+
+def test_a_step_of_which_frames_left_is_not_given_back(apart: Callable[..., Apart]) -> None:
+    thief = Thief(apart("px4", legs=2)).until(1)
+    up, leg = thief.permits[:2]
+    assert {withdrawn(thief, permit) for permit in (up, leg)} == {"permit/sent"}
+    thief.of.flight.loaded.executor.ended()
+    assert withdrawn(thief, leg) == "permit/sent", "nor once it ended"
+
+
+def test_a_step_of_which_something_was_signed_ahead_is_not_given_back(apart: Callable[..., Apart]) -> None:
+    """The frames of its links may have been sent, which the boundary does not see."""
+    thief = Thief(apart("px4", legs=1))
+    while not thief.permits:
+        assert thief.of.flight.turn() is None
+    (up,) = thief.permits
+    thief.signed(up, CONTINGENCY_LINK, 2, pack(messages.set_mode(1, Px4Mode.LAND)))
+    assert withdrawn(thief, up) == "permit/sent"
+
+
+@pytest.mark.parametrize("at_its_frame", [False, True])
+def test_a_takeoff_that_was_late_flies_where_frames_are_signed_ahead(
+    boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch, at_its_frame: bool
+) -> None:
+    """Late when it was to be sent, or when its first frame was: nothing was signed ahead by then."""
+
+    def make() -> Flight:
+        return Apart(boundary, monkeypatch, bundle(), config("px4", KEY), KEY).flight
+
+    flown: Any = late(make, at_its_frame=at_its_frame).fly()
+    assert flown.ending is Ending.COMPLETED
+    assert [each["detail"] for each in flown.effects("refused")] == ["permit/unsent"]
+    assert flown.dispatched()[:2] == ["takeoff", "takeoff"]
+
+
+def test_what_stands_behind_a_step_is_signed_as_it_begins_though_it_needs_no_frame(apart: Callable[..., Apart]) -> None:
+    of = apart("px4", legs=1)
+    thief, signed = Thief(of), list[bytes]()
+    answer = of._answer
+
+    def spied(octets: bytes) -> bytes:
+        if octets[0] == AHEAD:
+            signed.append(octets[11 : 11 + SIZE])
+        return answer(octets)
+
+    def stays(*_: object) -> list[Stage]:
+        return [Stage(None, None, lambda _: False, frozenset(Px4Mode))]
+
+    of._answer = spied
+    of.vehicle.driver._manoeuvres = {"px4.goto": stays}
+    while len(thief.permits) < 2:
+        of.flight.turn()
+    before = signed.count(thief.permits[1])
+    for _ in range(3):
+        of.flight.turn()
+    assert before == 0
+    assert signed.count(thief.permits[1]) > 3
+
+
+# ---------------------------------------------------------------- the log
+
+
+@cache
+def tried_twice(attested: bool) -> tuple[Lines, tuple[tuple[int, bytes], ...]]:
+    """A flight whose take-off was late once: its lines, and its frames."""
+    entries = list[Entries]()
+
+    def make() -> Flight:
+        made = flight(attested=attested)
+        entries.append(kept(made))
+        return made
+
+    return tuple(late(make).fly().lines), tuple(entries[-1])
+
+
+def moment(line: bytes) -> dict[str, int]:
+    return {name: read(line)[name] for name in ("at_us", "utc_us", "utc_error_us")}
+
+
+def where(lines: Lines, event: str) -> list[int]:
+    return [number for number, line in enumerate(lines) if event in (read(line).get("event"), read(line)["type"])]
+
+
+@pytest.mark.parametrize("mode", [Mode.SOFTWARE, Mode.PROCESS])
+def test_the_log_of_a_flight_whose_takeoff_was_late_is_sound(mode: Mode) -> None:
+    flown: Any = late(lambda: flight(mode=mode)).fly()
+    assert flown.ending is Ending.COMPLETED
+    assert flown.dispatched() == ["takeoff", "takeoff", "return_home"]
+    (failed,) = flown.effects("failed")
+    assert failed["detail"].startswith("late: nothing was sent: this computer was too busy")
+    sound(flown.lines)
+
+
+@pytest.mark.parametrize("attested", [False, True])
+def test_that_a_step_came_again_is_not_left_out(attested: bool) -> None:
+    lines, _ = tried_twice(attested)
+    (unsent,) = where(lines, "refused")
+    again = where(lines, "decision")[1]
+    slug, record = expect(signed([*lines[:unsent], *lines[unsent + 1 :]]))
+    if attested:
+        assert slug == "boundary/differs"
+    else:
+        assert (slug, record) == ("decision/consumed", again - 1)
+
+
+@pytest.mark.parametrize("attested", [False, True])
+@pytest.mark.parametrize("event", ["obeyed", "succeeded"])
+def test_a_step_that_was_flown_is_not_called_unsent(attested: bool, event: str) -> None:
+    lines, _ = tried_twice(attested)
+    (unsent,) = where(lines, "refused")
+    flown = next(number for number in where(lines, event) if read(lines[number])["step"] == 0)
+    lie = edit(lines[unsent], **moment(lines[flown]))
+    slug, record = expect(signed([*lines[: flown + 1], lie, *lines[flown + 1 :]]))
+    assert record == flown + 1
+    assert slug in (("boundary/differs", "boundary/invented") if attested else ("dispatch/was-sent",))
+
+
+def test_a_step_that_runs_or_whose_link_flew_is_not_called_unsent() -> None:
+    lines, _ = tried_twice(False)
+    (unsent,), (failed,) = where(lines, "refused"), where(lines, "failed")
+    assert expect(signed([*lines[:failed], *lines[failed + 1 :]])) == ("dispatch/was-sent", unsent - 1)
+    of_link = {"kind": CONTINGENCY_LINK, "step": -1, "link": 2, "token": 99, "detail": "emergency_land"}
+    link = edit(lines[where(lines, "dispatched")[0]], **of_link, **moment(lines[failed]))
+    flew = [*lines[:unsent], link, *lines[unsent:]]
+    assert expect(signed(flew)) == ("dispatch/was-sent", unsent + 1)
+
+
+@pytest.mark.parametrize("of", [{"kind": 1, "link": 0}, {"step": 1}, {"kind": CONTINGENCY_LINK, "step": -1, "link": 0}])
+def test_no_link_and_no_other_step_is_called_unsent(of: dict[str, int]) -> None:
+    lines, _ = tried_twice(False)
+    (unsent,) = where(lines, "refused")
+    lie = edit(lines[unsent], **of)
+    assert expect(signed([*lines[:unsent], lie, *lines[unsent + 1 :]])) == ("dispatch/was-sent", unsent)
+
+
+def judged(lines: Lines, entries: Entries) -> str | None:
+    """What is found in the frames beside a log."""
+    frames = Frames(iter(entries))
+    auditor = Auditor(ROOT_KEY, frames=frames)
+    for line in lines:
+        auditor.take(line)
+    found = auditor.audit().report.failure or frames.over()
+    return None if found is None else found.slug
+
+
+@pytest.mark.parametrize("attested", [False, True])
+def test_a_frame_that_left_is_found_beside_a_log_that_says_that_nothing_did(attested: bool) -> None:
+    lines, entries = tried_twice(attested)
+    assert judged(lines, list(entries)) is None
+    (unsent,), first = where(lines, "refused"), where(lines, "dispatched")[0]
+    sent = read(lines[where(lines, "dispatched")[1]])["utc_us"]
+    moving = next(octets for at_us, octets in entries if at_us >= sent and is_motion(octets))
+    began, over = read(lines[first])["utc_us"], read(lines[unsent])["utc_us"]
+    for at_us in (began + 1, over - 1):
+        beside = sorted([*entries, (at_us, moving)], key=lambda entry: entry[0])
+        assert judged(lines, beside) == "frames/was-sent", at_us
+
+
+def is_motion(octets: bytes) -> bool:
+    frame = read_frame(octets)
+    return frame is not None and frame.component == OURS and nature(frame) is Nature.COMMAND

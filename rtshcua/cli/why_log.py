@@ -26,6 +26,8 @@ from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
 from rtshcua.ground.why.link import of_contingency, trace_link
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
+from rtshcua.model.outcome import Reason
+from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import STEP
 
 #: effects that turn a flight homeward, or end it
@@ -38,6 +40,7 @@ _TURNS = frozenset({
 _FOLLOWS = frozenset({"stood-down", "not-landed", "stranded", "left", "resumed", "already-airborne"})
 #: what is over when something else is recorded
 _OVER = {"link-back": ("link-lost", "long-silence"), "gap-over": ("gap",)}
+_NO_SLACK = Reason.NO_SLACK.value
 _MOST = 20  # what is told of how it ended, in records
 
 
@@ -63,6 +66,7 @@ class _Log:
         self.cause: _Told | None = None  # why it ended early, if it did
         self._caused_by = ""  # the event of that
         self._falls = False  # a link flies: what comes now is no cause any more
+        self._late = False  # what came too late was the cause, as far as nothing else is
         self._path, self._number = path, number
         self._names = Names(None)
         self._in_force: Subject | None = None
@@ -128,11 +132,13 @@ class _Log:
             if record.kind != STEP:
                 self._falls = True
             elif record.outcome == "allow":
-                self.cause, self._caused_by, self._falls = None, "", False
-            elif record.outcome != "defer" and not self._falls:
+                self.cause, self._caused_by, self._falls, self._late = None, "", False, False
+            elif record.outcome != "defer" and not self._falls and not (self._late and record.reason == _NO_SLACK):
                 self.cause, self._caused_by = self._tell(record), "decision"
         elif isinstance(record, Effect) and not self._falls:
-            if record.event in _TURNS - _FOLLOWS:
+            if record.event == "refused" and record.detail == WITHDRAWN:
+                self._late = True  # and its time may be over by now: why it came too late was told before
+            elif record.event in _TURNS - _FOLLOWS:
                 self.cause, self._caused_by = self._tell(record), record.event
             elif self._caused_by in _OVER.get(record.event, ()):
                 self.cause, self._caused_by = None, ""

@@ -56,6 +56,7 @@ EVENTS: dict[str, Callable[["World"], Event]] = {
     "in the air": lambda at: AirState(at.now_us, True, True),
     "succeeded": lambda at: Succeeded(at.now_us, at.token),
     "failed": lambda at: Failed(at.now_us, at.token, "did-not-stop" if at.holds else "no-progress"),
+    "late": lambda at: Failed(at.now_us, at.token, "late"),
     "late success": lambda at: Succeeded(at.now_us, at.before),
     "taken over": lambda at: TakenOver(at.now_us, "POSCTL"),
     "crashed": lambda at: Crashed(at.now_us, "on its side"),
@@ -153,7 +154,7 @@ class Search:
 
     def __init__(self, of: Small) -> None:
         self._of = of
-        self._snapshots = Snapshots(SESSION_KEY, START.utc_us, OLD_US, (Ear,))
+        self._snapshots = Snapshots(SESSION_KEY, START.utc_us, OLD_US, (Ear,), late="late" in of.events)
         key = world.LOG_KEY
         self._ear = Ear(Recorder(lambda data: key.sign(data, duty=Duty.LOG), key.public, epoch_seeds()))
         template = world.loaded(of.policy, of.mission)

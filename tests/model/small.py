@@ -138,6 +138,7 @@ ALL = (
     _little("stop", (TAKEOFF, GOTO), ("good", "no-fix"), *LINK, *WORST, "taken over", "silence", **_HOLDS),
     _little("goes on", (TAKEOFF, HOME), ("good", "blind"), *LINK, "silence", after=AfterSilence.CONTINUE),
     _little("unknown", _STEPS, ("good", "blind"), *WORST, "silence"),
+    _little("late", _STEPS, ("good", "no-fix"), "armed", "late", "taken over", "interrupted"),
     _little("hold", _STEPS, ("good", "no-fix"), *WORST, "taken over", "interrupted", **_HOLDS),
     _little("skip", _STEPS, ("good", "no-fix"), *WORST, "interrupted", otherwise=OnInadmissible.SKIP),
     _little("degrade", _STEPS, ("good", "low"), *WORST, "interrupted", degrade=True),

@@ -82,16 +82,17 @@ _PLAIN = frozenset((str, bool, type(None)))
 _ALWAYS = frozenset((PreparedPolicy, Policy, TrustRoot, Limits))
 
 
-def _unread(stage: Stage) -> dict[type, tuple[str, ...]]:
-    """What is not read in a stage, by class."""
+def _unread(stage: Stage, late: bool) -> dict[type, tuple[str, ...]]:
+    """What is not read in a stage, by class. Where a step may be `late`, its release counts on while it runs."""
     unread = dict(_ONLY_WRITTEN)
     for (kind, name), stages in _READ_IN.items():
-        if stage not in stages:
+        counts_on = late and kind is InvocationQueue and stage is Stage.RUNNING
+        if stage not in stages and not counts_on:
             unread[kind] = (*unread.get(kind, ()), name)
     return unread
 
 
-_UNREAD = {stage: _unread(stage) for stage in Stage}
+_UNREAD = {(stage, late): _unread(stage, late) for stage in Stage for late in (False, True)}
 
 
 def fixed(kind: type) -> bool:
@@ -103,13 +104,17 @@ def fixed(kind: type) -> bool:
 
 
 class Snapshots:
-    """Takes and restores worlds. `unwatched`: types of objects that are shared and not compared."""
+    """Takes and restores worlds. `unwatched`: types of objects that are shared and not compared. `late`: a step that
+    runs may be waited for again.
+    """
 
-    def __init__(self, key: bytes, utc_us: int, old_us: int, unwatched: tuple[type, ...] = ()) -> None:
+    def __init__(
+        self, key: bytes, utc_us: int, old_us: int, unwatched: tuple[type, ...] = (), *, late: bool = False
+    ) -> None:
         self._shared: dict[int, Any] = {}
         self._keeps: dict[type, bool] = {}
         self._unwatched = unwatched
-        self._compare = _Comparison(key, utc_us, old_us, unwatched, self._reference)
+        self._compare = _Comparison(key, utc_us, old_us, unwatched, self._reference, late=late)
 
     def take(self, world: object) -> bytes:
         """The world, to be restored as often as wanted."""
@@ -154,8 +159,10 @@ class _Comparison:
     """Makes plain tuples of a world. A rule a class, found once."""
 
     def __init__(
-        self, key: bytes, utc_us: int, old_us: int, unwatched: tuple[type, ...], refer: Callable[[Any], int | None]
-    ) -> None:
+        self, key: bytes, utc_us: int, old_us: int, unwatched: tuple[type, ...], refer: Callable[[Any], int | None],
+        *, late: bool,
+    ) -> None:  # fmt: skip
+        self._late = late
         self._key = key
         self._utc_us = utc_us
         self._old_us = old_us
@@ -173,7 +180,7 @@ class _Comparison:
 
     def plain(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> Any:
         self._now_us = now_us
-        self._unread = _UNREAD[stage]
+        self._unread = _UNREAD[stage, self._late]
         permit = None if standing is None else open_permit(standing, self._key)
         self._stands = range(0)
         if permit is not None:

@@ -30,7 +30,7 @@ from rtshcua.onboard.ports import (
     Succeeded,
     TakenOver,
 )
-from rtshcua.wire.permit import LINK_VALID_US, open_permit
+from rtshcua.wire.permit import LINK_VALID_US, WITHDRAWN, open_permit
 from rtshcua.wire.request import NOTHING, STEP, Ref
 
 _OVER = ("succeeded", "failed", "violated", "time-over", "replaced", "landed", "released")
@@ -120,6 +120,7 @@ class Watch:
     flying: int | None = None  # the token of the command that flies
     command: object | None = None
     step: int = -1  # the last step that was sent
+    unsent: tuple[int, bool] = (-1, False)  # what `step` and `ours` were before it
     tokens: set[int] = field(default_factory=set)
     allowed: set[int] = field(default_factory=set)  # steps
     homeward: bool = False  # a link began a return or a landing
@@ -175,6 +176,11 @@ class Watch:
                 assert said["token"] == self.flying, "what ended did not fly"
                 self.flying = None
                 self.ours = self.ours and what != "landed"
+            elif what == "refused" and said["detail"] == WITHDRAWN:
+                assert self.flying is None, "under way, and withdrawn"
+                assert ref.step == self.step, "another was sent since"
+                self.step, self.ours = self.unsent
+                self.allowed.discard(ref.step)
             elif what == "recall":
                 self.recalled = True
         assert next(order, None) is None, "sent, and not recorded"
@@ -234,6 +240,7 @@ class Watch:
             bounds = (plan.kind, plan.path, plan.altitude, plan.speed)
             assert (command.kind, command.path, command.altitude, command.speed) == bounds, "not what was permitted"
             assert command.not_after_us <= now_us + contract.deadline_us
+            self.unsent = self.step, self.ours
             self.step = step
         else:
             assert ref in fresh or self.allowed, "a link that nothing stands for"

@@ -13,6 +13,7 @@ from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.evidence.gaps import seconds
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
+from rtshcua.wire.permit import WITHDRAWN
 
 #: columns of a line for a person, where it can be chosen
 WIDTH: Final = 80
@@ -24,6 +25,10 @@ _ALARMS: Final = {
     "cancellation": "CANCELLED by its proposer: no further step begins. In the air the policy's contingency flies",
     "taken-over": "TAKEN OVER: somebody else flies the vehicle. Nothing more is sent to it",
 }
+
+
+#: what a detail means to a person
+_TOLD: Final = {WITHDRAWN: "nothing was sent: it is tried again, up to its deadline"}
 
 
 def plain(message: Message) -> Iterable[str]:
@@ -52,7 +57,7 @@ def sentence(what: Happening) -> str:
 def _sentence(what: Happening) -> str:
     subject = what.subject
     if what.event != "decision":
-        detail = "" if what.event == "dispatched" and subject else what.detail
+        detail = "" if what.event == "dispatched" and subject else _TOLD.get(what.detail, what.detail)
         return f"{what.event:<11}  {subject}{'  ' if subject and detail else ''}{detail}".rstrip()
     why = ""
     if what.outcome != "allow":

@@ -123,6 +123,11 @@ def _hold_us(contract: Contract, arguments: tuple[int, ...]) -> int:
     return arguments[contract.motion.time] if contract.motion.time >= 0 else 0
 
 
+def never(_: int) -> bool:
+    """No id is given back."""
+    return False
+
+
 class Executor:
     """Checks permits under the session key and remembers what was sent.
 
@@ -132,7 +137,7 @@ class Executor:
 
     def __init__(
         self, key: bytes, commands: Commands, chain: BoundaryChain | None = None,
-        give_back: Callable[[int], bool] = lambda _: False,
+        give_back: Callable[[int], bool] = never,
     ) -> None:  # fmt: skip
         self._key = key
         self._commands = commands

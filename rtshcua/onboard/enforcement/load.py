@@ -18,7 +18,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.attestation import Attestation
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
-from rtshcua.onboard.enforcement.executor import Commands, Executor
+from rtshcua.onboard.enforcement.executor import Commands, Executor, never
 from rtshcua.onboard.enforcement.isolated import (
     Caller,
     IsolatedAttestation,
@@ -146,9 +146,9 @@ def session(
     enforced = mode is not Mode.NONE
     chain = BoundaryChain()
     boundary = SoftwareBoundary(in_force, commands, session_key, chain, enforced=enforced)
-    given_back = boundary.give_back if enforced else lambda _: False
+    give_back = boundary.give_back if enforced else never
     issuer = issuer or PreparationIssuer(session_key, {})
     attestation = Attestation(chain, in_force.flight, bundle, enforced=enforced)
-    executor = Executor(session_key, commands, chain, given_back)
+    executor = Executor(session_key, commands, chain, give_back)
     policy, vehicle = in_force.policy, in_force.vehicle
     return Loaded(boundary, executor, in_force, policy, vehicle, mode, issuer, attestation)

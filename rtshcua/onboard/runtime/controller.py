@@ -329,6 +329,7 @@ class MissionController:
         self.dispatcher.end(now, "failed", detail)
         if self.stage is _RUNNING and event.reason in _LATE and self.dispatcher.withdraw(now):
             self._supervisor = None
+            self.retry.renew(now.monotonic_us, at_once=True)
             self.stage = _DECIDING
         elif self.stage is _DECIDING and self.aloft:
             # It was a hold: whatever the vehicle does, it does not wait where it should.

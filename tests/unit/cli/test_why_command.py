@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from reference.forgery import flight
+from reference.world import Run
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.onboard.ports import Failed
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 STANDARD = str(CHECKOUT / "missions" / "standard.rts")
@@ -206,3 +208,30 @@ def test_what_follows_an_approval(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert shown(capsys, *asked, "--approved", "--state", "battery=9 %")["reason"] == "state/violated"
     assert shown(capsys, *asked, "--approved", "--waited", "31000")["reason"] == "timing/no-slack"
     assert "approvals     supervisor and safety, when the step was released" in why(capsys, *asked, "--approved")[1]
+
+
+def late_until(ends: int) -> list[bytes]:
+    """The log of a run whose take-off came too late so often; then it flies, or its time is over."""
+    run = Run().until_flies("takeoff")
+    for _ in range(ends):
+        run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+        if run.ending is not None:
+            break
+    run.until_over()
+    return [*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]
+
+
+def test_a_takeoff_that_was_late_until_its_time_was_over_names_the_busy_computer(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(b"".join(late_until(1_000)))
+    cause = shown(capsys, str(log))["cause"]
+    assert isinstance(cause, dict)
+    assert "late: nothing was sent: this computer was too busy" in cause["what"]
+
+
+def test_a_takeoff_that_was_late_and_flew_is_no_cause(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(b"".join(late_until(2)))
+    assert shown(capsys, str(log))["cause"] is None

@@ -61,6 +61,12 @@ def test_what_the_world_says_cannot_steer_a_terminal() -> None:
     assert "\x1b" not in drawn(PLAN, Note(nasty), Happened(Happening("failed", 1, 0, nasty, detail=nasty)))
 
 
+def test_a_step_that_comes_again_is_told_as_that() -> None:
+    told = sentence(Happening("refused", 1, 0, "takeoff()", detail="permit/unsent"))
+    assert told == "refused      takeoff()  nothing was sent: it is tried again, up to its deadline"
+    assert sentence(Happening("refused", 1, 0, "takeoff()", detail="permit/sent")).endswith("permit/sent")
+
+
 def test_plain_lines() -> None:
     said = [line for message in (PLAN, Happened(DENIED), Note("busy"), SUMMARY) for line in plain(message)]
     assert said[0] == "mission inspect under bridge@7 on quad-07, mode software"

@@ -69,7 +69,7 @@ def flown(folder: Path, flavour: str, without: str, hover_us: int, *, battery: i
     return found
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
 def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp_path: Path, flavour: str) -> None:
     found = flown(tmp_path, flavour, "", FAST_US)
     assert found.vehicle.simulation.truth().battery >= RESERVE
@@ -78,6 +78,7 @@ def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp
     assert any("the charge to come home" in str(each) or "way home" in str(each) for each in found.records)
 
 
+@pytest.mark.soak
 def test_without_the_measurement_it_is_not(tmp_path: Path) -> None:
     """The same flight by what is declared alone: the vehicle without the signal, as a policy may say."""
     assert flown(tmp_path, "ardupilot", ", battery.drain", FAST_US).vehicle.simulation.truth().battery < RESERVE

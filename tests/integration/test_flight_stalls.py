@@ -3,10 +3,10 @@ group of processes, a hypervisor, a debugger. Its log proves itself, and tells h
 """
 
 from functools import cache
-from itertools import pairwise, product
+from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as some
 
 from rtshcua.evidence.report import Verdict
@@ -16,6 +16,7 @@ from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending
 from virtual import case
 from virtual.flight import Flight
+from virtual.sampling import each_once
 from virtual.stalling import TOLD_US, StallingFlight, silences
 
 #: how often a short flight looks at its clock, at least, and some more for what follows of a stall
@@ -28,7 +29,6 @@ def bundle() -> bytes:
     return case.seal(case.mission(case.short_steps()))
 
 
-@settings(max_examples=settings().max_examples * 2)
 @given(
     stalls=STALLS,
     mode=some.sampled_from((Mode.SOFTWARE, Mode.PROCESS)),
@@ -55,10 +55,9 @@ def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
     assert all("vouched for by the key that signed record" in text for text in shown)
 
 
-@pytest.mark.parametrize(("for_s", "height", "flavour"), [
-    *product((28, 44, 60), (16 * case.M,), ("px4", "ardupilot")),
-    *product((28, 44), (4 * case.M,), ("px4", "ardupilot")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("for_s", "height", "flavour"), each_once((28, 44, 60), (16 * case.M, 4 * case.M), ("px4", "ardupilot"))
+)
 def test_a_vehicle_that_lands_while_nobody_reads_has_landed(for_s: int, height: int, flavour: str) -> None:
     """What waited says that it flies, what comes then that its motors are off, and maybe, as of PX4, in another mode:
     that is neither a crash nor a takeover.

@@ -1,6 +1,7 @@
 """What ships flies on a stock copter: GPS, barometer and battery, and nothing else, booted as recorded."""
 
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -13,11 +14,15 @@ from rtshcua.simulation.config import STOCK, Boot, Kind
 from rtshcua.virtual.fitting import fitting
 from virtual import case
 from virtual.flight import Flight, Flown
-from virtual.sampling import each_once
 from virtual.shipped import NAMES, shipped
 
 STARTER = Path(__file__).resolve().parents[2] / "examples/starter/missions/first_look.rts"
 FLAVOURS = ("px4", "ardupilot")
+#: flown each time; the long ones, and the other autopilot, are for soak
+SOME = [
+    pytest.param(*each, marks=() if each in (("starter", "px4"), ("short", "ardupilot")) else pytest.mark.soak)
+    for each in product(("starter", *NAMES), FLAVOURS)
+]
 #: what no stock copter tells
 NEVER = frozenset({"RADIO_STATUS", "DISTANCE_SENSOR", "OBSTACLE_DISTANCE", "WIND_COV"})
 
@@ -49,7 +54,7 @@ def flown(name: str, flavour: str) -> tuple[Flown, set[str]]:
     return flew, {kind.name for kind in kinds if kind is not None}
 
 
-@pytest.mark.parametrize(("name", "flavour"), each_once(("starter", *NAMES), FLAVOURS))
+@pytest.mark.parametrize(("name", "flavour"), SOME)
 def test_what_ships_flies_on_a_stock_copter(name: str, flavour: str) -> None:
     flight, said = flown(name, flavour)
     assert flight.ending is Ending.COMPLETED, flight.decisions()

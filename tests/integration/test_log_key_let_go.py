@@ -1,7 +1,6 @@
 """The log key signs the first record of a flight; after that the process holds it no more."""
 
 import gc
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -13,16 +12,8 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.keys import Duty, SigningKey
 
 
-@pytest.fixture(autouse=True)
-def frozen_again() -> Iterator[None]:
-    """For the tests after these, the collector need not look at what was there before."""
-    yield
-    gc.freeze()
-
-
 def held(public: bytes) -> list[SigningKey]:
-    """All objects of this process that are that key."""
-    gc.unfreeze()
+    """All objects that are that key. It was made in this test, so none is among those that are frozen."""
     gc.collect()
     return [each for each in gc.get_objects() if isinstance(each, SigningKey) and each.public == public]
 

@@ -2,7 +2,6 @@
 
 import re
 import shlex
-from itertools import product
 from pathlib import Path
 
 import pytest
@@ -23,8 +22,6 @@ from rtshcua.virtual.judge import judge
 
 FARM = Path(__file__).resolve().parents[2] / "examples" / "wind_farm"
 FLIGHTS = re.findall(r'(?m)^scenario "(.*)"', (FARM / "tests" / "flights.rts").read_text(encoding="utf-8"))
-#: flown each time, for it is the shortest; the others take as long as ten tests
-SHORT = "the substation on a Saturday"
 
 
 @pytest.fixture
@@ -62,13 +59,9 @@ def test_every_tower_is_kept_out_of(farm: Path) -> None:
     assert re.findall(r"tower_\d", airspace) == [f"tower_{number}" for number in range(1, 7)]
 
 
-@pytest.mark.parametrize(
-    ("name", "flavour"),
-    [
-        pytest.param(*each, marks=() if each == (SHORT, "px4") else pytest.mark.soak)
-        for each in product(FLIGHTS, ("px4", "ardupilot"))
-    ],
-)
+@pytest.mark.soak  # each takes as long as ten tests
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("name", FLIGHTS)
 def test_it_flies_as_its_scenarios_say(farm: Path, name: str, flavour: str) -> None:
     chosen = flight(name)
     assert flavour in chosen.scenario.flavours

@@ -98,7 +98,7 @@ def place(chance: Random, near: tuple[int, int], metres: int) -> tuple[int, int]
     return x + chance.randint(-metres * METRE, metres * METRE), y + chance.randint(-metres * METRE, metres * METRE)
 
 
-@rows("seed", range(8))
+@pytest.mark.parametrize("seed", [pytest.param(seed, marks=() if seed < 3 else pytest.mark.soak) for seed in range(8)])
 def test_what_a_zone_was_asked_before_changes_no_answer(seed: int) -> None:
     chance = Random(seed)
     for _ in range(60):

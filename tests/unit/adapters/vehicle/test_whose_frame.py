@@ -21,6 +21,7 @@ from virtual.copying import copied
 from virtual.flyer import Flyer, climbed
 from virtual.policy import POLICY
 from virtual.rows import rows
+from virtual.sampling import each_once
 
 S = 1_000_000
 PX4, ARDUPILOT, NONE = mavlink.MAV_AUTOPILOT_PX4, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, mavlink.MAV_AUTOPILOT_INVALID
@@ -212,8 +213,7 @@ FORGED: dict[str, Callable[[Flyer], Any]] = {
 BAD = TakenOver | Failed | Crashed
 
 
-@pytest.mark.parametrize("name", FORGED)
-@pytest.mark.parametrize("after_s", [2.0, 2.31, 4.07])
+@pytest.mark.parametrize(("name", "after_s"), each_once(FORGED, (2.0, 2.31, 4.07)))
 def test_one_forged_frame_ends_no_leg(aloft: Make, name: str, after_s: float) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
@@ -235,8 +235,9 @@ def test_one_forged_frame_ends_no_takeoff(flavour: str, name: str) -> None:
     assert isinstance(one.until((Succeeded, Failed, TakenOver, Crashed), 60), Succeeded)
 
 
-@pytest.mark.parametrize("says_", [Voice.STRAYED, Voice.DISARMED])
-@pytest.mark.parametrize("each_us", [100_000, 250_000, 1_000_000])
+@pytest.mark.parametrize(
+    ("says_", "each_us"), each_once((Voice.STRAYED, Voice.DISARMED), (100_000, 250_000, 1_000_000))
+)
 def test_who_contradicts_the_vehicle_in_the_air_is_noted_and_ends_nothing(
     aloft: Make, says_: Voice, each_us: int
 ) -> None:

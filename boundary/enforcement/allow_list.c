@@ -52,7 +52,11 @@ bool rt_is_housekeeping(const rt_frame *frame) {
 }
 
 bool rt_is_greeting(const rt_frame *frame) {
-    return frame->message == RT_MSG_HEARTBEAT && is_own(frame) && frame->system != GROUND_STATION;
+    if (frame->system == GROUND_STATION)
+        return false;
+    if (frame->message == RT_MSG_COMMAND_LONG) /* the number of HEARTBEAT is 0 */
+        return rt_u16(frame, RT_COMMAND_LONG_COMMAND) == RT_MAV_CMD_REQUEST_MESSAGE && are_zero(frame, 1);
+    return frame->message == RT_MSG_HEARTBEAT && is_own(frame);
 }
 
 static bool is_named(const rt_frame *frame, const char *name) {

@@ -89,7 +89,8 @@ class Flight:
     `simulated`: what the log says of a flight that was. `lapsed` says why the bundle is not to be trusted by the
     time that the clock has now. `answering`: how a person answers a step that asks.
 
-    Once it is made, the first record is on the disk. Raises OSError where the disk does not take it.
+    Once it is made, the first record is on the disk; not of one that is `resumed`, which waits for no disk. Raises
+    OSError where the disk does not take it.
     """
 
     def __init__(
@@ -140,7 +141,8 @@ class Flight:
             self._sink.append(self._recorder.effect(now, LOG_BEFORE, detail=past.note), WRITTEN)
         self._utc, self._lapsed = utc, lapsed
         self._sink.append(self._recorder.effect(now, CLOCK, detail=utc.bound.told()), WRITTEN)
-        self._sink.settle()
+        if not resumed:  # what hangs in the air comes down whatever the disk does
+            self._sink.settle()
         witnesses.begin(log.path, lambda: self._sink.synced)
         self._incidents = incidents
         self._preparations = Preparations(

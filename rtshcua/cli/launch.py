@@ -205,8 +205,10 @@ def _launch(order: Launch) -> ExitCode:
             agents = agents or _agents(order, loaded, stack)
             vehicle.driver.asks_utc, vehicle.driver.asks_back = utc.vehicle_may_tell, utc.question
             hurried = not order.dry_run and _broke_off(past) and _may_have_flown(order, loaded)
+            driver.hurries = hurried
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
-            events += await_utc(utc, vehicle, clock, patient=order.dry_run or order.utc_error_us is not None)
+            stated = order.utc_error_us is not None
+            events += await_utc(utc, vehicle, clock, patient=order.dry_run or stated, hurried=hurried)
             lapsed = _lapsed(bundle, signed_root, log_key.kid, loaded, clock)
             _expect_current(lapsed, resumed=not order.dry_run and order.sortie is None)
             if order.sortie is not None:
@@ -258,8 +260,7 @@ def _launch(order: Launch) -> ExitCode:
             told_before = filter(None, [alone, hangs, told, moved, past.note, unsigned, inside.note])
             for note in (*signing.notes, *told_before, *unsure):
                 feed.post(Note(note))
-            gc.collect()
-            gc.freeze()  # what was loaded stays; the collector need not look at it while flying
+            _keep_what_is_loaded(hurried=resumed)
             code, summary = flight.fly()
             if order.sortie is not None:
                 order.sortie.after(vehicle, clock, interrupts, Ending(summary.ending), flight.final_hash)
@@ -272,6 +273,15 @@ def _launch(order: Launch) -> ExitCode:
             feed.post(Note(signing.trouble))
         feed.post(summary)
     return code if feed.shown or code is not ExitCode.OK else ExitCode.FULL
+
+
+def _keep_what_is_loaded(*, hurried: bool) -> None:
+    """What was loaded stays; the collector need not look at it while flying. `hurried`: what is garbage may stay too,
+    for to collect it takes 30 ms.
+    """
+    if not hurried:
+        gc.collect()
+    gc.freeze()
 
 
 class _Begun(NamedTuple):

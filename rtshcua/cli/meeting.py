@@ -100,16 +100,19 @@ def meet(
     return events
 
 
-def await_utc(utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, patient: bool) -> list[Event]:
+def await_utc(
+    utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, patient: bool, hurried: bool = False
+) -> list[Event]:
     """Take the vehicle's time of day where the kernel vouches for none; what happened meanwhile. `patient`: it is
-    waited for, and then what the operator stated holds; else the vehicle is not ready before it told it.
+    waited for, and then what the operator stated holds; else the vehicle is not ready before it told it. `hurried`: a
+    flight may have broken off, and what is armed then is brought down first.
     """
     events: list[Event] = []
     until_s = time.monotonic() + (UTC_S if patient else 0)
     while utc.waits:
         flavour = vehicle.driver.flavour
         taken = flavour is not None and utc.look(vehicle.driver.source, flavour.name, clock.now().monotonic_us)
-        if taken or time.monotonic() >= until_s:
+        if taken or time.monotonic() >= until_s or (hurried and vehicle.driver.seen.armed):
             break
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     utc.settle()

@@ -139,6 +139,8 @@ class ConnectedVehicle:
             if self.driver.link.outdated > outdated:
                 self._greet(now_us, sender)  # the time stamp of our heartbeat sets its clock; a replay gains nothing
             if self.driver.flavour is None:
+                for question in heard.answers:  # not kept: it is to nobody yet
+                    self._transport.send(question, sender)
                 self._look(datagram)
                 return now_us
             if not any(frame.system == self.driver.system for frame in heard.frames):

@@ -47,6 +47,8 @@ from rtshcua.onboard.left import Left
 from rtshcua.onboard.ports import Command, Event, Said
 
 HEARTBEAT_US = 1_000_000
+#: who an autopilot is that was heard is asked so often
+WHO_US = 200_000
 #: so long what no waiting changes must stand until it is told: somebody may be about to set a parameter right
 UNFIT_US = 5_000_000
 #: why a vehicle that signs answers nothing to whoever does not
@@ -138,6 +140,9 @@ class Driver:
         self.resumes = False
         #: and what that run may have left it doing; None: nobody knows
         self.left: Left | None = None
+        #: it may have, so who it is is asked of whatever autopilot speaks: its next heartbeat may be a second away
+        self.hurries = False
+        self._who_us: int | None = None
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
         self._left_mode: int | None = None  # one report says that it left this mode, by nobody of ours
@@ -148,7 +153,8 @@ class Driver:
         self._watch = LinkWatch(slack)
         self._was_mute = False
         self._answers_us: int | None = None  # it was found to answer in the air, before it was ready
-        self._timed = False  # and the times of what it says are known, or not waited for any more
+        self._timed = False  # and the times of what it says are known, or not waited for any more,
+        self._aimless = False  # and it was asked for its target, and has none
         self._crash = CrashWatch()
         self._spoken: set[str] = set()
         self._beats_us = 0  # when our next heartbeat is due
@@ -258,6 +264,8 @@ class Driver:
                 told, manoeuvre = self._take(frame, now_us, events, send), self._manoeuvre
                 if told or (manoeuvre is not None and now_us >= manoeuvre.due_us):
                     self._advance(now_us, send, events)
+        if self.flavour is None:
+            return _heard(Heard, (events, self._ask_who(received, now_us) if self.hurries else [], received))
         return _heard(Heard, (events, self._pack(send, now_us, events) if send else [], received))
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
@@ -319,10 +327,24 @@ class Driver:
             send.append(messages.request(self.system, "SYSTEM_TIME"))
         if now_us >= self.stream_requests.due_us:
             send += self.stream_requests.due(self.system, now_us)
+        if self._timed and not self._was_ready:
+            send += self._ask_once(now_us)
         if self.asks is not None and self.seen.down:
             send += self.asks.due(self.system, now_us)
         if not self._was_ready and self.seen.down and not self.prepares:
             send += self.preflight.due(self.system, now_us)
+        return send
+
+    def _ask_once(self, now_us: int) -> list[Message]:
+        """What is awaited in the air: one report of each kind, and the target that it may have."""
+        query, named = self._aids.query, self._aids.named
+        send = self.stream_requests.due_once(self.system, now_us)
+        query.asked += len(send)  # their answers are counted, too
+        if self._awaits_target(now_us):
+            self._aimless = named.is_gone(self.seen, now_us, query.asked)
+            if named.asks:
+                named.asks, query.wants_target = False, True
+                send += self._ask(now_us)
         return send
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
@@ -388,6 +410,15 @@ class Driver:
         """Stand down: nothing that moves the vehicle is sent any more."""
         self._manoeuvre, self._unsent, self._released = None, None, True
 
+    def _ask_who(self, received: Sequence[Received], now_us: int) -> list[bytes]:
+        if self._who_us is not None and now_us - self._who_us < WHO_US:
+            return []
+        system = next((frame.system for frame in received if frame.component == AUTOPILOT), None)
+        if system is None:
+            return []
+        self._who_us = now_us
+        return self.link.ask_who(system, now_us)
+
     def announce(self, severity: int, text: str) -> None:
         """Tell any ground station; goes out with a later `tick`, when the link has nothing better to do."""
         self._announcer.add(severity, text)
@@ -406,7 +437,7 @@ class Driver:
             self.link.settle(frame.system)
             self.seen.estimator = Estimator(flavour.estimator)
             needed = [group for group in self._telemetry.sources if not group <= IN_THE_AIR]
-            self.stream_requests = StreamRequests(self.plan(flavour), needed)
+            self.stream_requests = StreamRequests(self.plan(flavour), needed, flavour.estimator)
             slack = self._commander.slack
             self._aids = Aids(
                 flavour, Brakes.of(self._policy.vehicle), self._commander, clock=self.source.clock, signed=self._signed
@@ -704,11 +735,13 @@ class Driver:
         if not self._timed and (self.source.unready is None or now_us - self._answers_us > PATIENCE_US):
             self._timed = True
             self.stream_requests.renew(now_us)
-        return self._timed and self.stream_requests.settled(now_us) and not self._awaits_target(now_us)
+        return self._timed and self.stream_requests.settled(now_us, aloft=True) and not self._awaits_target(now_us)
 
     def _awaits_target(self, now_us: int) -> bool:
-        """Whether the target may still come that tells whose flight this is; ArduCopter has none in a takeoff."""
-        if self.left is None or self.flavour is None or self.seen.targets or self._answers_us is None:
+        """Whether the target may still come that tells whose flight this is; ArduCopter has none in a takeoff, and says
+        so by telling all else that it was asked.
+        """
+        if self.left is None or self.flavour is None or self.seen.targets or self._answers_us is None or self._aimless:
             return False
         return self.seen.mode in self.flavour.aims and now_us - self._answers_us <= PATIENCE_REFUSED_US
 

@@ -88,8 +88,14 @@ class VehicleLink:
         """Our heartbeat to a vehicle that waits to be spoken to, before it is known which one it is. It is of the
         system that was named, or of the one that autopilots are delivered as.
         """
-        codec = Codec(self._system or self._greets_as, OURS)
-        sealed = self._frames.seal(codec.pack(messages.heartbeat()), now_us)
+        return self._sealed(self._system or self._greets_as, messages.heartbeat(), now_us)
+
+    def ask_who(self, system: int, now_us: int) -> list[bytes]:
+        """Ask who an autopilot is that was heard, and not chosen yet: for its HEARTBEAT."""
+        return self._sealed(system, messages.request(system, "HEARTBEAT"), now_us)
+
+    def _sealed(self, system: int, message: Message, now_us: int) -> list[bytes]:
+        sealed = self._frames.seal(Codec(system, OURS).pack(message), now_us)
         return [] if isinstance(sealed, Refusal) else [sealed]
 
     def begin(self) -> None:

@@ -21,6 +21,8 @@ QUIET_US = 3_000_000  # a stream that is silent for so long is asked for again
 #: else may send (RADIO_STATUS comes from the radio).
 PATIENCE_US = 5_000_000
 PATIENCE_REFUSED_US = 2_000_000
+#: and in the air, where what can be asked for was, and what brings it down waits
+PATIENCE_ALOFT_US = 500_000
 #: A stream is measured over this long, and too slow when it comes at less than one `SLOW`th of the rate asked for.
 MEASURE_US = 5_000_000
 SLOW = 2
@@ -31,6 +33,7 @@ AT_TIMES: Mapping[str, Rate] = {"POSITION_TARGET_GLOBAL_INT": Rate(100_000, 500_
 #: How much of a link streams may fill, in 1/100: the rest is for answers, texts, and for what comes late.
 SHARE: Final = 80
 _SECOND: Final = 1_000_000
+_POSITION: Final = "GLOBAL_POSITION_INT"
 _NEVER_US: Final = -1
 #: What is no stream, but an answer or an event: it is not turned off.
 _ANSWERS: Final = frozenset({
@@ -105,14 +108,17 @@ class StreamRequests:
     """SET_MESSAGE_INTERVAL for each message of the plan, one request outstanding at a time.
 
     Those of `AT_TIMES` are asked for like the others, and not missed when they do not come. `needed` holds groups of
-    messages of which one is enough: the sources of one signal. `notes` collects what an operator should know: which
-    streams come too seldom, when they are right again, and once how much is delivered of what was asked for.
+    messages of which one is enough: the sources of one signal. A position counts as heard where one came after a report
+    of the `estimator`, if that is named: what nobody vouches for yet is none. `notes` collects what an operator should
+    know: which streams come too seldom, when they are right again, and once how much is delivered of what was asked
+    for.
 
     On a link whose capacity is known, what nobody here asked for is turned off where there is no room for it.
     """
 
-    def __init__(self, plan: StreamPlan, needed: Iterable[frozenset[str]]) -> None:
+    def __init__(self, plan: StreamPlan, needed: Iterable[frozenset[str]], estimator: str = "") -> None:
         self.plan = plan
+        self._estimator = estimator
         self._needed = [*needed, *[frozenset({name}) for name in AT_LEAST]]
         self._at_times, self._wanted = _sorted(plan)
         self._queue = [*self._wanted, *self._at_times]
@@ -124,6 +130,7 @@ class StreamRequests:
         self.due_us = 0
         self._answer_us = ANSWER_US
         self._late_us: deque[int] = deque()  # when requests were given up whose answers may come yet
+        self._once_us: int | None = None  # when what is missing was last asked for once
         self._since_us: int | None = None
         self._counts = dict.fromkeys(self._wanted, 0)
         self._measured_us: int | None = None
@@ -146,7 +153,8 @@ class StreamRequests:
 
     def heard(self, name: str, now_us: int, octets: int = 0) -> None:
         """A message came, in a frame of so many octets."""
-        self._heard_us[name] = now_us
+        if name != _POSITION or not self._estimator or self._estimator in self._heard_us:
+            self._heard_us[name] = now_us
         self._octets += octets
         counts = self._counts
         if name in counts:
@@ -206,14 +214,32 @@ class StreamRequests:
     def renew(self, now_us: int) -> None:
         """What was heard so far does not count as heard."""
         self._heard_us.clear()
-        self._since_us = now_us
+        self._since_us, self._once_us = now_us, None
 
-    def settled(self, now_us: int) -> bool:
-        """Whether one message of each group was heard, or was waited for long enough."""
+    def due_once(self, system: int, now_us: int) -> list[Message]:
+        """The requests for one message of each group that was not heard since `renew`, where they are due: a stream of
+        which one is awaited in the air may take a second for it.
+        """
+        if self._since_us is None or (self._once_us is not None and now_us - self._once_us < ANSWER_US):
+            return []
+        self._once_us = now_us
+        names = {name for group in self._missing for name in group}
+        if _POSITION in names and self._estimator and self._estimator not in self._heard_us:
+            names.add(self._estimator)
+        ordered = sorted(names, key=lambda name: (name == _POSITION, name))  # after who vouches for it
+        return [messages.request(system, name) for name in ordered if messages.number_of(name) is not None]
+
+    @property
+    def _missing(self) -> list[frozenset[str]]:
+        return [group for group in self._needed if not group & self._heard_us.keys()]
+
+    def settled(self, now_us: int, *, aloft: bool = False) -> bool:
+        """Whether one message of each group was heard, or was waited for long enough; `aloft`: to bring it down."""
         if self._since_us is None:
             return False
-        missing = [group for group in self._needed if not group & self._heard_us.keys()]
-        patience_us = PATIENCE_REFUSED_US if all(group <= self._refused for group in missing) else PATIENCE_US
+        missing = self._missing
+        refused_us = PATIENCE_ALOFT_US if aloft else PATIENCE_REFUSED_US
+        patience_us = refused_us if all(group <= self._refused for group in missing) else PATIENCE_US
         return not missing or now_us - self._since_us > patience_us
 
     def _measure(self, now_us: int) -> None:

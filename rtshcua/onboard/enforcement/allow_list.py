@@ -86,8 +86,15 @@ _GROUND_STATION: Final = 255
 
 
 def is_greeting(frame: Frame) -> bool:
-    """Whether the frame is our heartbeat, under an id that no ground station has: it may leave before any came."""
-    return frame.message == HEARTBEAT and _is_own(frame.fields) and frame.system != _GROUND_STATION
+    """Whether the frame is our heartbeat, or asks for one, under an id that no ground station has: it may leave before
+    any came.
+    """
+    if frame.system == _GROUND_STATION:
+        return False
+    if frame.message == COMMAND_LONG:
+        asks = _command_number(frame.fields) == enums.MAV_CMD_REQUEST_MESSAGE
+        return asks and not any(_parameters(frame.fields))  # the number of HEARTBEAT is 0
+    return frame.message == HEARTBEAT and _is_own(frame.fields)
 
 
 def is_of_fence(frame: Frame, types: float | None) -> bool:

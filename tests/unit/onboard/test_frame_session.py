@@ -380,12 +380,20 @@ def test_a_fence_is_not_handed_to_a_vehicle_that_is_armed(message: Any) -> None:
 def test_before_a_vehicle_is_known_only_a_greeting_leaves() -> None:
     """Over some links a vehicle waits to be spoken to."""
     gate = FrameSession()
-    assert gate.seal(pack(ALWAYS[0]), NOW) == pack(ALWAYS[0])
+    who = long(512, 0)  # asks for a HEARTBEAT
+    for greeting in (ALWAYS[0], who):
+        assert gate.seal(pack(greeting), NOW) == pack(greeting)
     for other in (
         pack(ALWAYS[0], system=255),
         pack(ALWAYS[0], component=1),
         pack(heartbeat(PX4)),
         pack(long(176, 1, 9)),
+        pack(who, system=255),
+        pack(who, component=1),
+        pack(long(512, 148)),
+        pack(long(512, 0, 1)),
+        pack(long(511, 0)),
+        pack(long(400, 0)),
     ):
         assert gate.seal(other, NOW) is NO_VEHICLE
 

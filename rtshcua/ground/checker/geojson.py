@@ -7,7 +7,9 @@ that no float decides on which side of a fence a place lies.
 
 import json
 import re
-from collections.abc import Sequence
+from array import array
+from codecs import BOM_UTF8
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal, localcontext
 from itertools import pairwise
@@ -27,18 +29,24 @@ from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 #: a FeatureCollection's MultiPolygon takes nine, foreign members (RFC 7946, 6.1) may take some more
 MAX_DEPTH = 32
 #: objects, lists, texts and numbers of a file beside its positions; keys are none of them. Of positions, which are
-#: lists of two or three numbers, as many are read as there is room for: borders of countries have hundreds of thousands
+#: lists of two or three numbers, there may be as many as there is room for: borders of countries have hundreds of
+#: thousands. Those of one area are few, and no others are read
 MAX_VALUES = 250_000
 #: characters of a number: a double needs no more than 24
 MAX_NUMBER = 64
 MAX_EXPONENT = 3  # digits; that of a double has no more
 #: a local projection has no use nearer to a pole
 MAX_LATITUDE, MAX_LONGITUDE = 85, 180
-_NUMBER = rb"\s*+-?[0-9][0-9.eE+-]*+\s*+"
-_POSITION = re.compile(rb"\[%b,%b(?:,%b)?\]" % (_NUMBER, _NUMBER, _NUMBER))
-#: whether a number may be too long, or its exponent: `_number` then says which
-_LONG = re.compile(rb"[0-9.eE+-]{%d}|[eE][+-]?[0-9]{%d}" % (MAX_NUMBER + 1, MAX_EXPONENT + 1))
-_PIECE = 1 << 16  # octets that are looked at a time: what is left between millions of positions takes memory
+#: positions that stand beside one another are left as they are written until they are asked for: to read each of the
+#: millions that a file may have takes seconds, and hundreds of megabytes. A pattern keeps a place for each of these
+_RUN = 1_000
+_SPACE = rb"[ \t\n\r]*+"
+_NUMBER = rb"%b-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?(?:[eE][+-]?[0-9]++)?%b" % (_SPACE, _SPACE)
+_POSITION = rb"\[%b,%b(?:,%b)?\]" % (_NUMBER, _NUMBER, _NUMBER)
+#: a text, or the beginning of one; what is no number of JSON; a run of positions
+_PART = re.compile(rb'"[^"]*+"?|NaN|%b(?:%b,%b%b){0,%d}' % (_POSITION, _SPACE, _SPACE, _POSITION, _RUN - 1))
+#: what stands for a run while the rest is read
+_STAND_IN = "NaN"
 _DEGREE = Decimal(10_000_000)
 _AS_BRACKETS = bytes.maketrans(b"{}", b"[]")
 _NO_BRACKETS = bytes(each for each in range(256) if each not in b"[]{}")
@@ -56,9 +64,26 @@ class GeoPolygon:
 
 
 class Number(msgspec.Struct, frozen=True, gc=False):
-    """A number as it is written. A file has millions."""
+    """A number as it is written."""
 
     text: str
+
+
+class Run(msgspec.Struct, frozen=True, eq=False, gc=False):
+    """Positions that stand beside one another in a text, as they are written there: from `start` to `end`."""
+
+    data: bytes
+    start: int
+    end: int
+
+    def count(self) -> int:
+        """How many."""
+        return self.data.count(b"[", self.start, self.end)
+
+    def read(self) -> list[list[Number]]:
+        """The positions. Raises `Refused` for a number that is too long."""
+        found: list[list[Number]] = _read(f"[{self.data[self.start : self.end].decode()}]", _no_number)
+        return found
 
 
 def _not_json(message: str) -> Refused:
@@ -78,47 +103,97 @@ def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
 
 
 def _json(data: bytes) -> Any:
-    """The value of a text; numbers stay as they are written."""
+    """The value of a text; numbers stay as they are written, and positions that stand side by side are a `Run`."""
     try:
-        text = data.decode("utf-8-sig")  # RFC 8259, 8.1: a parser may ignore a byte order mark
+        data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise _not_json(f"byte {error.start} (0x{data[error.start]:02x}) is not UTF-8") from error
-    bare = bare_of(data, MAX_VALUES)
-    if bare is None or _beside_positions(bare) > MAX_VALUES:
-        raise _not_json(
-            f"it has more than {MAX_VALUES} values beside its positions: leave the features out that are not needed"
-        )
+    outline = _Outline(data.removeprefix(BOM_UTF8))  # RFC 8259, 8.1: a parser may ignore a byte order mark
+    bare = bare_of(outline.text, MAX_VALUES)
+    if bare is None or values_of(bare) > MAX_VALUES:
+        raise _too_many()
     if _too_deep(bare):
-        raise _not_json(f"it is nested more than {MAX_DEPTH} deep")
+        raise _nested()
+    runs = outline.runs()
+
+    def constant(name: str) -> Run:
+        run = next(runs) if name == _STAND_IN else None
+        if run is None or not run.count():
+            raise _no_number(name)
+        return run
+
+    text = outline.text.decode()
     try:
-        number = _number if _LONG.search(bare) else Number
-        return json.loads(
-            text, parse_float=number, parse_int=number, parse_constant=_constant, object_pairs_hook=_object
-        )
+        return _read(text, constant)
     except json.JSONDecodeError as error:
-        message = error.msg[0].lower() + error.msg[1:]
-        raise _not_json(f"line {error.lineno}, column {error.colno}: {message}") from error
+        line, column = outline.place(len(text[: error.pos].encode()))
+        raise _not_json(f"line {line}, column {column}: {error.msg[0].lower()}{error.msg[1:]}") from error
 
 
-def _beside_positions(bare: bytes) -> int:
-    """How many values there are that are no positions and none of their numbers."""
-    if values_of(bare) <= MAX_VALUES:
-        return 0
-    found = bare.count(b"[") - bare.count(b",")  # each position has a comma: so many lists are none
-    if found > MAX_VALUES:
-        return found
-    found = start = 0
-    while start < len(bare) and found <= MAX_VALUES:
-        end = bare.find(b"]", start + _PIECE) + 1 or len(bare)  # within no position
-        rest, positions = _POSITION.subn(b"", bare[start:end])
-        found += values_of(rest) - positions  # a comma is left of each
-        start = end
-    return found
+class _Outline:
+    """A text with a stand-in for each run of positions; one of its own is a run of none. Raises `Refused` for many."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._starts, self._ends = array("L"), array("L")
+        bare = bare_of(data, MAX_VALUES)
+        if bare is None:
+            raise _too_many()
+        if (
+            sum(map(bare.count, (b"[", b"{"))) - sum(map(bare.count, (b"]", b"}"))) > MAX_DEPTH
+        ):  # quicker than to search
+            raise _too_many() if values_of(bare) > MAX_VALUES else _nested()
+        del bare
+        made, at = bytearray(), 0
+        # a quote within a text ends none; what is masked is as long as before
+        masked = data.replace(b"\\\\", b"__").replace(b'\\"', b"__") if b"\\" in data else data
+        for part in _PART.finditer(masked):
+            start = part.start()
+            if masked[start] == ord('"'):
+                continue
+            made += data[at:start]
+            made += _STAND_IN.encode()
+            at = part.end()
+            self._starts.append(start)
+            self._ends.append(at)
+            if len(self._starts) > MAX_VALUES:
+                raise _too_many()
+        made += data[at:]
+        self.text = bytes(made)
+
+    def runs(self) -> Iterator["Run"]:
+        """What the stand-ins stand for, in their order."""
+        return (Run(self._data, start, end) for start, end in zip(self._starts, self._ends, strict=True))
+
+    def place(self, position: int) -> tuple[int, int]:
+        """The line and column, from 1, of the text itself at an octet of this."""
+        shorter = 0
+        for start, end in zip(self._starts, self._ends, strict=True):
+            if start - shorter >= position:
+                break
+            shorter += end - start - len(_STAND_IN)
+        before = self._data[: position + shorter]
+        return before.count(b"\n") + 1, len(before[before.rfind(b"\n") + 1 :].decode()) + 1
+
+
+def _read(text: str, constant: Callable[[str], Any]) -> Any:
+    return json.loads(text, parse_float=_number, parse_int=_number, parse_constant=constant, object_pairs_hook=_object)
+
+
+def _too_many() -> Refused:
+    return _not_json(
+        f"it has more than {MAX_VALUES} values beside its positions: leave the features out that are not needed"
+    )
+
+
+def _nested() -> Refused:
+    return _not_json(f"it is nested more than {MAX_DEPTH} deep")
 
 
 def _too_deep(bare: bytes) -> bool:
-    """Whether brackets in what has no texts are nested too deep. Each round takes away the innermost, all at once: one
-    at a time costs seconds where a file has many. What is left over and not deep is no JSON, and is told as that.
+    """Whether brackets are nested too deep in what has no texts and no positions. Each round takes away the innermost,
+    all at once: one at a time costs seconds where a file has many. What is left over and not deep is no JSON, and is
+    told as that.
     """
     left = bare.translate(_AS_BRACKETS, _NO_BRACKETS)
     for _ in range(MAX_DEPTH):
@@ -136,8 +211,8 @@ def _number(text: str) -> Number:
     return Number(text)
 
 
-def _constant(text: str) -> None:
-    raise _not_json(f"`{text}` is not a number in JSON")  # RFC 8259, 6
+def _no_number(text: str) -> Refused:
+    return _not_json(f"`{text}` is not a number in JSON")  # RFC 8259, 6
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -145,6 +220,8 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     for key, value in pairs:
         if key in made:  # RFC 7493, 2.3: names must be unique; RFC 8259 leaves open what else they mean
             raise _not_json(f"the key `{key}` is written twice in one object")
+        if isinstance(value, Run) and value.count() > 1:
+            raise _not_json(f"the key `{key}` has several values, without brackets around them")
         made[key] = value
     return made
 
@@ -155,14 +232,15 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _polygons(geometry: dict[str, Any], pointer: str) -> tuple[GeoPolygon, ...]:
     """The polygons of a Polygon (RFC 7946, 3.1.6) or a MultiPolygon (3.1.7)."""
     pointer = f"{pointer}/coordinates"
-    coordinates = _array(geometry.get("coordinates"), pointer)
-    count = _count(coordinates)
+    written = geometry.get("coordinates")
+    count = _count(written)
     if count > MAX_VERTICES + MAX_RINGS:  # what is really too much is known in the local plane
         raise Refused(
             codes.GEOJSON_SHAPE,
             f"the area at `{pointer}` has {count:,} positions, and at most {MAX_VERTICES:,} corners fit on board",
             "simplify it to what matters for a flight",
         )
+    coordinates = _array(_laid_out(written), pointer)
     if geometry["type"] == "Polygon":
         return (_polygon(coordinates, pointer),)
     found = tuple(_polygon(_array(each, f"{pointer}/{i}"), f"{pointer}/{i}") for i, each in enumerate(coordinates))
@@ -173,9 +251,24 @@ def _polygons(geometry: dict[str, Any], pointer: str) -> tuple[GeoPolygon, ...]:
 
 def _count(value: Any) -> int:
     """The number of positions."""
+    if isinstance(value, Run):
+        return value.count()
+    return sum(map(_count, value)) if isinstance(value, list) else 0
+
+
+def _laid_out(value: Any) -> Any:
+    """A value with its runs read: each of their positions is one of the list that they stand in."""
+    if isinstance(value, Run):
+        return value.read()[0]
     if not isinstance(value, list):
-        return 0
-    return sum(map(_count, value)) if value and isinstance(value[0], list) else 1
+        return value
+    made: list[Any] = []
+    for each in value:
+        if isinstance(each, Run):
+            made += each.read()
+        else:
+            made.append(_laid_out(each))
+    return made
 
 
 def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:

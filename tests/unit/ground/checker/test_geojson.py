@@ -135,6 +135,12 @@ def test_numbers_are_decimal_digits_and_no_floats(written: str, whole: int) -> N
         (b"[" * 33 + b"]" * 33, "nested more than 32 deep"),
         (b'[[], {"]": "[[\\""}, ' + b'{"a":' * 32 + b"1" + b"}" * 32 + b"]", "nested more than 32 deep"),
         (b"[" * 32 + b"]" * 32, "no GeoJSON object"),
+        (b'{"type": "Polygon", "coordinates": [1, 2],[3, 4]}', "`coordinates` has several values, without brackets"),
+        (b'{"type": "Polygon",\n"coordinates": [[[1, 2],\n[3, 4]], [[5, 6]]] "', "line 3, column 20: expecting ','"),
+        ('{"é": [[1, 2]], "ü": [[1, 2], [3, 04]]}'.encode(), "line 1, column 36: expecting ','"),
+        (b'{"type": "Polygon", "coordinates": [[[1, 2], NaN, [3, 4]]]}', "`NaN` is not a number"),
+        (b'{"coordinates": [[1, 2]], "a": ] NaN', "line 1, column 32: expecting value"),
+        (b'{"type": "Polygon", "coordinates": [[[1, 2.]]]}', "line 1, column 43: expecting ','"),
         (b"[[]]" * 40, "line 1, column 5: extra data"),
         (b"]" * 40, "line 1, column 1: expecting value"),
         (b'"' + b"[" * 50 + b'"', "no GeoJSON object"),
@@ -212,6 +218,20 @@ def test_what_holds_no_such_area_is_refused(tree: Any, name: str | None, words: 
     found = refused(tree, name)
     assert found.code == codes.GEOJSON_SHAPE
     assert words in found.message
+
+
+def test_positions_in_texts_are_texts_and_other_values_stand_beside_positions() -> None:
+    ring = [[8, 47], [9, 47], [9, 48], [8, 47]]
+    told = {"name": '"[1,2],[3,4]', "a": [1, 2], "b": [[1, 2], "x"], "c": [[[1, 2]], [3, 4], 5]}
+    feature = {"type": "Feature", "properties": told, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    (area,) = read_area(json.dumps({"type": "FeatureCollection", "features": [feature]}).encode(), '"[1,2],[3,4]')
+    assert len(area.outer) == 3
+    feature["geometry"] = {"type": "Polygon", "coordinates": [[*ring[:2], "x", *ring[2:]]]}
+    with pytest.raises(Refused, match="`/geometry/coordinates/0/2` is not an array"):
+        read_area(json.dumps(feature).encode(), None)
+    feature["geometry"] = {"type": "Polygon", "coordinates": [[[8]], ring]}
+    with pytest.raises(Refused, match="the ring at `/geometry/coordinates/0` has too few"):
+        read_area(json.dumps(feature).encode(), None)
 
 
 def test_hints_name_what_is_there() -> None:

@@ -17,6 +17,7 @@ import socket
 import struct
 import time
 from base64 import b64decode, b64encode
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import count
@@ -36,6 +37,8 @@ MOST_OF_A_PEER: Final = 4
 MOST_WELCOMED: Final = 32
 #: how much may wait for one reader, in bytes
 MOST_WAITING: Final = 4 << 20
+#: how much is told one reader at once, in bytes: more waits for the next turn
+AT_ONCE: Final = 1 << 16
 #: the longest line that may come in: a document in base64, with what stands around it
 LONGEST: Final = MAX_DOCUMENT * 4 // 3 + 1024
 #: a document comes in no sooner than this after the one before it, in us: verifying takes a third of a millisecond
@@ -65,6 +68,25 @@ class _Handed(msgspec.Struct, forbid_unknown_fields=True):
     id: int = 0
 
 
+#: what is said to whoever sends something else than a document
+NO_LINE: Final = ("malformed", "not a line of the kind {id, document}, document in base64")
+
+
+class Encoded(NamedTuple):
+    """A document that somebody handed over, in base64 as far as is known."""
+
+    at_us: int
+    text: str
+    sender: int
+
+    def decoded(self) -> Presented:
+        """The document, or that it is none."""
+        try:
+            return Presented(self.at_us, b64decode(self.text, validate=True), self.sender)
+        except ValueError:
+            return Presented(self.at_us, b"", self.sender, NO_LINE)
+
+
 class _Numbered(msgspec.Struct):
     """What is read of a line that is wrong otherwise: the number to answer to."""
 
@@ -90,23 +112,33 @@ class _Reader:
         self.link = link
         self.peer = peer
         self.incoming = bytearray()
-        self.waiting = bytearray()
+        self.seen = 0  # how much of that was looked at, and has no line's end
+        self.waiting: deque[memoryview] = deque()  # lines, and the rest of one
+        self.waits = 0  # how many bytes these are
 
     def tell(self, line: bytes) -> bool:
         """Send a line, or keep it for later; False when the reader is to be dropped."""
-        self.waiting += line
-        return self.flush() and len(self.waiting) <= MOST_WAITING
+        waits = bool(self.waiting)
+        self.waiting.append(memoryview(line))
+        self.waits += len(line)
+        return (waits or self.flush()) and self.waits <= MOST_WAITING
 
-    def flush(self) -> bool:
-        """Send what waits, as far as the reader takes it now."""
-        while self.waiting:
+    def flush(self, most: int = AT_ONCE) -> bool:
+        """Send what waits, as far as the reader takes it now, and no more than so many bytes."""
+        while self.waiting and most > 0:
+            first = self.waiting[0]
             try:
-                sent = self.link.send(self.waiting)
+                sent = self.link.send(first[:most])
             except BlockingIOError:
                 return True
             except OSError:
                 return False
-            del self.waiting[:sent]
+            if sent == len(first):
+                self.waiting.popleft()
+            else:
+                self.waiting[0] = first[sent:]
+            self.waits -= sent
+            most -= sent
         return True
 
     @property
@@ -121,7 +153,9 @@ class _Reader:
 
     def line(self) -> bytes | None:
         """The next whole line, if there is one; raises OSError for a connection that ended or sends too long a line."""
-        if b"\n" not in self.incoming:
+        end = self.incoming.find(b"\n", self.seen)
+        if end < 0:
+            self.seen = len(self.incoming)
             try:
                 chunk = self.link.recv(_CHUNK)
             except BlockingIOError:
@@ -129,12 +163,15 @@ class _Reader:
             if not chunk:
                 raise ConnectionResetError(errno.ECONNRESET, "it hung up")
             self.incoming += chunk
-        line, newline, _ = bytes(self.incoming).partition(b"\n")
-        if len(line) > LONGEST:
+            end = self.incoming.find(b"\n", self.seen)
+        if (len(self.incoming) if end < 0 else end) > LONGEST:
             raise OSError(errno.EMSGSIZE, "the line is too long")
-        if not newline:
+        if end < 0:
             return None
-        del self.incoming[: len(line) + 1]
+        with memoryview(self.incoming) as octets:
+            line = bytes(octets[:end])
+        del self.incoming[: end + 1]
+        self.seen = 0
         return line
 
 
@@ -143,6 +180,7 @@ class AgentSocket:
 
     `own`: nobody but the user that this runs as, and root, is listened to, whatever the socket's mode says. `group`:
     the id of a group whose users may open it too. `numbers` are for what comes in; sockets of one flight share them.
+    `encoded`: what is long is left as it came, in base64.
     """
 
     def __init__(
@@ -153,8 +191,10 @@ class AgentSocket:
         own: bool = False,
         group: int | None = None,
         numbers: Iterator[int] | None = None,
+        encoded: bool = False,
     ) -> None:
         self.path = path
+        self._encoded = encoded
         self._greeting = greeting
         self._own = own
         self.readers: list[_Reader] = []
@@ -167,7 +207,7 @@ class AgentSocket:
         self._listener = _listen(path, group)
         self._place = _place(path)
 
-    def poll(self, now_us: int) -> Presented | None:
+    def poll(self, now_us: int) -> Presented | Encoded | None:
         """The next document, if one came in: one of each reader in turn, and at most one in `GAP_US`."""
         self._welcome()
         for reader in list(self.readers):
@@ -204,7 +244,7 @@ class AgentSocket:
         if self._listener.fileno() < 0:
             return
         for reader in list(self.readers):
-            reader.flush()
+            reader.flush(MOST_WAITING)
             self._drop(reader)
         self._listener.close()
         with suppress(OSError):
@@ -251,21 +291,21 @@ class AgentSocket:
         self._budgets[user] = now_us, left - octets if may else left
         return may
 
-    def _taken(self, reader: _Reader, line: bytes, now_us: int) -> Presented | None:
+    def _taken(self, reader: _Reader, line: bytes, now_us: int) -> Presented | Encoded | None:
         if len(line) > SHORT and not self._has_budget(reader.peer.user, len(line), now_us):
             text = f"of one user {WORK_RATE >> 10} KiB a second are looked at: hand it in again later"
             self._send(reader, _answer(_number(line), "busy", text))
             return None
         try:
             handed = _read(line)
-            document = b64decode(handed.document, validate=True)
+            later = self._encoded and len(line) > SHORT
+            document = b"" if later else b64decode(handed.document, validate=True)
         except (ValueError, msgspec.DecodeError):
-            text = "not a line of the kind {id, document}, document in base64"
-            self._send(reader, _answer(_number(line), "malformed", text))
+            self._send(reader, _answer(_number(line), *NO_LINE))
             return None
         number = next(self._numbers)
         self._senders[number] = (reader, handed.id)
-        return Presented(now_us, document, number)
+        return Encoded(now_us, handed.document, number) if later else Presented(now_us, document, number)
 
     def _send(self, reader: _Reader, line: bytes) -> None:
         if not reader.tell(line):

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from base64 import b64encode
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from hashlib import sha256
@@ -13,14 +14,15 @@ from typing import Final, Self
 import msgspec
 from msgspec.structs import replace
 
-from rtshcua.adapters.agent_socket import AgentSocket
+from rtshcua.adapters.agent_socket import NO_LINE, AgentSocket, Encoded
 from rtshcua.cli.showing import words
+from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Append, Event, Presented, Reply
 from rtshcua.wire import names
-from rtshcua.wire.document import MAX_WITHOUT_MISSION, kind_of
+from rtshcua.wire.document import kind_of
 from rtshcua.wire.untrusted import Untrusted
 
 FORMAT: Final = "rtshcua/agent"
@@ -38,6 +40,8 @@ _MOST_AHEAD: Final = 8
 _SWITCH_S: Final = 0.000_1
 #: replacements of which it is kept what became of them, so that none is looked at twice
 _MOST_KNOWN: Final = 256
+#: missions of which it is kept what is told of them
+_MOST_MISSIONS: Final = 4
 #: what stays so, whatever happens later
 _LASTING: Final = frozenset(
     {
@@ -57,7 +61,7 @@ class _Door:
 
     def __init__(self, socket: AgentSocket) -> None:
         self.socket = socket
-        self.ahead: list[tuple[Future[Untrusted | None], Presented]] = []
+        self.ahead: list[tuple[Future[Presented], Presented | Encoded]] = []
         self.worker = ThreadPoolExecutor(1)
 
 
@@ -87,9 +91,11 @@ class Agents:
         numbers = count(1)
         try:
             if operators is not None:  # first: what operators hand in comes before what agents do
-                self._sockets.append(_Door(AgentSocket(operators, self._greeting, own=True, numbers=numbers)))
+                own = AgentSocket(operators, self._greeting, own=True, numbers=numbers, encoded=True)
+                self._sockets.append(_Door(own))
             if path is not None:
-                self._sockets.append(_Door(AgentSocket(path, self._greeting, group=group, numbers=numbers)))
+                agents = AgentSocket(path, self._greeting, group=group, numbers=numbers, encoded=True)
+                self._sockets.append(_Door(agents))
         except OSError:
             self._close()
             raise
@@ -99,10 +105,14 @@ class Agents:
         self._asked: dict[int, bytes] = {}
         #: why the ones that were would be refused again
         self._known: dict[bytes, tuple[str, str]] = {}
+        #: what is told of missions, by digest: of the one in force, and of those that may come into force
+        self._missions: dict[bytes, bytes] = {}
+        if not waits:
+            self._mission()
 
     def events(self, now: Now) -> Sequence[Event]:
-        """The documents that came in. What takes longer than some 0.5 ms to look at was looked at in another thread;
-        what was refused there, or is refused by its outline, says so.
+        """The documents that came in. What is long, and each replacement, was looked at in another thread; what was
+        refused there, or is refused by its outline, says so.
         """
         found: list[Event] = [*self._left]
         self._left = ()
@@ -111,12 +121,13 @@ class Agents:
             if event is not None:
                 found += self._sorted(door, event, now)
             while door.ahead and door.ahead[0][0].done():
-                future, event = door.ahead.pop(0)
-                error = future.exception() or future.result()
-                if error is not None:
-                    refused = (error.slug, str(error)) if isinstance(error, Untrusted) else _FAILED
-                    event = replace(event, refused=refused)
-                found.append(event)
+                future, came = door.ahead.pop(0)
+                if future.exception() is not None:
+                    found.append(Presented(came.at_us, b"", came.sender, _FAILED))
+                elif future.result().refused == NO_LINE:
+                    door.socket.answer(came.sender, *NO_LINE)
+                else:
+                    found.append(future.result())
                 if not any(each.ahead for each in self._sockets):
                     sys.setswitchinterval(self._switch_s)
         if self._watches and not self._sockets[-1].socket.users.isdisjoint((0, os.geteuid())):
@@ -124,29 +135,62 @@ class Agents:
             self._notes.append(ALIKE)
         return found
 
-    def _sorted(self, door: _Door, event: Presented, now: Now) -> Sequence[Event]:
+    def _sorted(self, door: _Door, event: Presented | Encoded, now: Now) -> Sequence[Event]:
         """What comes of a document at once."""
-        if self._waits or self._over:
+        if self._over:
+            return (Presented(event.at_us, b"", event.sender),)
+        if isinstance(event, Encoded):
+            if not self._waits:
+                return self._later(door, event, now)
+            event = event.decoded()  # nothing flies yet
+            if event.refused is not None:
+                door.socket.answer(event.sender, *event.refused)
+                return ()
+        if self._waits:
             return (event,)
-        document = event.document
         try:
-            kind = kind_of(document)
-        except Untrusted as error:  # what is large is not hashed here either
-            small = len(document) <= MAX_WITHOUT_MISSION
-            return (event if small else replace(event, refused=(error.slug, str(error))),)
-        if kind is not names.REPLACEMENT:
+            kind = kind_of(event.document)
+        except Untrusted:
             return (event,)
-        digest = sha256(document).digest()
-        known = self._known.get(digest)
-        if known is not None:
-            return (replace(event, refused=known),)
+        return (event,) if kind is not names.REPLACEMENT else self._later(door, event, now)
+
+    def _later(self, door: _Door, event: Presented | Encoded, now: Now) -> Sequence[Event]:
+        """Have it looked at in the other thread."""
         if len(door.ahead) == _MOST_AHEAD:
             door.socket.answer(event.sender, "busy", "other documents are being looked at")
             return ()
         sys.setswitchinterval(_SWITCH_S)
-        self._asked[event.sender] = digest
-        door.ahead.append((door.worker.submit(self._loaded.boundary.consider, document, now), event))
+        door.ahead.append((door.worker.submit(self._looked_at, event, now), event))
         return ()
+
+    def _looked_at(self, event: Presented | Encoded, now: Now) -> Presented:
+        """A document as it is handed over, after all that takes long: decoded, hashed, verified, and what comes into
+        force with it made. In the other thread.
+        """
+        came = event.decoded() if isinstance(event, Encoded) else event
+        document = came.document
+        if came.refused is not None:
+            return came
+        try:
+            kind = kind_of(document)
+        except Untrusted as error:
+            return replace(came, refused=(error.slug, str(error)))
+        if kind is not names.REPLACEMENT:
+            return came
+        digest = sha256(document).digest()
+        known = self._known.get(digest)
+        if known is not None:
+            return replace(came, refused=known)
+        self._asked[came.sender] = digest
+        refused = self._loaded.boundary.consider(document, now)
+        if refused is not None:
+            return replace(came, refused=(refused.slug, str(refused)))
+        after = self._loaded.in_force.considered(document)
+        if after is not None:
+            self._missions[after.mission_digest] = self._words(after.mission, after.mission_digest)
+            for old in [*self._missions][:-_MOST_MISSIONS]:
+                self._missions.pop(old, None)
+        return replace(came, envelope=b64encode(document).decode())
 
     def _learn(self, reply: Reply) -> None:
         """Keep what became of a replacement, if it stays so."""
@@ -244,7 +288,14 @@ class Agents:
     def _mission(self) -> bytes:
         """The mission that is in force: sent first, and again after each replacement."""
         bundle = self._loaded.bundle
-        mission = bundle.mission
+        told = self._missions.pop(bundle.mission_digest, None)
+        told = self._words(bundle.mission, bundle.mission_digest) if told is None else told
+        self._missions[bundle.mission_digest] = told  # the last one, so that it stays longest
+        return told
+
+    def _words(self, mission: Mission, digest: bytes) -> bytes:
+        """What is told of a mission."""
+        bundle = self._loaded.bundle
         steps = [
             {
                 "step": each.step,
@@ -260,7 +311,7 @@ class Agents:
         told = {
             "type": "mission",
             "mission": mission.name,
-            "digest": bundle.mission_digest.hex(),
+            "digest": digest.hex(),
             "policy": f"{mission.policy}@{mission.policy_version}",
             "policy_digest": bundle.policy_digest.hex(),
             "steps": steps,

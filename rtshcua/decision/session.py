@@ -43,13 +43,15 @@ _KINDS: Final = {
 
 
 class _Ahead(NamedTuple):
-    """What was found ahead of a document: the replacement in it, prepared, or why it is not to be trusted; and the
-    digest of the mission whose steps it was compared with.
+    """What was found ahead of a document: the replacement in it, prepared, or why it is not to be trusted; the digest
+    of the mission whose steps it was compared with, and what is in force if it is taken then; the ids of its new steps.
     """
 
     found: Replacement | Untrusted
     prepared: tuple[PreparedInvocation, ...]
     compared: bytes = b""
+    after: Bundle | None = None
+    new: frozenset[bytes] = frozenset()
 
 
 class InForce:
@@ -119,11 +121,11 @@ class InForce:
             if kind_of(document) is not names.REPLACEMENT:
                 return None
             bundle, found = self.bundle, self._opened(document, now)
-            compared = b""
+            compared, after = b"", None
             if found.supersedes == bundle.mission_digest:
                 check_stays(found, bundle)
-                compared = bundle.mission_digest
-            ahead = _Ahead(found, self._prepared(found.mission), compared)
+                compared, after = bundle.mission_digest, found.over(bundle)
+            ahead = _Ahead(found, self._prepared(found.mission), compared, after, found.new)
         except Untrusted as error:
             ahead = _Ahead(error, ())
         self._ahead[document] = ahead
@@ -131,13 +133,20 @@ class InForce:
             self._ahead.pop(old, None)
         return ahead.found if isinstance(ahead.found, Untrusted) else None
 
+    def considered(self, document: bytes) -> Bundle | None:
+        """What is in force if a replacement that was considered is taken; None where it may not be, or not yet."""
+        ahead = self._ahead.get(document)
+        return None if ahead is None else ahead.after
+
     def take(self, document: bytes, now: Now, *, decided: int, released: int, current: int = 0) -> Receipt:
         """Take a document in. The first `decided` steps are decided for good, the first `released` were released; those
         from `current` on are not over.
         """
         kind = UNKNOWN
         try:
-            kind = _KINDS[kind_of(document)]
+            ahead = self._ahead.get(document)
+            trusted = ahead is not None and isinstance(ahead.found, Replacement)
+            kind = REPLACEMENT if trusted else _KINDS[kind_of(document)]
             if self.recalled:
                 raise DocumentError("recalled", "the mission was recalled")
             if self.cancelled and kind != RECALL:
@@ -208,8 +217,8 @@ class InForce:
                 check_key(key, self.vehicle, now)
             found = ahead.found
         after = fit_replacement(found, self.bundle, released, compared=b"" if ahead is None else ahead.compared)
-        new = frozenset(each.invocation_id for each in found.mission.invocations[found.kept :])
-        if new & self._seen:
+        new = found.new if ahead is None else ahead.new
+        if not new.isdisjoint(self._seen):
             raise DocumentError("id-seen", "a new step has the id of one that this flight knew before")
         prepared = self._prepared(found.mission) if ahead is None else ahead.prepared
         self._seen |= new

@@ -179,12 +179,13 @@ class Presented(Event, frozen=True):
     cancellation.
 
     `sender` numbers who gets the answer. `refused` is why it is refused, as a slug and a text, where that was found out
-    before: then it is not looked at again.
+    before: then it is not looked at again. `envelope` is the document in base64, where that was made before.
     """
 
     document: bytes
     sender: int = 0
     refused: tuple[str, str] | None = None
+    envelope: str = ""
 
 
 class Anchored(Event, frozen=True):

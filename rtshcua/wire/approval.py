@@ -156,6 +156,8 @@ class Approvals:
 
     def keep(self, invocations: tuple[Invocation, ...]) -> None:
         """These are the steps now. Grants of others are dropped; refusals stay."""
+        if not self._answers:
+            return
         ids = {each.invocation_id for each in invocations}
         self._answers = {
             key: answered

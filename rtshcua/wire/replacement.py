@@ -48,6 +48,11 @@ class Replacement(NamedTuple):
     digest: bytes
     key: VerificationKey
 
+    @property
+    def new(self) -> frozenset[bytes]:
+        """The ids of the steps that are new."""
+        return frozenset([each.invocation_id for each in self.mission.invocations[self.kept :]])
+
     def over(self, bundle: Bundle) -> Bundle:
         """The bundle with what is in force now: the steps that stay as they were signed first, then the new ones."""
         steps = (*bundle.mission.invocations[: self.kept], *self.mission.invocations[self.kept :])

@@ -10,21 +10,35 @@ import time
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from hostile.documents import enveloped, head, hostile
-from reference.documents import low, recall, replacement
-from reference.world import MISSION_KEY, Run
-from rtshcua.adapters.agent_socket import GAP_US, SHORT, WORK_AT_ONCE, WORK_RATE, AgentSocket
+from reference.documents import low, low_mission, recall, replacement
+from reference.world import MISSION_KEY, ROOT, START, VEHICLE, Run, loaded, sealed_again
+from rtshcua.adapters.agent_socket import GAP_US, SHORT, WORK_AT_ONCE, WORK_RATE, AgentSocket, Encoded
+from rtshcua.cli import agents
 from rtshcua.cli.agents import Agents
+from rtshcua.cli.showing import words
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.onboard.enforcement.isolated import PART, PRESENT, Caller
+from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.onboard.ports import Event, Presented
-from rtshcua.wire import cbor, cose
+from rtshcua.onboard.runtime import runtime
+from rtshcua.virtual.served import Served
+from rtshcua.wire import cbor, cose, response
 from rtshcua.wire.cose import MAX_PROTECTED, EnvelopeError
 
+#: what takes as long as a document is, or as it has steps: the flight's thread does none of it
+LONG: list[tuple[Any, str]] = [
+    (Commands, "_of_step"), (response, "own_clauses"), (words, "call"), (Encoded, "decoded"), (agents, "b64encode"),
+    (runtime, "b64encode"),
+]  # fmt: skip
 #: CBOR items that one turn may decode in the thread that flies: some 0.1 ms
 ITEMS = 150
 HOSTILE = hostile(MISSION_KEY)
@@ -33,15 +47,16 @@ HOSTILE = hostile(MISSION_KEY)
 class Flooded(Run):
     """A run, and somebody at its socket; counts what is decoded in which thread."""
 
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        of = low()
-        self.agents = Agents(folder / "s", of)
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, of: Loaded, *, operators: bool = False) -> None:
+        path = folder / "s"
+        self.agents = Agents(None if operators else path, of, operators=path if operators else None)
         self.link = socket.socket(socket.AF_UNIX)
         self.link.connect(str(folder / "s"))
         self.decoded: Counter[int] = Counter()
         self.looked_at: list[bytes] = []
         self.me = threading.get_ident()
         self.most = 0
+        self.busy: Counter[str] = Counter()  # what takes long, by name, as far as the flight's thread did it
         item, consider = cbor._item, of.boundary.consider
 
         def counted(*arguments: Any) -> Any:
@@ -54,8 +69,19 @@ class Flooded(Run):
             return consider(document, now)
 
         monkeypatch.setattr(cbor, "_item", counted)
+        for where, name in LONG:
+            self._watch(where, name, monkeypatch)
         monkeypatch.setattr(of.boundary, "consider", considered)
         super().__init__(of)
+
+    def _watch(self, where: Any, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        does = getattr(where, name)
+
+        def watched(*arguments: Any, **more: Any) -> Any:
+            self.busy[name] += threading.get_ident() == self.me
+            return does(*arguments, **more)
+
+        monkeypatch.setattr(where, name, watched)
 
     def hand(self, document: bytes, *, over: bool = False) -> str:
         """What is answered; how much the flight's thread decoded meanwhile is kept."""
@@ -88,13 +114,77 @@ class Flooded(Run):
         return next((line["slug"] for line in lines if line["type"] == "answer"), "")
 
 
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch) -> Iterator[Flooded]:
+@contextmanager
+def flooded(of: Loaded, monkeypatch: pytest.MonkeyPatch, *, operators: bool = False) -> Iterator[Flooded]:
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
-        found = Flooded(Path(name), monkeypatch)
+        found = Flooded(Path(name), monkeypatch, of, operators=operators)
         with found.agents:
             yield found
         found.link.close()
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Iterator[Flooded]:
+    with flooded(low(), monkeypatch) as found:
+        yield found
+
+
+def elsewhere() -> tuple[Loaded, list[int]]:
+    """The same flight by a boundary elsewhere, and the kinds of calls that it gets."""
+    served, kinds = Served(ROOT, VEHICLE), list[int]()
+
+    def call(octets: bytes) -> bytes:
+        kinds.append(octets[0])
+        return served(octets)
+
+    of = load(
+        sealed_again(loaded(mission=low_mission())), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS,
+        session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False, caller=Caller(call),
+    )  # fmt: skip
+    assert isinstance(of, Loaded), of
+    return of, kinds
+
+
+def large(of: Loaded, steps: int = 60) -> bytes:
+    """A replacement of many steps."""
+    mission = of.bundle.mission
+    first, second, _, last = mission.invocations
+    more = [replace(second, step=number, invocation_id=number.to_bytes(16)) for number in range(2, steps)]
+    ends = replace(last, step=steps, invocation_id=steps.to_bytes(16))
+    anew = replace(mission, issued_at_us=mission.issued_at_us + 1, invocations=(first, second, *more, ends))
+    return replacement(of, 2, anew)
+
+
+@pytest.mark.parametrize("operators", [False, True], ids=["agents", "operators"])
+@pytest.mark.parametrize("mode", [Mode.SOFTWARE, Mode.PROCESS])
+def test_what_a_replacement_needs_is_made_in_another_thread(
+    mode: Mode, operators: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All that takes as long as it has steps; what is left is to put it in force, and to record it."""
+    of = low() if mode is Mode.SOFTWARE else elsewhere()[0]
+    with flooded(of, monkeypatch, operators=operators) as run:
+        document = large(of)
+        assert len(document) > SHORT
+        assert run.hand(document) == "accepted"
+        if mode is Mode.SOFTWARE:  # elsewhere it is the boundary that verifies it, in the call
+            assert run.most <= ITEMS
+            assert not +run.busy, "in the flight's thread"
+        else:
+            assert +run.busy == Counter(_of_step=61, own_clauses=61), "by the boundary"
+        assert len(of.bundle.mission.invocations) == 61
+        assert of.in_force.considered(document) is None, "it is taken"
+        assert any(b'"event":"replacement"' in line and b64encode(document) in line for line in run.lines)
+
+
+def test_a_boundary_elsewhere_is_asked_nothing_about_what_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    of, kinds = elsewhere()
+    with flooded(of, monkeypatch, operators=True) as run:
+        kinds.clear()
+        for document, slug in HOSTILE.values():
+            assert run.hand(document) == slug
+        assert not {PART, PRESENT} & {*kinds}
+        assert run.most <= ITEMS
+        assert run.busy["decoded"] == 0
 
 
 @pytest.mark.parametrize("name", HOSTILE)
@@ -135,7 +225,7 @@ def test_a_protected_header_is_malformed_by_its_length() -> None:
 def test_a_user_has_a_budget_and_what_is_short_counts_for_nothing() -> None:
     long, short = (json.dumps({"document": "A" * size}).encode() + b"\n" for size in (349_000, SHORT // 4 * 4 - 400))
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
-        agents = AgentSocket(Path(name) / "s", bytes)
+        listening = AgentSocket(Path(name) / "s", bytes)
         with socket.socket(socket.AF_UNIX) as flood, socket.socket(socket.AF_UNIX) as other:
             for link in (flood, other):
                 link.connect(str(Path(name) / "s"))
@@ -145,13 +235,13 @@ def test_a_user_has_a_budget_and_what_is_short_counts_for_nothing() -> None:
             for turn in range(seconds * 50):
                 if turn % 50 == 0:
                     other.sendall(short)
-                event = agents.poll(turn * GAP_US)
+                event = listening.poll(turn * GAP_US)
                 if isinstance(event, Presented):
                     taken += len(event.document) > SHORT
                     shorts += len(event.document) <= SHORT
                 time.sleep(0.000_1)  # the sender has something to do
             sender.join(20)
-            agents.close()
+            listening.close()
     assert 1 <= taken <= (WORK_AT_ONCE + seconds * WORK_RATE) // len(long)
     assert shorts >= seconds - 2
 

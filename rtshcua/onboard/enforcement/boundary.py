@@ -6,21 +6,22 @@ it answers it chains first (`wire.boundary_chain`); an answer about a step that 
 """
 
 from hashlib import sha256
-from typing import Final
+from typing import Final, NamedTuple
 
 from msgspec.structs import replace
 
 from rtshcua.decision.links import DEGRADE
 from rtshcua.decision.prepare import PreparedInvocation
-from rtshcua.decision.session import InForce, Session
+from rtshcua.decision.session import MOST_AHEAD, InForce, Session
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
+from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Context, Now
 from rtshcua.model.outcome import REASON_NUMBERS, Outcome
-from rtshcua.onboard.enforcement.executor import Commands
+from rtshcua.onboard.enforcement.executor import Commands, Made
 from rtshcua.wire import boundary_chain, response
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
 from rtshcua.wire.clock import bears_out
@@ -59,6 +60,16 @@ class PermitIssuer:
         return seal(Permit(*ref, serial, 0, 0, not_after_us), self._key)
 
 
+class _Ready(NamedTuple):
+    """What a mission needs that comes into force: its commands, the numbers of its steps' clauses, and SHA-256 of the
+    document that brings it.
+    """
+
+    made: Made
+    numbers: tuple[_Numbers, ...]
+    digest: bytes
+
+
 class SoftwareBoundary:
     """The boundary over a prepared bundle.
 
@@ -85,7 +96,9 @@ class SoftwareBoundary:
         self._slots = policy.policy.slots
         self._monitors = len(policy.monitors)
         self._shared: _Numbers = {clause: at for at, clause in enumerate(response.shared_clauses(policy.policy))}
-        self._own = self._own_numbers()
+        self._own = self._own_numbers(in_force.bundle.mission.invocations)
+        #: what was made ahead of a mission that may come into force, by the document that brings it
+        self._ready: dict[bytes, _Ready] = {}
         self._now_us = 0  # of the last request: time does not go back
         self._ahead_us: int | None = None  # UTC less monotonic time, as it was first told
 
@@ -144,7 +157,15 @@ class SoftwareBoundary:
 
         Gives why it is not to be trusted.
         """
-        return self._in_force.consider(document, now)
+        refused = self._in_force.consider(document, now)
+        after = self._in_force.considered(document)
+        if after is not None:
+            numbers = self._own_numbers(after.mission.invocations)
+            made = self._commands.made(after.mission)
+            self._ready[document] = _Ready(made, numbers, sha256(document).digest())
+            for old in list(self._ready)[:-MOST_AHEAD]:
+                self._ready.pop(old, None)
+        return refused
 
     def present(self, document: bytes, now: Now, released: int, own: Now | None = None) -> bytes:
         """Take in a signed document, if it is to be trusted. Nothing is raised, and nothing else is changed.
@@ -152,15 +173,17 @@ class SoftwareBoundary:
         `own` is as for `enforce`. `released` steps were released, as far as the runtime knows; more were if they were
         asked for here. An answer about a step whose id is used up comes too late.
         """
-        receipt = self._taken(document, now, released, own)
+        ready = self._ready.pop(document, None)
+        receipt = self._taken(document, now, released, own, ready)
         if receipt.accepted:
-            payload = boundary_chain.document(receipt.kind, receipt.step, now, sha256(document).digest())
+            digest = sha256(document).digest() if ready is None else ready.digest
+            payload = boundary_chain.document(receipt.kind, receipt.step, now, digest)
             evidence = self._chain.add(Tag.DOCUMENT, payload)
         else:
             evidence = self._chain.decline(document)
         return encode_receipt(replace(receipt, evidence=evidence))
 
-    def _taken(self, document: bytes, now: Now, released: int, own: Now | None) -> Receipt:
+    def _taken(self, document: bytes, now: Now, released: int, own: Now | None, ready: _Ready | None) -> Receipt:
         if now.monotonic_us < self._now_us:
             return Receipt(UNKNOWN, "time-went-back", "it came before the last request")
         disowned = self._disowned(now, own)
@@ -173,8 +196,9 @@ class SoftwareBoundary:
         receipt = self._session.take(document, now, released)
         self._commands.called_off = self._in_force.called_off
         if receipt.kind == REPLACEMENT and receipt.accepted:
-            self._commands.replace(self._in_force.bundle.mission)
-            self._own = self._own_numbers()
+            mission = self._in_force.bundle.mission
+            self._commands.replace(mission, None if ready is None else ready.made)
+            self._own = self._own_numbers(mission.invocations) if ready is None else ready.numbers
         return receipt
 
     def _disowned(self, named: Now, own: Now | None) -> Status | None:
@@ -245,10 +269,9 @@ class SoftwareBoundary:
                 return -1 - self._shared[degrade.rule]
         raise LookupError("no degrade rule has this target")
 
-    def _own_numbers(self) -> tuple[_Numbers, ...]:
+    def _own_numbers(self, steps: tuple[Invocation, ...]) -> tuple[_Numbers, ...]:
         """By step, the numbers of its contract's clauses, behind those of what all steps share."""
-        contracts = (prepared.invocation.contract for prepared in self._in_force.invocations)
         return tuple(
-            {clause: at for at, clause in enumerate(response.own_clauses(contract), len(self._shared))}
-            for contract in contracts
+            {clause: at for at, clause in enumerate(response.own_clauses(each.contract), len(self._shared))}
+            for each in steps
         )

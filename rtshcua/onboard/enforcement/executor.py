@@ -28,6 +28,8 @@ from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
 #: a command but for its token, and until when it may be sent
 _Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool]
+#: the commands of a mission, by kind, step and link
+Made = dict[tuple[int, int, int], _Made]
 
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 _UNTOUCHED = DEGRADE - 1
@@ -64,20 +66,26 @@ class Commands:
     def __init__(self, policy: Policy, mission: Mission) -> None:
         self.called_off = False
         self._policy = policy
-        self._made: dict[tuple[int, int, int], _Made] = {}
-        self._targets: dict[int, _Made] = {}
-        self.replace(mission)
-
-    def replace(self, mission: Mission) -> None:
-        """From now on these are the steps. All commands are made now, for when a link must fly there is no time."""
-        contingency, rules = enumerate(self._policy.contingency), enumerate(self._policy.rules)
-        self._made = {(CONTINGENCY_LINK, -1, number): self._of_link(link) for number, link in contingency}
+        self._contingency = policy.contingency
         # one of each rule, not of each step: there may be thousands of both
+        rules = enumerate(policy.rules)
         self._targets = {-1 - rule: self._of_link(each.target) for rule, each in rules if each.target is not None}
+        self._made = self.made(mission)
+
+    def replace(self, mission: Mission, made: Made | None = None) -> None:
+        """From now on these are the steps. All commands are made now, for when a link must fly there is no time; or
+        they were `made` for this mission before.
+        """
+        self._made = self.made(mission) if made is None else made
+
+    def made(self, mission: Mission) -> Made:
+        """The commands of a mission, in whatever thread."""
+        made = {(CONTINGENCY_LINK, -1, number): self._of_link(link) for number, link in enumerate(self._contingency)}
         for step, invocation in enumerate(mission.invocations):
-            self._made[STEP, step, -1] = self._of_step(invocation)
+            made[STEP, step, -1] = self._of_step(invocation)
             for number, link in enumerate(invocation.contract.fallback):
-                self._made[FALLBACK_LINK, step, number] = self._of_link(link)
+                made[FALLBACK_LINK, step, number] = self._of_link(link)
+        return made
 
     def command(self, kind: int, step: int, link: int, token: int, not_after_us: int = ALWAYS) -> Command:
         """The command, under the token of its permit, and until when that is good.

@@ -12,7 +12,7 @@ from struct import error as struct_error
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from rtshcua.decision.session import InForce
+from rtshcua.decision.session import MOST_AHEAD, InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, SIGNATURE
 from rtshcua.mavlink.signing import MINUTE, UNIT_US, Counts, Stream, stream_of, timestamp_in
@@ -20,7 +20,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import executor, frames, preparation
 from rtshcua.onboard.enforcement.ahead import NOT_AHEAD, Encode, FramesAhead
 from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
-from rtshcua.onboard.enforcement.executor import Ahead, Commands
+from rtshcua.onboard.enforcement.executor import Ahead, Commands, Made
 from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.clock import Source
@@ -170,6 +170,8 @@ class IsolatedBoundary:
         self._caller = caller
         self._in_force = in_force
         self._commands = commands
+        #: the commands of missions that may come into force, made ahead, by the document that brings them
+        self._ready: dict[bytes, Made] = {}
 
     @property
     def lost(self) -> str | None:
@@ -186,7 +188,13 @@ class IsolatedBoundary:
 
     def consider(self, document: bytes, now: Now) -> Untrusted | None:
         """Look at a document ahead, for what this end makes of it. Gives why it is not to be trusted."""
-        return self._in_force.consider(document, now)
+        refused = self._in_force.consider(document, now)
+        after = self._in_force.considered(document)
+        if after is not None:
+            self._ready[document] = self._commands.made(after.mission)
+            for old in list(self._ready)[:-MOST_AHEAD]:
+                self._ready.pop(old, None)
+        return refused
 
     def present(self, document: bytes, now: Now, released: int) -> bytes:
         """The boundary's receipt; what it accepted is in force at this end too."""
@@ -208,7 +216,7 @@ class IsolatedBoundary:
         self._in_force.take(document, now, decided=0, released=receipt.step if receipt.kind == REPLACEMENT else 0)
         self._commands.called_off = self._in_force.called_off
         if receipt.kind == REPLACEMENT:
-            self._commands.replace(self._in_force.bundle.mission)
+            self._commands.replace(self._in_force.bundle.mission, self._ready.pop(document, None))
 
 
 class IsolatedGate:

@@ -248,7 +248,7 @@ class EventHandler:
         """Present one document, act on what became of it, and answer."""
         receipt = self._receipt(now, event)
         if receipt.accepted:
-            self._accepted(now, receipt, event.document)
+            self._accepted(now, receipt, event.envelope or b64encode(event.document).decode())
         else:
             self._refused(now, receipt)
         self._journal.add(Reply(event.sender, receipt.slug, receipt.text))
@@ -262,10 +262,9 @@ class EventHandler:
         receipt = decode(self._boundary.present(document, now, self._controller.released))
         return Receipt(UNKNOWN, "unanswered", receipt.text) if isinstance(receipt, Refusal) else receipt
 
-    def _accepted(self, now: Now, receipt: Receipt, document: bytes) -> None:
+    def _accepted(self, now: Now, receipt: Receipt, envelope: str) -> None:
         controller, journal = self._controller, self._journal
         controller.retry.news()
-        envelope = b64encode(document).decode()
         if receipt.kind == APPROVAL:
             journal.effect(now, "approval", Ref(STEP, receipt.step, -1), detail=envelope)
         elif receipt.kind == RECALL:

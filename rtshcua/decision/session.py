@@ -138,6 +138,19 @@ class InForce:
         ahead = self._ahead.get(document)
         return None if ahead is None else ahead.after
 
+    def misfit(self, document: bytes, released: int) -> Untrusted | None:
+        """Why a replacement that was considered does not fit what is in force, of which `released` steps were released;
+        None where it does, or was not considered, or nothing comes of any document.
+        """
+        ahead = self._ahead.get(document)
+        if ahead is None or isinstance(ahead.found, Untrusted) or self.called_off:
+            return None
+        try:
+            fit_replacement(ahead.found, self.bundle, released, compared=self.bundle.mission_digest)
+        except Untrusted as error:
+            return error
+        return None
+
     def take(self, document: bytes, now: Now, *, decided: int, released: int, current: int = 0) -> Receipt:
         """Take a document in. The first `decided` steps are decided for good, the first `released` were released; those
         from `current` on are not over.

@@ -187,6 +187,18 @@ def test_a_boundary_elsewhere_is_asked_nothing_about_what_is_refused(monkeypatch
         assert run.busy["decoded"] == 0
 
 
+def test_a_boundary_elsewhere_is_asked_nothing_about_what_does_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rightly signed, each other octets: it would verify each, while the flight waits."""
+    of, kinds = elsewhere()
+    with flooded(of, monkeypatch) as run:
+        anew = [large(of, steps) for steps in (20, 21, 22)]
+        late = replacement(of, 0, replace(of.bundle.mission, issued_at_us=of.bundle.mission.issued_at_us + 2))
+        assert run.hand(late) == "already-released"
+        assert PRESENT not in kinds
+        assert [run.hand(document) for document in anew] == ["accepted", "superseded", "superseded"]
+        assert kinds.count(PRESENT) == 1
+
+
 @pytest.mark.parametrize("name", HOSTILE)
 def test_the_flights_thread_decodes_little_of_whatever_is_handed_in(run: Flooded, name: str) -> None:
     document, slug = HOSTILE[name]

@@ -200,6 +200,9 @@ class IsolatedBoundary:
         """The boundary's receipt; what it accepted is in force at this end too."""
         if len(document) > MAX_DOCUMENT:
             return encode_receipt(Receipt(UNKNOWN, "too-large", f"at most {MAX_DOCUMENT} bytes are read"))
+        misfit = self._in_force.misfit(document, released)
+        if misfit is not None:  # the boundary would verify it first, and answer nothing meanwhile
+            return encode_receipt(Receipt(REPLACEMENT, misfit.slug, str(misfit)))
         refused = self._caller.put(PRESENT, document)
         answer = refused or self._caller(PRESENT, _SHOWN.pack(*_times(now), released, len(document)))
         if isinstance(answer, Refusal):

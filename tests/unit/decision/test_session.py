@@ -359,6 +359,29 @@ def test_a_step_that_was_given_back_may_be_replaced() -> None:
     assert asked.session.take(paper, NOW).slug == "accepted"
 
 
+def test_what_was_considered_is_known_to_fit_or_not() -> None:
+    asked, of = confirmed(0)
+    in_force, fits, late = asked.in_force, documents.replacement(of), documents.replacement(of, 1)
+    other = documents.replacement(of, mission=replace(documents.shorter(of), name="another"))
+    forged = fits[:-1] + bytes([fits[-1] ^ 1])
+    assert (in_force.considered(fits), in_force.misfit(fits, 0)) == (None, None), "it was not considered"
+    assert [in_force.consider(each, NOW) is None for each in (fits, late, other, forged)] == [True, True, True, False]
+    after = in_force.considered(fits)
+    assert after is not None
+    assert len(after.mission.invocations) == 3
+    assert (in_force.considered(forged), in_force.misfit(forged, 0), in_force.misfit(fits, 2)) == (None, None, None)
+    refused = in_force.misfit(late, 2)
+    assert refused is not None
+    assert refused.slug == "already-released"
+    assert asked.session.take(fits, NOW).accepted
+    assert in_force.bundle == after
+    superseded = in_force.misfit(other, 0)
+    assert superseded is not None
+    assert superseded.slug == "superseded"
+    assert asked.session.take(documents.recall(of), NOW).accepted
+    assert in_force.misfit(other, 0) is None, "the mission was recalled, and that is why"
+
+
 def test_a_replacement_brings_steps_that_were_never_used() -> None:
     asked, of = confirmed(2)
     assert asked.used() == [0, 1]

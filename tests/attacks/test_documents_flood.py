@@ -18,7 +18,7 @@ import pytest
 from msgspec.structs import replace
 
 from hostile.documents import enveloped, head, hostile
-from reference.documents import low, low_mission, recall, replacement
+from reference.documents import large, low, low_mission, recall, replacement
 from reference.world import MISSION_KEY, ROOT, START, VEHICLE, Run, loaded, sealed_again
 from rtshcua.adapters.agent_socket import GAP_US, SHORT, WORK_AT_ONCE, WORK_RATE, AgentSocket, Encoded
 from rtshcua.cli import agents
@@ -143,16 +143,6 @@ def elsewhere() -> tuple[Loaded, list[int]]:
     )  # fmt: skip
     assert isinstance(of, Loaded), of
     return of, kinds
-
-
-def large(of: Loaded, steps: int = 60) -> bytes:
-    """A replacement of many steps."""
-    mission = of.bundle.mission
-    first, second, _, last = mission.invocations
-    more = [replace(second, step=number, invocation_id=number.to_bytes(16)) for number in range(2, steps)]
-    ends = replace(last, step=steps, invocation_id=steps.to_bytes(16))
-    anew = replace(mission, issued_at_us=mission.issued_at_us + 1, invocations=(first, second, *more, ends))
-    return replacement(of, 2, anew)
 
 
 @pytest.mark.parametrize("operators", [False, True], ids=["agents", "operators"])

@@ -32,7 +32,7 @@ SAMPLES: dict[str, dict[str, Any]] = {
     "evidence": {"RECORDS": 1_100, "SYNCED_RECORDS": 3, "ROUNDS": 1, "BLOCK": 100},
     "fence": {"LARGEST": 200, "ROUNDS": 1, "PLACES": 10, "PEER_S": 0.05},
     "fleet": {"VEHICLES": 1, "SPEED": 10},
-    "flood": {"BLOCKS": 1, "BLOCK_S": 0.5},
+    "flood": {"BLOCKS": 1, "BLOCK_S": 0.5, "STEPS": (4, 20), "TRIES": 1},
     "format": {"LINES": 100, "ROUNDS": 1},
     "hostile_link": {"DATAGRAMS": 8_000, "BLOCK": 1_000, "GOOD": 100},
     "lint": {"ROUNDS": 1, "FEW": 10, "MANY": 20},

@@ -74,6 +74,16 @@ def shorter(of: Loaded) -> Mission:
     return replace(mission, issued_at_us=mission.issued_at_us + S, invocations=(first, second, replace(last, step=2)))
 
 
+def large(of: Loaded, steps: int = 60) -> bytes:
+    """A signed replacement of many steps: the second one of the low mission again and again."""
+    mission = of.bundle.mission
+    first, second, _, last = mission.invocations
+    more = [replace(second, step=number, invocation_id=number.to_bytes(16)) for number in range(2, steps)]
+    ends = replace(last, step=steps, invocation_id=steps.to_bytes(16))
+    anew = replace(mission, issued_at_us=mission.issued_at_us + 1, invocations=(first, second, *more, ends))
+    return replacement(of, 2, anew)
+
+
 def replacement(of: Loaded, kept: int = 2, mission: Mission | None = None, key: SigningKey = MISSION_KEY) -> bytes:
     """A signed replacement, by the mission without its inspection if nothing else is said."""
     return sign_replacement(mission or shorter(of), over=of.bundle, flight=of.in_force.flight, kept=kept, key=key)

@@ -590,13 +590,15 @@ class Driver:
             events.append(each)
 
     def _watch_mode(self, before: int | None, now_us: int, events: list[Event]) -> None:
-        """In the air, and outside of any manoeuvre of ours, too, whoever changes the mode has taken over."""
+        """In the air, and outside of any manoeuvre of ours, too, whoever changes the mode has taken over. What may have
+        landed while nothing was heard chose another mode itself.
+        """
         mode, flavour = self.seen.mode, self.flavour
         if self._manoeuvre is not None or self._released or not self.seen.airborne or mode is None or flavour is None:
             return
         left, self._left_mode = self._left_mode, None
         before = before if left is None else left
-        if before in (None, mode) or (before, mode) in flavour.natural:
+        if before in (None, mode) or self.seen.may_rest or (before, mode) in flavour.natural:
             return
         if not arrives(self.left, flavour, before, mode):
             if left is None and not self._signed:  # the next report has to say so, too

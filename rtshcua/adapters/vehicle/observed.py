@@ -177,13 +177,14 @@ class ObservedVehicle:
 
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
     so now, of a position that is not old; `placed` is the last report of all, however old. `target` is where the
-    autopilot says that it flies to. `descent` is how fast it sinks and `tilt` how many degrees it leans (`tilt_us`:
-    measured then), whoever vouches for that. `beats` counts heartbeats and `targets` reports of a target (`target_us`:
-    told last); `up_us` is link time, see `LinkWatch`. `heard` counts frames of the autopilot, `numbered` those that it
-    sent by then, as their numbers tell, and `answers` its answers to questions for messages. `ahead` is what its range
-    finder last saw in front, at `ahead_us`. `notes` collects what an operator should know. `disarms`: one heartbeat
-    says that the motors are off; they count as off when the next one says so, too, or, while two speak under its ids
-    (`disputed`), when nothing else is said for a while. `landings` counts reports of `landed_state`.
+    autopilot says that it flies to. `speed_us` is the link time at which the last speed that is known was measured:
+    after a hold-up what waited is of long before. `descent` is how fast it sinks and `tilt` how many degrees it leans
+    (`tilt_us`: measured then), whoever vouches for that. `beats` counts heartbeats and `targets` reports of a target
+    (`target_us`: told last); `up_us` is link time, see `LinkWatch`. `heard` counts frames of the autopilot, `numbered`
+    those that it sent by then, as their numbers tell, and `answers` its answers to questions for messages. `ahead` is
+    what its range finder last saw in front, at `ahead_us`. `notes` collects what an operator should know. `disarms`:
+    one heartbeat says that the motors are off; they count as off when the next one says so, too, or, while two speak
+    under its ids (`disputed`), when nothing else is said for a while. `landings` counts reports of `landed_state`.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -201,6 +202,7 @@ class ObservedVehicle:
     levelled: bool = False
     home_amsl: int | None = None
     speed: int | None = None
+    speed_us: int = 0
     descent: int = 0
     placed_us: int = 0
     placed: Placed | None = None
@@ -273,7 +275,7 @@ class ObservedVehicle:
                 self.placed = Placed(at_us, height, 10 * message.vz)
                 if now_us - at_us > STALE_US:
                     return False
-                self._place(message, now_us)
+                self._place(message, now_us, at_us)
                 return True
             case "POSITION_TARGET_GLOBAL_INT":
                 before = self.target
@@ -425,7 +427,7 @@ class ObservedVehicle:
             self.notes.append(says)
         self.critical = critical
 
-    def _place(self, message: Any, now_us: int) -> None:
+    def _place(self, message: Any, now_us: int, at_us: int) -> None:
         estimator = self.estimator
         self.located, self.levelled = estimator.position(now_us), estimator.height(now_us)
         if self.located:
@@ -437,6 +439,8 @@ class ObservedVehicle:
         known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
         # from cm/s; without a speed that the estimator knows, it does not count as still
         self.speed = round(10 * hypot(message.vx, message.vy, message.vz)) if known else None
+        if known:
+            self.speed_us = self.up_us - (now_us - at_us)
         self.descent, self.placed_us = 10 * message.vz, now_us
 
 

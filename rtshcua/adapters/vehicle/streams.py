@@ -34,6 +34,8 @@ AT_TIMES: Mapping[str, Rate] = {"POSITION_TARGET_GLOBAL_INT": Rate(100_000, 500_
 SHARE: Final = 80
 _SECOND: Final = 1_000_000
 _POSITION: Final = "GLOBAL_POSITION_INT"
+#: of which the first report alone is not believed (`telemetry.Batteries`)
+_COUNT_TWICE: Final = frozenset({"BATTERY_STATUS"})
 _NEVER_US: Final = -1
 #: What is no stream, but an answer or an event: it is not turned off.
 _ANSWERS: Final = frozenset({
@@ -124,6 +126,7 @@ class StreamRequests:
         self._queue = [*self._wanted, *self._at_times]
         self._refused: set[str] = set()
         self._heard_us: dict[str, int] = {}
+        self._first: set[str] = set()  # what was heard once, and does not count yet
         self._asking: str | None = None
         self._asked_us = self._looked_us = 0
         #: before then `due` gives nothing, so nobody need call it
@@ -153,7 +156,9 @@ class StreamRequests:
 
     def heard(self, name: str, now_us: int, octets: int = 0) -> None:
         """A message came, in a frame of so many octets."""
-        if name != _POSITION or not self._estimator or self._estimator in self._heard_us:
+        if name in _COUNT_TWICE and name not in self._first:
+            self._first.add(name)
+        elif name != _POSITION or not self._estimator or self._estimator in self._heard_us:
             self._heard_us[name] = now_us
         self._octets += octets
         counts = self._counts
@@ -214,6 +219,7 @@ class StreamRequests:
     def renew(self, now_us: int) -> None:
         """What was heard so far does not count as heard."""
         self._heard_us.clear()
+        self._first.clear()
         self._since_us, self._once_us = now_us, None
 
     def due_once(self, system: int, now_us: int) -> list[Message]:
@@ -227,6 +233,7 @@ class StreamRequests:
         if _POSITION in names and self._estimator and self._estimator not in self._heard_us:
             names.add(self._estimator)
         ordered = sorted(names, key=lambda name: (name == _POSITION, name))  # after who vouches for it
+        ordered += sorted(names & _COUNT_TWICE)
         return [messages.request(system, name) for name in ordered if messages.number_of(name) is not None]
 
     @property

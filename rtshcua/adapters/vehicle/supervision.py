@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle.effects import STILL, apart, still
 from rtshcua.adapters.vehicle.flavour import KEPT, KEPT_LEVEL, ExpectedProgress, ExpectedTarget
-from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STOPPED, ObservedVehicle, Placed, Reported
+from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STALE_US, STOPPED, ObservedVehicle, Placed, Reported
 from rtshcua.model.flat.policy import Vehicle
 
 NEVER: Final = (1 << 63) - 1  # us
@@ -110,18 +110,21 @@ class BrakingWatch:
         """Whether it is faster than it may be by now, or moves when it must stand still.
 
         `obeyed`: the command was acknowledged, or its mode shows. The speed that it must lose is the greatest until its
-        effect must show. A speed that is not known is none that fell.
+        effect must show. A speed counts at the time at which it was measured. One that is not known any more, and was
+        not for as long as it may be old, is none that fell.
         """
         if self._since_us is None and obeyed:
             self._since_us = seen.up_us
-        if self._since_us is None or seen.up_us - self._since_us <= self._brakes.reaction_us + LAG_US:
+        at_us = seen.up_us if seen.speed is None else seen.speed_us
+        if self._since_us is None or at_us - self._since_us <= self._brakes.reaction_us + LAG_US:
             if seen.speed is not None:  # it may have been told to stop while it still gathered speed
                 self._speed = max(self._speed or 0, seen.speed)
             return False
-        passed_us, speed = seen.up_us - self._since_us, self._speed or 0
-        if passed_us > self._brakes.stands_us(speed):
-            return seen.speed is None or seen.speed > STILL
-        return seen.speed is not None and seen.speed > self._brakes.fastest(speed, passed_us) + STILL
+        passed_us, speed = at_us - self._since_us, self._speed or 0
+        stands = passed_us > self._brakes.stands_us(speed)
+        if seen.speed is None:
+            return stands and seen.up_us - seen.speed_us > STALE_US
+        return seen.speed > (STILL if stands else self._brakes.fastest(speed, passed_us) + STILL)
 
 
 # ---------------------------------------------------------------- somebody else's target
@@ -333,8 +336,8 @@ class PauseWatch:
             self._since_us = None
             return False
         if self._since_us is None:
-            self._since_us = seen.up_us
-        return seen.up_us - self._since_us >= STANDS_US
+            self._since_us = seen.speed_us
+        return seen.speed_us - self._since_us >= STANDS_US
 
 
 def stands_idly(
@@ -379,10 +382,10 @@ class SpeedWatch:
             self._since_us = None
             return False
         if self._since_us is None or not steadily:
-            self._since_us, self._low, self._high = seen.up_us, speed, speed
+            self._since_us, self._low, self._high = seen.speed_us, speed, speed
             return False
         self._low, self._high = min(self._low, speed), max(self._high, speed)
-        if seen.up_us - self._since_us < SLOW_US:
+        if seen.speed_us - self._since_us < SLOW_US:
             return False
         self.slow = speed
         return True

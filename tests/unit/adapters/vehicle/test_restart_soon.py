@@ -12,11 +12,12 @@ from rtshcua.adapters.vehicle.messages import number_of
 from rtshcua.adapters.vehicle.streams import ANSWER_US, StreamRequests, plan_streams
 from rtshcua.codec.frames import Codec
 from rtshcua.decision.rates import Rate
+from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.model.faults import LinkLoss, PilotGoto
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.left import InForce, Left
-from rtshcua.onboard.ports import Command, Readings, Ready
+from rtshcua.onboard.ports import Command, Readings, Ready, TakenOver
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual.copying import copied
@@ -90,6 +91,20 @@ def test_where_frames_are_lost_a_target_is_waited_for_as_before() -> None:
     one.vehicle.simulation.inject(PilotGoto(0, 100_000, 0, 30_000))
     one.wait(0.2)
     assert begun_again(one).until(Ready, 10).others == "another target"
+
+
+@pytest.mark.parametrize(("armed", "taken"), [(False, []), (True, ["Return"])])
+def test_what_landed_while_nothing_was_heard_was_not_taken_over(armed: bool, taken: list[str]) -> None:
+    """The last word that it flies is old, and the first that is new says that its motors are off, in another mode."""
+    one = begun_again(copied(left_climbing("px4")))
+    one.until(Ready, 1)
+    one.vehicle.hurt = lambda datagram: ()
+    one.wait(5)
+    beat = mavlink.MAVLink_heartbeat_message(2, 12, 128 if armed else 0, Px4Mode.RETURN, 4, 3)
+    codec = Codec(1, 1)
+    for _ in range(2):
+        one.events += one.vehicle.driver.receive(codec.pack(beat), one.now_us).events
+    assert [event.how for event in one.events if isinstance(event, TakenOver)] == taken
 
 
 def questions(frames: Any) -> list[tuple[int, int]]:

@@ -5,8 +5,11 @@ by the ground speed alone, never by an acknowledgement or a mode.
 """
 
 from collections.abc import Callable
+from functools import cache
+from itertools import product
 from typing import Any
 
+import msgspec
 import pytest
 
 from rtshcua.adapters.vehicle.driver import Driver
@@ -16,8 +19,12 @@ from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.supervision import LAG_US, Brakes, BrakingWatch, StageProgress
 from rtshcua.model.faults import Kill, LinkDelay, Mode, Pillar
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Crashed, Failed, Ready, Succeeded, TakenOver
+from rtshcua.onboard.ports import Crashed, Event, Failed, Ready, Succeeded, TakenOver
+from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.vehicle import Vehicle
+from rtshcua.virtual.vehicle import VirtualVehicle
+from virtual.copying import copied
+from virtual.flyer import Flyer
 from virtual.policy import POLICY
 from virtual.rows import rows
 from virtual.sampling import each_once
@@ -162,8 +169,11 @@ def speeds(
     stop: BrakingWatch, of: Callable[[float], int | None], until_s: float = 20, obeyed_s: float = 0
 ) -> float | None:
     """When a stop from 10 m/s fails, where the speed is `of` the seconds since; None: it does not."""
+    known_us = 0
     for tick in range(round(until_s * 10)):
-        seen = ObservedVehicle(up_us=tick * S // 10, speed=of(tick / 10))
+        speed = of(tick / 10)
+        known_us = known_us if speed is None else tick * S // 10
+        seen = ObservedVehicle(up_us=tick * S // 10, speed=speed, speed_us=known_us)
         if stop.has_failed(seen, obeyed=tick / 10 >= obeyed_s):
             return tick / 10
     return None
@@ -210,6 +220,58 @@ def test_a_speed_that_nobody_knows_has_not_fallen() -> None:
     stands_s = (BRAKES.reaction_us + 2 * LAG_US) / S
     assert speeds(stop_from(None), lambda s: None) == pytest.approx(stands_s, abs=0.2)
     assert speeds(stop_from(10_000), lambda s: None) is not None
+
+
+def test_a_speed_that_is_not_known_for_a_moment_is_not_held_against_it() -> None:
+    """After a hold-up what waited is too old, and what is fresh has not come yet."""
+    stands_s = BRAKES.stands_us(10_000) / S
+    braking = speeds(
+        stop_from(10_000), lambda s: None if abs(s - stands_s) < 0.8 else round(max(0.0, 9_000 - 2_000 * s))
+    )
+    assert braking is None
+
+
+#: how it brakes at the least that a flight without a hold-up still passes, in mm/s^2
+TIGHT = {"px4": 4_000, "ardupilot": 6_000}
+
+
+@cache
+def stopping_tightly(flavour: str) -> Flyer:
+    """From 10 m/s, with brakes declared as good as they are."""
+    one = Flyer(flavour)
+    policy = msgspec.structs.replace(
+        POLICY, vehicle=msgspec.structs.replace(POLICY.vehicle, braking=TIGHT[flavour], reaction_us=100_000)
+    )
+    one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=Kind(flavour), return_mm=22_000))
+    one.up(20_000)
+    one.begin(MotionKind.FLY, (600_000, 0), altitude=20_000, speed=10_000)
+    one.wait(8)
+    one.begin(MotionKind.HOLD)
+    return one
+
+
+def stalled(flavour: str, after_ms: int, for_ms: int) -> list[Event]:
+    """What ends a stop in which our computer stands still for a while."""
+    one = copied(stopping_tightly(flavour))
+    one.wait(after_ms / 1_000)
+    one.vehicle.stand_still(for_ms * 1_000)
+    return [event for event in one.wait(8) if isinstance(event, (Failed, TakenOver, Crashed))]
+
+
+@pytest.mark.parametrize(("after_ms", "flavour"), each_once([2_200, 2_900, 3_400], ["px4", "ardupilot"]))
+def test_what_waited_while_nobody_read_is_held_against_its_own_time(after_ms: int, flavour: str) -> None:
+    """A speed of before was held against what it may be a second later: `did-not-stop`, and it was flown home."""
+    for for_ms in (300, 1_000, 6_000):
+        assert stalled(flavour, after_ms, for_ms) == []
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_no_hold_up_makes_a_stop_fail(flavour: str) -> None:
+    for after_ms, for_ms in product(
+        range(0, 6_000, 100), (300, 700, 1_000, 1_500, 2_000, 3_000, 6_000, 15_000, 30_000)
+    ):
+        assert stalled(flavour, after_ms, for_ms) == [], (after_ms, for_ms)
 
 
 def test_a_vehicle_without_declared_brakes_is_given_a_cautious_guess() -> None:

@@ -57,12 +57,6 @@ def flies(step: int) -> Callable[[Apart], bool]:
     return dies
 
 
-#: a flight of ten minutes takes as long as ten tests
-LONG = [
-    pytest.param(*each, marks=() if each == ("px4", "signed") else pytest.mark.soak) for each in product(FLAVOURS, KEYS)
-]
-
-
 def after_loss(flown: Any) -> list[tuple[int, int, int]]:
     """The links that flew without the boundary."""
     lost = next(n for n, record in enumerate(flown.records) if record.get("event") == "boundary-lost")
@@ -84,7 +78,9 @@ def came_down(flown: Any) -> None:
     assert report.shortfall.slug == "boundary/lost"
 
 
-@pytest.mark.parametrize(("flavour", "key"), LONG)
+@pytest.mark.soak  # each takes as long as ten tests
+@pytest.mark.parametrize("key", KEYS)
+@pytest.mark.parametrize("flavour", FLAVOURS)
 def test_ten_minutes_after_takeoff(flavour: str, key: str, apart: Make) -> None:
     of = apart(flavour, KEYS[key], legs=80, hover_us=40 * 60 * S)
     took_off: list[int] = []

@@ -34,6 +34,7 @@ def test_both_answer_the_same(tmp_path: Path) -> None:
     assert wanted <= counts.keys(), wanted - counts.keys()
 
 
+@pytest.mark.soak
 def test_both_stop_signing_ahead_at_the_same_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A link that is signed ahead again and again, until no more is."""
     monkeypatch.setattr(together, "FLOODS", 1)

@@ -197,12 +197,10 @@ def test_a_target_that_is_told_late_is_waited_for_before_a_restart_takes_the_fli
 
 @pytest.mark.parametrize(
     "taken",
-    [
-        at(468, faults.BatteryLevel(0, 900)),
-        pytest.param(at(513.5, faults.PilotMode(0, Mode.LAND)), marks=pytest.mark.soak),
-    ],
+    [at(468, faults.BatteryLevel(0, 900)), at(513.5, faults.PilotMode(0, Mode.LAND))],
     ids=["failsafe", "pilot"],
 )
+@pytest.mark.soak  # each flies for nine minutes
 def test_a_landing_is_not_sent_again_to_a_vehicle_that_was_landed_by_others(taken: Incident) -> None:
     """The link to it was dead, so ours had not arrived; its mode was the one that ours asks for."""
     was = flown(of("ardupilot", at(35, faults.LinkSilence(0, None, Way.UP)), taken))

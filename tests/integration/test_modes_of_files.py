@@ -16,7 +16,7 @@ SECRET = ("keys", "state", "link.key")
 MOST = 30
 
 
-@pytest.fixture(params=[0o000, 0o077], ids=["000", "077"])
+@pytest.fixture(params=[0o000, pytest.param(0o077, marks=pytest.mark.soak)], ids=["000", "077"])
 def umask(request: pytest.FixtureRequest) -> Iterator[int]:
     before = os.umask(request.param)
     yield request.param

@@ -5,16 +5,20 @@ from math import hypot
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode
 from rtshcua.model.scenario import AfterStep
+from rtshcua.onboard.ports import Ending
 from rtshcua.virtual.flown import Sample, ScenarioFlown
 from rtshcua.virtual.judge import judge, local_mm
 from virtual import case
+from virtual.flight import Flight
 from virtual.sampling import each_once
 from virtual.scenarios import flown, scenario, when
-from virtual.shipped import sealed
+from virtual.shipped import sealed, shipped, simulated
 
 M = 1_000
 CEILING, RADIUS = 26, 15
@@ -105,3 +109,20 @@ def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str,
     assert [each.slug for each in judge(found).failures] == []
     last = found.samples[-1]
     assert hypot(*local_mm(found.policy, last.latitude, last.longitude)) < 3 * M, "it came home"
+
+
+def test_a_px4_with_a_rally_point_is_not_flown() -> None:
+    """Its return leads to the nearest of home and rally points, and no parameter tells that there are some."""
+    flight = Flight(shipped("short"), simulated("px4"))
+    ground, point = Codec(255, 190), (473_980_000, 85_460_000, 20)
+    for message in (
+        mavlink.MAVLink_mission_count_message(1, 1, 1, mavlink.MAV_MISSION_TYPE_RALLY),
+        mavlink.MAVLink_mission_item_int_message(
+            1, 1, 0, 6, mavlink.MAV_CMD_NAV_RALLY_POINT, 0, 1, 0, 0, 0, 0, *point, mavlink.MAV_MISSION_TYPE_RALLY
+        ),
+    ):
+        flight.vehicle.simulation.receive(ground.pack(message), 0)
+    ended = flight.fly()
+    assert ended.ending is Ending.REFUSED
+    assert "(it has 1 rally point)" in (flight.vehicle.driver.unready or "")
+    assert not any(record.get("event") == "dispatched" for record in ended.records)

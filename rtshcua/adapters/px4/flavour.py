@@ -109,4 +109,5 @@ PX4 = AutopilotFlavour(
     bytewise=True,
     fence=FenceHabits(frame=enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, all_inclusions=False, switches=()),
     own_fence=OwnFence("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
+    counts_rally_points=True,
 )

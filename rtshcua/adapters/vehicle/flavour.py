@@ -165,6 +165,7 @@ class AutopilotFlavour:
     fence: FenceHabits
     own_fence: OwnFence
     names_targets: bool = False
+    counts_rally_points: bool = False
 
     def mode_name(self, number: int) -> str:
         """The autopilot's name of a `custom_mode`, or the number itself."""

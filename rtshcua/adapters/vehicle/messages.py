@@ -22,6 +22,7 @@ SET_INTERVAL = enums.MAV_CMD_SET_MESSAGE_INTERVAL
 REQUEST_MESSAGE = enums.MAV_CMD_REQUEST_MESSAGE
 RUN_PREARM_CHECKS = enums.MAV_CMD_RUN_PREARM_CHECKS
 FENCE = enums.MAV_MISSION_TYPE_FENCE
+RALLY = enums.MAV_MISSION_TYPE_RALLY
 
 Message = Any  # one of pymavlink's classes
 
@@ -157,6 +158,16 @@ def fence_item(system: int, number: int, frame: int, item: FenceItem) -> Message
 def fence_list(system: int) -> Message:
     """MISSION_REQUEST_LIST: how many items has the fence?"""
     return dialect.MAVLink_mission_request_list_message(system, _AUTOPILOT, FENCE)
+
+
+def rally_list(system: int) -> Message:
+    """MISSION_REQUEST_LIST: how many rally points has it?"""
+    return dialect.MAVLink_mission_request_list_message(system, _AUTOPILOT, RALLY)
+
+
+def rally_received(system: int) -> Message:
+    """MISSION_ACK that ends that question: their number is all that is wanted."""
+    return dialect.MAVLink_mission_ack_message(system, _AUTOPILOT, dialect.MAV_MISSION_ACCEPTED, RALLY)
 
 
 def fence_request(system: int, number: int) -> Message:

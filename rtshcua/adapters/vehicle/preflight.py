@@ -15,7 +15,7 @@ from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, ReturnAltitude
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import RETRIES, RETRY_US, VehicleParameters
-from rtshcua.adapters.vehicle.returns import ReturnLimits
+from rtshcua.adapters.vehicle.returns import RallyPoints, ReturnLimits
 from rtshcua.mavlink.quantise import hypot_mm, quantise
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -49,12 +49,13 @@ class Preflight:
         self._projection, self._home_within = policy.projection, policy.vehicle.home_within
         self._wanted_mm = policy.vehicle.return_altitude
         self._limits = ReturnLimits(flavour.limits, policy.vehicle)
+        self._rally = RallyPoints(wanted=flavour.counts_rally_points and bool(self._wanted_mm), slack=slack)
         self._parameters = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
         self._fencing = Fencing(policy, flavour, self._parameters, wanted=fence, slack=slack)
         self._policy, self._steps = policy, steps
         self._arms = (fence or judges) and bool(flavour.fence.switches and fence_of(policy, flavour.fence).items)
         self._meant = meant
-        self._told = False
+        self._told = self._rally_told = False
         self._missed: set[str] = set()  # what limits its way home and was not answered, as far as that was told
         self._advised = 0  # what its circle was said to be set to
         self._reached: tuple[tuple[int, int], bounds.Reach] | None = None  # where it stood, and what was made of it
@@ -70,7 +71,7 @@ class Preflight:
         for name in self._flavour.own_fence.names if self._steps else ():
             if name not in self._parameters.values:
                 self._parameters.read(name)
-        out = self._parameters.due(system, now_us)
+        out = [*self._parameters.due(system, now_us), *self._rally.due(system, now_us)]
         if self._seen.prearm_fails and (self._checked_us is None or now_us - self._checked_us >= CHECK_US):
             self._checked_us = now_us
             out.append(messages.command(system, messages.RUN_PREARM_CHECKS))
@@ -83,6 +84,12 @@ class Preflight:
                     f"{names} was not answered within {RETRIES * RETRY_US // 1_000_000} s, so it counts as one that it "
                     "does not have; if it has it, its way home may not be the one that is proved"
                 )
+        if self._rally.silent and not self._rally_told:
+            self._rally_told = True
+            self.notes.append(
+                f"it did not say within {(RETRIES + 1) * RETRY_US // 1_000_000} s how many rally points it has, so it "
+                "counts as a vehicle without; if it has any, its way home may not be the one that is proved"
+            )
         if not self._told and self._fencing.unready is None:
             self._told = True
             self.notes.append(self._fencing.note)
@@ -94,7 +101,7 @@ class Preflight:
         if name == "PARAM_VALUE":
             self._parameters.take(message)
             return []
-        return self._fencing.take(name, message, system, now_us)
+        return self._rally.take(name, message, system) + self._fencing.take(name, message, system, now_us)
 
     def _narrower_than_airspace(self) -> list[str]:
         """What of the airspace its own fence takes away, though the mission does without."""
@@ -128,13 +135,14 @@ class Preflight:
     def astray(self) -> str | None:
         """What is known to be otherwise than the policy has it, in words."""
         returns = None if self._found is None else self._returns_at(self._found)
-        return self._far_from_home() or returns or self._limits.wrong(self._values) or self._bounded()
+        wrong = self._limits.wrong(self._values) or self._rally.wrong
+        return self._far_from_home() or returns or wrong or self._bounded()
 
     @property
     def unfit(self) -> str | None:
         """What of its parameters is otherwise than the policy or the mission has it, in words: waiting changes none."""
         returns = None if self._found is None else self._returns_at(self._found)
-        return returns or self._limits.wrong(self._values) or self._bounded()
+        return returns or self._limits.wrong(self._values) or self._rally.wrong or self._bounded()
 
     @property
     def unplaced(self) -> str | None:
@@ -145,7 +153,7 @@ class Preflight:
     def unread(self) -> str | None:
         """That its return altitude is not known, in words."""
         if not self._wanted_mm or self._found is not None:
-            return self._limits.unread(self._parameters) or self._bounds_unread()
+            return self._limits.unread(self._parameters) or self._rally.unread or self._bounds_unread()
         names = [each.parameter for each in self._flavour.returns]
         quoted = " or ".join(f"`{name}`" for name in names)
         if all(map(self._parameters.is_absent, names)):

@@ -3,9 +3,11 @@ proved (`decision.volume`): docs/flying/returns.md has the sources.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from rtshcua.adapters.vehicle.parameters import VehicleParameters
+from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.parameters import RETRIES, RETRY_US, VehicleParameters
 from rtshcua.decision.volume import SHORT, STEEP, cone
 from rtshcua.mavlink.quantise import quantise
 from rtshcua.model.flat.policy import Vehicle
@@ -145,3 +147,61 @@ class ReturnLimits:
         """
         groups = [[each.parameter for each in group] for group in self._limits]
         return [" or ".join(f"`{name}`" for name in group) for group in groups if all(map(parameters.is_absent, group))]
+
+
+_UNSUPPORTED: Final = 3  # MAV_MISSION_RESULT
+
+
+class RallyPoints:
+    """How many rally points there are, to which a return may lead that is nearer to them than to home: asked for by the
+    mission protocol where no parameter tells. A vehicle that does not answer counts as one that has none, and that is
+    told.
+    """
+
+    def __init__(self, *, wanted: bool, slack: int = 1) -> None:
+        self._wanted = wanted
+        self._retry_us = RETRY_US * slack
+        self._asked_us: int | None = None
+        self._asked, self._silent = 0, False
+        self._count: int | None = None
+
+    def due(self, system: int, now_us: int) -> list[Message]:
+        """The question, where it is due."""
+        early = self._asked_us is not None and now_us - self._asked_us < self._retry_us
+        if not self._wanted or self._count is not None or early:
+            return []
+        if self._asked > RETRIES:
+            self._silent = True
+            return []
+        self._asked_us, self._asked = now_us, self._asked + 1
+        return [messages.rally_list(system)]
+
+    def take(self, name: str, message: Any, system: int) -> list[Message]:
+        """A message of the mission protocol; what answers it."""
+        if not self._wanted or message.mission_type != messages.RALLY:
+            return []
+        if name == "MISSION_COUNT":
+            self._count = message.count
+            return [messages.rally_received(system)] if message.count else []
+        if name == "MISSION_ACK" and message.type == _UNSUPPORTED:
+            self._count = 0
+        return []
+
+    @property
+    def silent(self) -> bool:
+        """Whether it was asked often enough, and does not answer."""
+        return self._silent and self._count is None
+
+    @property
+    def unread(self) -> str | None:
+        """That their number is not known yet, in words."""
+        waits = self._wanted and self._count is None and not self.silent
+        return "its rally points were not counted yet" if waits else None
+
+    @property
+    def wrong(self) -> str | None:
+        """That there are some, in words."""
+        if not self._count:
+            return None
+        many = "1 rally point" if self._count == 1 else f"{self._count} rally points"
+        return f"its way home would not be {ELSEWHERE} (it has {many}): clear them, and upload none"

@@ -52,6 +52,7 @@ class Port:
         self.lose: Callable[[str], bool] = lambda name: False
         self.bend: Callable[[Any], Any] = lambda message: message
         self.heard: list[str] = []
+        self.rally: Callable[[], list[Any]] = lambda: [mavlink.MAVLink_mission_count_message(1, 191, 0, 2)]
 
     def ask(self, number: int) -> Any:
         kind = mavlink.MAVLink_mission_request_message if self.legacy else mavlink.MAVLink_mission_request_int_message
@@ -74,6 +75,8 @@ class Port:
                 self.items[m.seq] = m
                 missing = next((number for number in range(self.count) if number not in self.items), None)
                 return [mavlink.MAVLink_mission_ack_message(1, 191, 0, 1) if missing is None else self.ask(missing)]
+            case "MISSION_REQUEST_LIST" if m.mission_type == 2:
+                return self.rally()
             case "MISSION_REQUEST_LIST":
                 return [mavlink.MAVLink_mission_count_message(1, 191, len(self.items), 1)]
             case "MISSION_REQUEST_INT":
@@ -231,6 +234,47 @@ def test_a_limit_of_the_way_home_that_stays_silent_is_told_once(flavour: Flavour
     ]
 
 
+@pytest.mark.parametrize(("count", "told"), [(1, "1 rally point"), (7, "7 rally points")])
+def test_px4s_rally_points_keep_it_from_being_ready(count: int, told: str) -> None:
+    """A return leads to the one that is nearest, with RTL_TYPE 0 too; no parameter tells of them."""
+    one, port = preflight(PX4), Port(PX4)
+    port.rally = lambda: [mavlink.MAVLink_mission_count_message(1, 191, count, 2)]
+    port.settle(one, 10)
+    wrong = f"its way home would not be to the place that is proved (it has {told}): clear them, and upload none"
+    assert (one.unready, one.unfit) == (wrong, wrong)
+    assert "MISSION_ACK" in port.heard, "the vehicle waits for no more questions"
+    assert "MISSION_COUNT" not in port.heard, "its fence stays as it is"
+
+
+def test_arducopter_tells_of_its_rally_points_by_a_parameter_alone() -> None:
+    one, port = preflight(ARDUPILOT, fence=False), Port(ARDUPILOT)
+    port.settle(one)
+    assert "MISSION_REQUEST_LIST" not in port.heard
+
+
+def test_px4_that_knows_no_rally_points_has_none() -> None:
+    one, port = preflight(PX4, fence=False), Port(PX4)
+    port.rally = lambda: [mavlink.MAVLink_mission_ack_message(1, 191, 3, 2)]
+    port.settle(one, 3)
+    assert one.unready is None
+    assert not [note for note in one.notes if "rally" in note]
+
+
+def test_px4_that_tells_of_no_rally_points_is_asked_again_and_that_is_told() -> None:
+    one, port = preflight(PX4, fence=False), Port(PX4)
+    port.rally = list
+    port.settle(one, 3)
+    assert one.unready == "its rally points were not counted yet"
+    port.settle(one)
+    assert one.unready is None
+    (told,) = [note for note in one.notes if "rally" in note]
+    assert told.startswith("it did not say within 6 s how many rally points it has")
+    busy = preflight(PX4, fence=False)
+    port.rally = lambda: [mavlink.MAVLink_mission_ack_message(1, 191, 1, 2)]
+    port.settle(busy, 3)
+    assert busy.unready == "its rally points were not counted yet"
+
+
 @FLAVOURS
 def test_a_policy_that_says_no_return_altitude_asks_for_none(flavour: Flavour) -> None:
     one, port = Preflight(POLICY, flavour, at_home(), fence=False), Port(flavour, {})
@@ -267,7 +311,7 @@ def test_a_fence_that_is_refused_or_kept_otherwise_keeps_it_from_being_ready(fla
     assert "it holds another item 2 than it was sent" in (other.unready or "")
 
     def shorter(message: Any) -> Any:
-        if message.get_type() == "MISSION_COUNT":
+        if message.get_type() == "MISSION_COUNT" and message.mission_type == 1:
             message.count = 3
         return message
 
@@ -323,7 +367,7 @@ def test_what_failed_is_begun_again(flavour: Flavour) -> None:
     port.settle(one)
     assert one.unready is None
     switched = "; switched on with `FENCE_TYPE` from 3 to 7 and `FENCE_ENABLE` from 0 to 1, which stays so"
-    assert one.notes == [
+    assert [note for note in one.notes if "rally" not in note] == [
         "its fence was set to the policy's airspace (4 items), and read back"
         + (switched if flavour is ARDUPILOT else "")
     ]

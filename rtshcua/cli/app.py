@@ -16,6 +16,7 @@ from rtshcua import __version__
 from rtshcua.cli.faults import as_json, barrier, fail, say, say_lines
 from rtshcua.cli.streams import mend_streams
 from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
+from rtshcua.cli.width import fitted
 from rtshcua.diagnostics.exits import ExitCode
 
 #: the commands whose `--json` is that of `Findings`
@@ -155,15 +156,18 @@ def overview(*, bold: bool) -> str:
         return f"\033[1m{text}\033[0m" if bold else text
 
     lines = [
-        f"{head('rtshcua')} {__version__}: an agent may propose what a drone does, and can never make the drone do it",
+        f"{head('rtshcua')} {__version__}: an agent may propose what a drone does,",
+        "and can never make the drone do it",
         "",
         f"{head('usage')}  rtshcua COMMAND [OPTIONS] ...",
     ]
     for group, title in GROUPS.items():
         lines += ["", head(title)]
-        lines += [f"  {row.name:<{width}}  {row.help}" for row in COMMANDS if row.group == group]
+        for row in COMMANDS:
+            lines += fitted(f"  {row.name:<{width}}  {row.help}") if row.group == group else []
     lines += ["", head("For example")]
-    lines += [f"  {line:<{example_width}}  {what}" for line, what in EXAMPLES]
+    for line, what in EXAMPLES:
+        lines += fitted(f"  {line:<{example_width}}  {what}")
     lines += [
         "",
         head("Options"),

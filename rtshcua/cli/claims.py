@@ -3,14 +3,11 @@
 import os
 import sys
 from collections.abc import Iterable, Sequence
-from textwrap import wrap
 
 from rtshcua.cli.stdout import out
+from rtshcua.cli.width import fitted
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.evidence.finding import Claim
-
-#: characters in a line
-WIDTH = 100
 
 
 def listed(title: str, style: str, mark: str, claims: Sequence[Claim]) -> list[tuple[str, str]]:
@@ -19,8 +16,7 @@ def listed(title: str, style: str, mark: str, claims: Sequence[Claim]) -> list[t
         return []
     lines = [("", ""), ("bold", title)]
     for claim in claims:
-        head, *more = wrap(visible(claim.text), WIDTH)
-        lines += [(style, f"  {mark} {head}"), *((style, f"    {line}") for line in more)]
+        lines += [(style, f"  {mark} {visible(claim.text)}")]
     return lines
 
 
@@ -34,4 +30,5 @@ def write(lines: Iterable[tuple[str, str]]) -> None:
 
     console = Console(highlight=False)
     for style, text in lines:
-        console.print(Text(visible(text), style))
+        for line in fitted(visible(text)):
+            console.print(Text(line, style), soft_wrap=True)

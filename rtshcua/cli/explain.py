@@ -13,8 +13,7 @@ from rtshcua.cli.stdout import out, out_json, out_rendered
 from rtshcua.diagnostics.codes import REGISTRY, Code
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
-
-_WIDTH = 78
+from rtshcua.diagnostics.wrapped import WIDTH
 
 app = typer.Typer(add_completion=False)
 
@@ -44,7 +43,7 @@ def explain(
     elif sys.stdout.isatty():
         _draw(page.text)
     else:
-        out_rendered(page.text, end="")
+        out_rendered(_reflowed(page.text), end="")
     return ExitCode.OK
 
 
@@ -62,8 +61,7 @@ def _of_log(word: str, *, as_json: bool) -> ExitCode:
         out_json(json.dumps(said, indent=2, ensure_ascii=False))
         return ExitCode.OK
     out(f"{found.slug}: {found.found}")
-    for line in wrap(found.meaning, _WIDTH):
-        out(line)
+    out(found.meaning)
     out(f"exit code {int(found.exit_code)}: {found.exit_code.meaning}")
     if found.help:
         out(f"help: {found.help}")
@@ -96,4 +94,24 @@ def _draw(text: str) -> None:
     from rich.console import Console
     from rich.markdown import Markdown
 
-    Console(width=min(Console().width, 100)).print(Markdown(text))
+    Console(width=min(Console().width, WIDTH)).print(Markdown(text))
+
+
+def _reflowed(text: str) -> str:
+    """A page in lines of a terminal; examples and tables stay as they are."""
+    lines: list[str] = []
+    paragraph: list[str] = []
+    fenced = False
+    for line in [*text.splitlines(), ""]:
+        plain = not fenced and bool(line.strip()) and not line.startswith(("#", "|", ">", "```"))
+        if paragraph and (not plain or line.startswith("- ")):
+            beneath = "  " if paragraph[0].startswith("- ") else ""
+            words = " ".join(each.strip() for each in paragraph)
+            lines += wrap(words, WIDTH, subsequent_indent=beneath, break_long_words=False, break_on_hyphens=False)
+            paragraph = []
+        if plain:
+            paragraph.append(line)
+            continue
+        fenced ^= line.startswith("```")
+        lines.append(line)
+    return "\n".join(lines[:-1]) + "\n"

@@ -125,12 +125,14 @@ def _print_object(
 
 
 def say(line: str) -> None:
-    """Prints one line on the standard error, harmless whatever is in it; when even that is gone there is nobody left
-    to tell.
+    """Prints one line on the standard error, harmless whatever is in it, or several where it is longer than a terminal
+    is wide; when even that is gone there is nobody left to tell.
     """
-    from rtshcua.diagnostics.excerpt import visible  # the door opens without it
+    from rtshcua.cli.width import fitted  # the door opens without these
+    from rtshcua.diagnostics.excerpt import visible
 
-    _say(visible(line))
+    for each in fitted(visible(line)):
+        _say(each)
 
 
 def say_lines(text: str) -> None:

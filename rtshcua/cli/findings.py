@@ -8,6 +8,7 @@ from typing import Any
 
 from rtshcua.cli.faults import code_of, fail, say, say_lines, say_rendered
 from rtshcua.cli.stdout import out_json
+from rtshcua.cli.width import fitted
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -38,7 +39,7 @@ class Findings:
             self._object = as_json(found, sources)
         elif found:
             found = folded(found)
-            text = render(most_severe(found), sources)
+            text = _laid_out(render(most_severe(found), sources))
             say_rendered((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say_lines(f"\n{_count(found)}")
             if len(found) > MOST_SHOWN:
@@ -78,6 +79,12 @@ def _count(found: tuple[Diagnostic, ...]) -> str:
 
 def _wants_colour() -> bool:
     return sys.stderr is not None and sys.stderr.isatty() and not os.environ.get("NO_COLOR")
+
+
+def _laid_out(text: str) -> str:
+    """What is said, in lines of a terminal; lines of a source stay as they are cut."""
+    lines = text.split("\n")
+    return "\n".join("\n".join([line] if " | " in line else fitted(line)) for line in lines)
 
 
 def _coloured(text: str) -> str:

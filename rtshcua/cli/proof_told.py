@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import msgspec
 
-from rtshcua.cli.claims import WIDTH, listed, write
+from rtshcua.cli.claims import listed, write
 from rtshcua.cli.pin import Pin
 from rtshcua.cli.shown import many, shorten, utc
 from rtshcua.diagnostics.excerpt import visible
@@ -136,6 +136,6 @@ def _fields(result: Proven | Received) -> list[tuple[str, str]]:
     lines = []
     for key, value in (record or {}).items():
         text = value if isinstance(value, str) else msgspec.json.encode(value).decode()
-        shown = utc(value) if key == "utc_us" and isinstance(value, int) else shorten(visible(text), WIDTH)
+        shown = utc(value) if key == "utc_us" and isinstance(value, int) else shorten(visible(text), _SHOWN)
         lines.append(("", f"  {key:<16} {shown}"))
     return [("", ""), ("bold", f"Record {result.number}"), *lines] if lines else []

@@ -17,6 +17,10 @@ _OUTDATED = (
     "vehicle does not hear us here, connect over a cable for a moment: "
     "`rtshcua doctor --connect serial:DEVICE:BAUD --signing-key FILE`"
 )
+_STRANGE = (
+    "`{}` is not this user's own file, so no memory is used: after a kill, frames of the last second could be heard "
+    "again; remove it before the flight"
+)
 #: messages that nobody signs
 _UNSIGNED = frozenset({"RADIO_STATUS"})
 
@@ -51,6 +55,9 @@ class Signing:
             store = LinkStore(state, policy.vehicle.identity, key)
             link = SignedLink(key, store.load(), now.utc_us, now.monotonic_us)
             self._keeper = LinkKeeper(store, link, clock.us_in)
+            strange = store.heard.refused
+            if strange is not None:
+                self.notes.append(_STRANGE.format(strange))
         except (LinkKeyError, OSError) as error:
             if store is not None:
                 store.close()

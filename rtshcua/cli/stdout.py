@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
+from rtshcua.cli.width import fitted
 from rtshcua.diagnostics.excerpt import escaped, hiding, visible
 
 #: lines that wait for whoever reads them; of more the oldest are left out
@@ -20,9 +21,10 @@ _ROOM: Final = 4_096
 
 
 def out(*lines: str, flush: bool = False) -> None:
-    """Prints each as one line, whatever is in it."""
+    """Prints each as one line, whatever is in it, or as several where it is longer than a terminal is wide."""
     for line in lines:
-        print(visible(line))
+        for each in fitted(visible(line)):
+            print(each)
     if flush:
         sys.stdout.flush()
 

@@ -14,6 +14,7 @@ from rtshcua.cli.stdout import out, out_rendered
 from rtshcua.cli.testing.generating import Wanted, generate
 from rtshcua.cli.testing.running import Results, run_all
 from rtshcua.cli.testing.told import Told
+from rtshcua.cli.width import fitted
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -123,7 +124,8 @@ def _finish(
     told = Told(results.sources)
     if not quiet:
         for line in (*told.tests(ran, verbose=verbose), *told.scenarios(flown, verbose=verbose)):
-            out_rendered(line)
+            for each in fitted(line):
+                out_rendered(each)
     failed = tuple(each.finding for each in ran if each.finding is not None)
     failed += tuple(finding for each in flown for finding in each.findings)
     findings.report((*results.diagnostics, *failed), results.sources)
@@ -137,7 +139,8 @@ def _finish(
         code = ExitCode.TESTS
     if not quiet:
         for line in told.coverage(covered or (), verbose=verbose):
-            out_rendered(line)
+            for each in fitted(line):
+                out_rendered(each)
         out_rendered(told.summary(ran, flown, results.left_out) if ran or flown else _none(results))
         if short:
             reached = sum(one.coverage.covered for one in covered or ())

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from textwrap import wrap
 
-from rtshcua.cli.claims import WIDTH, listed, write
+from rtshcua.cli.claims import listed, write
 from rtshcua.cli.flown import lasted_us
 from rtshcua.cli.pin import Pin
 from rtshcua.cli.shown import shorten, utc
@@ -152,14 +151,14 @@ def _flight(report: Report, path: Path) -> list[tuple[str, str]]:
 
 
 def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
-    yield from (("", f"  {line}") for line in wrap(visible(finding.text), WIDTH))
+    yield "", f"  {visible(finding.text)}"
     if finding.offset >= 0:
         yield "", f"  begins    at byte {finding.offset} of the log"
     if finding.expected:
         yield "", f"  expected  {shorten(visible(finding.expected), _SHOWN)}"
     if finding.found:
         yield "", f"  found     {shorten(visible(finding.found), _SHOWN)}"
-    yield from (("", f"  {line}") for line in wrap(meaning_of(finding.slug, failed=failed), WIDTH))
+    yield "", f"  {meaning_of(finding.slug, failed=failed)}"
     if finding.slug in HELPS:
         yield "", f"  help      {HELPS[finding.slug]}"
 

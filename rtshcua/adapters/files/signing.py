@@ -105,6 +105,12 @@ class HeardStamps:
             return {}
         return {(a, b, c): last for a, b, c, last in self._SLOT.iter_unpack(self._memory[:]) if 0 < last <= LAST}
 
+    @property
+    def refused(self) -> Path | None:
+        """What lies where the memory would be, and is not this user's own: then it serves nobody."""
+        path = memory_file(self._name)
+        return path if self._memory is None and os.path.lexists(path) else None
+
     def start(self, streams: dict[Stream, int]) -> None:
         """Remember these, and nothing else."""
         self._memory = self._memory or self._open()

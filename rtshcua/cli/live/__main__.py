@@ -9,6 +9,7 @@ import msgspec
 
 from rtshcua.cli.live.lines import as_json, plain
 from rtshcua.cli.live.story import Happened, Message
+from rtshcua.cli.width import fitted
 
 EXIT_OK, EXIT_GONE = 0, 1
 
@@ -47,7 +48,8 @@ def _print(style: Callable[[Message], Iterable[str]], *, bell: bool) -> None:
             rung.add(message.what.step)
             print(end="\a")
         for line in style(message):
-            print(line, flush=True)
+            for each in [line] if style is as_json else fitted(line):
+                print(each, flush=True)
 
 
 if __name__ == "__main__":

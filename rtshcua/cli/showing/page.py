@@ -3,11 +3,10 @@
 import os
 import sys
 from collections.abc import Iterable
-from textwrap import wrap
 
+from rtshcua.cli.width import fitted
 from rtshcua.diagnostics.excerpt import visible
 
-_WIDTH = 110
 _NAME = 12
 
 
@@ -28,9 +27,7 @@ class Page:
     def row(self, name: str, value: str, *, indent: int = 2, width: int = _NAME) -> None:
         """A name and its value, wrapped beneath itself."""
         start = " " * indent + f"{visible(name):<{width}}  "
-        head, *more = wrap(visible(value), max(_WIDTH - len(start), 40), break_on_hyphens=False) or [""]
-        self._lines.append((start + head).rstrip())
-        self._lines += [" " * len(start) + line for line in more]
+        self._lines += [line.rstrip() for line in fitted(start + visible(value))]
 
     def rows(self, name: str, values: Iterable[str], *, indent: int = 2, width: int = _NAME) -> None:
         """A name beside the first of its values, the others beneath; nothing for none."""
@@ -39,8 +36,8 @@ class Page:
             name = ""
 
     def text(self, line: str, *, indent: int = 2) -> None:
-        """A line as it is, not wrapped."""
-        self._lines.append(" " * indent + visible(line))
+        """A line of its own."""
+        self._lines += fitted(" " * indent + visible(line))
 
     def __str__(self) -> str:
         return "\n".join(self._lines)

@@ -101,12 +101,15 @@ def test_each_slug_has_a_meaning_and_an_exit_code() -> None:
     ("word", "code"), [("seal/missing", 9), ("SEAL/MISSING", 9), ("close/junk-after", 9), ("boundary/lost", 10),
                        ("trust/root-unknown-key", 4), ("document/expired", 11), ("anchor/root", 12)],
 )  # fmt: skip
-def test_explain_prints_what_a_slug_means(word: str, code: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_explain_prints_what_a_slug_means(
+    word: str, code: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("COLUMNS")
     assert main(["explain", word]) == 0
     text = capsys.readouterr().out
     assert text.startswith(f"{word.lower()}: ")
     assert f"exit code {code}: " in text
-    assert max(map(len, text.splitlines())) <= 130
+    assert max(map(len, text.splitlines())) <= 80
     assert main(["explain", word, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["exit_code"] == code
 

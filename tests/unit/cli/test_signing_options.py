@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from reference.world import VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files.signing import LinkStore, read_link_key, write_link_key
+from rtshcua.adapters.store import memory
 from rtshcua.adapters.vehicle import address
 from rtshcua.cli import app, launch
 from rtshcua.cli.meeting import unmet
@@ -177,3 +178,19 @@ def test_a_mission_that_would_wait_for_the_radio_in_vain_does_not_begin(
         assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "signal-unsigned")
         assert "--unsigned-radio" in (refused.value.help or "")
     signing.close()
+
+
+def test_memory_that_is_somebody_elses_is_told_at_the_start(
+    tmp_path: Path, key_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "_FOLDER", tmp_path)
+    signing = Signing(key_file, POLICY, FrameSession(), tmp_path, SystemClock(), unsigned_radio=False)
+    signing.close()
+    assert not any("own file" in note for note in signing.notes)
+    store = LinkStore(tmp_path, POLICY.vehicle.identity, KEY)
+    there = memory.memory_file(store.heard._name)
+    store.close()
+    there.symlink_to(tmp_path / "elsewhere")
+    signing = Signing(key_file, POLICY, FrameSession(), tmp_path, SystemClock(), unsigned_radio=False)
+    signing.close()
+    assert [note for note in signing.notes if "own file" in note and str(there) in note]

@@ -173,6 +173,7 @@ def test_without_memory_that_outlives_the_process_the_disk_is_at_most_a_second_b
     after = SignedLink(KEY, store.load(), UTC, 0)
     assert not after.accept(first, 0)
     assert after.accept(others[-1], 0)
+    assert store.heard.refused is None, "nothing is in the way"
     keeper.close()
 
 
@@ -189,6 +190,9 @@ def test_memory_of_somebody_else_is_not_used(tmp_path: Path, monkeypatch: pytest
         case "two names":
             path.hardlink_to(target)
     assert memory.open_memory("name", 256) is None
+    heard = signing.HeardStamps("name")
+    heard.start({(1, 1, 0): 100})
+    assert heard.refused == path
     assert target.read_bytes() == b"as it was"
 
 

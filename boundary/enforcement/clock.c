@@ -3,12 +3,9 @@
 #include "mavlink/framing.h"
 #include "model/limits.h"
 
-#define DRIFT_US 500
 #define SECOND_US 1000000
 #define CHALLENGE_US 5000000LL
-#define UNIX_US 1000000000000000LL /* 2001 */
-#define SYSTEM_TIME 2              /* time_unix_usec (u64), time_boot_ms (u32); that of TIMESYNC has tc1 and ts1 (i64) */
-#define TIMES 16                   /* octets of a payload that are looked at */
+#define TIMES 16 /* octets of a payload that are looked at */
 
 static void take(rt_clock *clock, int64_t source, int64_t ahead_us, int64_t error_us, int64_t since_us) {
     clock->source = source;
@@ -37,8 +34,8 @@ void rt_clock_settle(rt_clock *clock, int64_t monotonic_us) {
 void rt_clock_now(const rt_clock *clock, int64_t monotonic_us, rt_now *now) {
     int64_t error_us = clock->error_us;
     if (clock->source != RT_UTC_UNKNOWN)
-        error_us += rt_max(0, monotonic_us - clock->since_us) / SECOND_US * DRIFT_US +
-                    rt_max(0, monotonic_us - clock->since_us) % SECOND_US * DRIFT_US / SECOND_US;
+        error_us += rt_max(0, monotonic_us - clock->since_us) / SECOND_US * RT_DRIFT_US +
+                    rt_max(0, monotonic_us - clock->since_us) % SECOND_US * RT_DRIFT_US / SECOND_US;
     *now = (rt_now){monotonic_us, rt_max(0, monotonic_us + clock->ahead_us), rt_min(error_us, RT_UTC_UNKNOWN_US)};
 }
 
@@ -83,10 +80,10 @@ void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t vehicl
         clock->system = frame.at[5];
         clock->component = frame.at[6];
         clock->link = link;
-    } else if (message == SYSTEM_TIME && clock->answered && frame.at[5] == clock->system && frame.at[6] == clock->component &&
+    } else if (message == RT_MSG_SYSTEM_TIME && clock->answered && frame.at[5] == clock->system && frame.at[6] == clock->component &&
                link == clock->link) {
-        const uint64_t utc_us = le64(body);
-        if (utc_us < UNIX_US || utc_us > RT_MAX_VALUE) return;
+        const uint64_t utc_us = le64(body + RT_SYSTEM_TIME_TIME_UNIX_USEC);
+        if (utc_us < RT_UNIX_US || utc_us > RT_MAX_VALUE) return;
         const int64_t open_us = rt_max(0, monotonic_us - clock->drawn_us);
         take(clock, RT_UTC_VEHICLE, (int64_t)utc_us - monotonic_us + open_us / 2, vehicle_us + open_us - open_us / 2, monotonic_us);
     }

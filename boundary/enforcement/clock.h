@@ -1,12 +1,10 @@
-/* The time of day that the boundary holds to: its own, never what the runtime names. `clock.py`, and `wire/clock.py`. */
+/* The time of day that the boundary holds to: its own, never what the runtime names. `wire/clock.py`. */
 #ifndef RT_ENFORCEMENT_CLOCK_H
 #define RT_ENFORCEMENT_CLOCK_H
 
 #include "../base.h"
 #include "../model/flat.h"
-
-#define RT_UTC_UNKNOWN_US (1LL << 52)
-#define RT_APART_US 2000000LL
+#include "../model/limits.h"
 
 /* where it is from */
 enum { RT_UTC_UNKNOWN = 0, RT_UTC_KERNEL = 1, RT_UTC_VEHICLE = 2, RT_UTC_OPERATOR = 3, RT_UTC_SHARED = 4 };
@@ -36,12 +34,8 @@ bool rt_clock_asks(const rt_clock *clock, int64_t monotonic_us);
 void rt_clock_challenge(rt_clock *clock, int64_t number, int64_t monotonic_us);
 int64_t rt_clock_number(const rt_clock *clock);
 
-/* how far the clocks of autopilots may be off, and a stamp that is in whole ms: of ArduPilot, and of any */
-#define RT_ARDUPILOT_US 1001000LL
-#define RT_VEHICLE_US 6001000LL
-
 /* A frame of which the link's signature was verified came in by a link of this id; its signature is off. The vehicle's own UTC may be
-   off by so much. */
+   off by so much: RT_ARDUPILOT_US, and RT_VEHICLE_US for any other autopilot. */
 void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t vehicle_us, int64_t monotonic_us);
 
 /* Whether a time of day that is named may be decided by. */

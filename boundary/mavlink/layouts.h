@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #define RT_MSG_HEARTBEAT 0
+#define RT_MSG_SYSTEM_TIME 2
 #define RT_MSG_PARAM_REQUEST_READ 20
 #define RT_MSG_PARAM_REQUEST_LIST 21
 #define RT_MSG_PARAM_VALUE 22
@@ -32,6 +33,7 @@ typedef struct {
 
 static const rt_layout rt_layouts[] = {
     {0, 9, -1}, /* HEARTBEAT */
+    {2, 12, -1}, /* SYSTEM_TIME */
     {20, 20, 2}, /* PARAM_REQUEST_READ */
     {21, 2, 0}, /* PARAM_REQUEST_LIST */
     {22, 25, -1}, /* PARAM_VALUE */
@@ -58,6 +60,8 @@ static const rt_layout rt_layouts[] = {
 #define RT_HEARTBEAT_BASE_MODE 6
 #define RT_HEARTBEAT_SYSTEM_STATUS 7
 #define RT_HEARTBEAT_MAVLINK_VERSION 8
+#define RT_SYSTEM_TIME_TIME_UNIX_USEC 0
+#define RT_SYSTEM_TIME_TIME_BOOT_MS 8
 #define RT_PARAM_REQUEST_READ_PARAM_INDEX 0
 #define RT_PARAM_REQUEST_READ_TARGET_SYSTEM 2
 #define RT_PARAM_REQUEST_READ_TARGET_COMPONENT 3

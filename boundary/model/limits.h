@@ -1,4 +1,4 @@
-/* Made by .make/limits from rtshcua/model/flat: what fits on board. */
+/* Made by .make/limits from rtshcua/model/flat and rtshcua/wire/clock.py: what fits on board, how far clocks may be off. */
 #ifndef RT_MODEL_LIMITS_H
 #define RT_MODEL_LIMITS_H
 
@@ -41,6 +41,12 @@
 #define RT_MAX_DISPATCHED 65536
 #define RT_MAX_STACK 16
 #define RT_MAX_INSTRUCTIONS 128
+#define RT_APART_US 2000000
+#define RT_DRIFT_US 500
+#define RT_UNIX_US 1000000000000000LL
+#define RT_ARDUPILOT_US 1001000
+#define RT_VEHICLE_US 6001000
+#define RT_UTC_UNKNOWN_US 4503599627370496LL
 #define RT_MAX_VERTICES 4096
 #define RT_MAX_RINGS 1024
 

@@ -6,11 +6,10 @@ from typing import Protocol
 
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.ports import Clock, ClockStepped
+from rtshcua.wire.clock import DRIFT_US
 
 #: How far UTC may be off in a simulation, in us: it has the time of the machine that it runs on.
 UTC_ERROR_US = 100_000
-#: How much more it may be off after each second, in us: the kernel takes no clock for worse (500 ppm, MAXFREQ).
-DRIFT_US = 500
 #: Linux's monotonic clock stops in a suspend, and this one does not
 _BOOTTIME: int | None = getattr(time, "CLOCK_BOOTTIME", None)
 

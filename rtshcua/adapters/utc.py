@@ -14,16 +14,10 @@ from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 from rtshcua.onboard.enforcement.isolated import OwnTime
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import AUTOPILOT_US, STAMP_US, Source
 
 #: the effect that says in the log where the bound came from
 CLOCK: Final = "clock"
-#: With GPS, in us. PX4 sets its clock when it is off by more than 5 s, for that stops all else for a moment
-#: (`SET_CLOCK_DRIFT_TIME_S`, src/drivers/gps/gps.cpp). ArduPilot sets its own by the receiver while it is disarmed, and
-#: leaves it alone while it is armed (AP_RTC.cpp, `set_utc_usec`): some ms at arming, and a crystal's drift since.
-VEHICLE_US: Final = {"px4": 6_000_000, "ardupilot": 1_000_000}
-#: SYSTEM_TIME says when it was made in whole ms
-_STAMP_US: Final = 1_000
 _SIMULATED: Final = "simulated"
 
 
@@ -150,14 +144,14 @@ class UtcWatch:
         if utc is None:
             return False
         ahead_us, open_us = utc
-        self._take("vehicle", VEHICLE_US[flavour] + open_us + _STAMP_US, ahead_us)
+        self._take("vehicle", AUTOPILOT_US[flavour] + open_us + STAMP_US, ahead_us)
         return True
 
     def settle(self) -> None:
         """The vehicle's time was waited for long enough: what the operator states holds, if it was stated."""
         if self._own is not None:
-            if self.waits and self._stated_us is not None:
-                self._follow(self._own(True))
+            if self.waits:
+                self._follow(self._own(True))  # as the boundary itself was told, if it was
         elif self.waits and self._stated_us is not None:
             self._take("operator", self._stated_us)
 

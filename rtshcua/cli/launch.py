@@ -38,7 +38,7 @@ from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
 from rtshcua.cli.live.telling import Answering
 from rtshcua.cli.log_signer import LogSigner
-from rtshcua.cli.meeting import APART_UTC_NOTE, UTC_NOTE, await_utc, meet, unopened
+from rtshcua.cli.meeting import APART_UTC_NOTE, LISTENING_UTC_NOTE, UTC_NOTE, await_utc, meet, unopened
 from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, obeys, still_flies
 from rtshcua.cli.past import Past
 from rtshcua.cli.qualified import record_of, unqualified
@@ -208,7 +208,8 @@ def _launch(order: Launch) -> ExitCode:
             driver.hurries = hurried
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
             stated = order.utc_error_us is not None
-            events += await_utc(utc, vehicle, clock, patient=order.dry_run or stated, hurried=hurried)
+            listens = order.boundary_socket is not None
+            events += await_utc(utc, vehicle, clock, patient=order.dry_run or stated, listens=listens, hurried=hurried)
             lapsed = _lapsed(bundle, signed_root, log_key.kid, loaded, clock)
             _expect_current(lapsed, resumed=not order.dry_run and order.sortie is None)
             if order.sortie is not None:
@@ -252,7 +253,7 @@ def _launch(order: Launch) -> ExitCode:
                 raise refusal
             if not resumed:
                 mark_opened(order.state, loaded, clock, flight)
-            unsure = _utc_notes(utc, apart)
+            unsure = _utc_notes(utc, apart, listens=order.boundary_socket is not None)
             unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
             alone = "" if absent is None else f"{_why(absent)}; it is brought down without a boundary of its own"
             alone += _UNVERIFIABLE if alone and order.boundary_socket is not None else ""
@@ -788,10 +789,12 @@ def _follow(utc: UtcWatch, apart: Apart | None) -> None:
         utc.follow(apart.time)
 
 
-def _utc_notes(utc: UtcWatch, apart: Apart | None) -> list[str]:
+def _utc_notes(utc: UtcWatch, apart: Apart | None, *, listens: bool) -> list[str]:
     """That the time of day is not known, and what helps."""
     if not utc.waits:
         return []
+    if listens:
+        return [LISTENING_UTC_NOTE]
     return [UTC_NOTE if apart is None or apart.process.link_name is not None else APART_UTC_NOTE]
 
 

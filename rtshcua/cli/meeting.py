@@ -54,6 +54,12 @@ APART_UTC_NOTE: Final = (
     "this machine's clock is not synchronised, and the boundary takes the vehicle's time over a link with a key alone: "
     "steps are deferred (`--signing-key`, or `--utc-error 500ms` states how far it is off)"
 )
+#: the same where the boundary is one that listens
+LISTENING_UTC_NOTE: Final = (
+    "the boundary does not know the time of day: this machine's clock is not synchronised, and the vehicle has not "
+    "told its own over a link with a key; steps are deferred (`--utc-error US` in the boundary's own command line "
+    "states it)"
+)
 
 _POLL_S = 0.05
 _HELP: Final = "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try"
@@ -101,14 +107,16 @@ def meet(
 
 
 def await_utc(
-    utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, patient: bool, hurried: bool = False
-) -> list[Event]:
+    utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, patient: bool, listens: bool = False,
+    hurried: bool = False,
+) -> list[Event]:  # fmt: skip
     """Take the vehicle's time of day where the kernel vouches for none; what happened meanwhile. `patient`: it is
-    waited for, and then what the operator stated holds; else the vehicle is not ready before it told it. `hurried`: a
-    flight may have broken off, and what is armed then is brought down first.
+    waited for, and then what the operator stated holds; else the vehicle is not ready before it told it. `listens`: the
+    boundary listens, and an operator may have stated it there, so it is waited for as long, and where nobody did the
+    vehicle is not ready either. `hurried`: a flight may have broken off, and what is armed then is brought down first.
     """
     events: list[Event] = []
-    until_s = time.monotonic() + (UTC_S if patient else 0)
+    until_s = time.monotonic() + (UTC_S if patient or listens else 0)
     while utc.waits:
         flavour = vehicle.driver.flavour
         taken = flavour is not None and utc.look(vehicle.driver.source, flavour.name, clock.now().monotonic_us)
@@ -117,5 +125,5 @@ def await_utc(
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     utc.settle()
     vehicle.driver.asks_utc = utc.vehicle_may_tell
-    vehicle.driver.utc_patience_us = 0 if patient else clock.us_in(READY_UTC_S)
+    vehicle.driver.utc_patience_us = 0 if patient or (listens and not utc.waits) else clock.us_in(READY_UTC_S)
     return events

@@ -141,6 +141,7 @@ def run(
     given = {
         "--signing-key": signing_key, "--boundary-user": boundary_user, "--log-key": log_key, "--set": set_,
         "--boundary-key": boundary_key, "--passphrase-file": passphrase_file, "--dry-run": rehearsal,
+        _UTC_ERROR: utc_error,
     }  # fmt: skip
     alone = "" if boundary_socket is None else _not_with_socket(given, own=own, mode=mode)
     lonely = misplaced or alone or (_LONELY[system is not None, utc_error is not None] if own else "")
@@ -243,6 +244,8 @@ _UTC = "`--utc-error` goes with `--connect`: a simulation has this machine's tim
 #: what is wrong without `--connect`, by whether `--system` and `--utc-error` are given
 _LONELY = {(False, False): "", (True, False): _SYSTEM, (True, True): _SYSTEM, (False, True): _UTC}
 _VEHICLE_HELP = "its identity, as its policy says it: a bundle for another vehicle is refused then"
+_UTC_ERROR = "--utc-error"
+_OWN_TIME = "the boundary there tells the time itself; it is told in its own command line, `--utc-error US`"
 _OWN = "the boundary there has keys of its own, sets no parameters, and rehearses nothing"
 _SIM_HELP = "`rtshcua sim` takes them, where it is the vehicle that you connect to"
 
@@ -276,7 +279,9 @@ def _not_with_socket(given: Mapping[str, object], *, own: bool, mode: Mode | Non
     if mode not in (None, Mode.PROCESS):
         return f"`--boundary-socket` goes with `--mode process`, not with `{mode}`"
     found = next((name for name, value in given.items() if value), None)
-    return "" if found is None else f"`{found}` does not go with `--boundary-socket`: {_OWN}"
+    if found is None:
+        return ""
+    return f"`{found}` does not go with `--boundary-socket`: {_OWN_TIME if found == _UTC_ERROR else _OWN}"
 
 
 def _mode(mode: Mode | None, *, own: bool, named: bool) -> tuple[Mode, bool]:

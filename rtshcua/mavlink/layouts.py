@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 from rtshcua.mavlink.framing import HEADER
 
 HEARTBEAT: Final = 0
+SYSTEM_TIME: Final = 2
 PARAM_REQUEST_READ: Final = 20
 PARAM_REQUEST_LIST: Final = 21
 PARAM_VALUE: Final = 22
@@ -69,6 +70,7 @@ _PARAMETERS: Final = "param1 param2 param3 param4"
 
 LAYOUTS: Final = {
     HEARTBEAT: _layout(50, "<IBBBBB", "custom_mode type autopilot base_mode system_status mavlink_version"),
+    SYSTEM_TIME: _layout(137, "<QI", "time_unix_usec time_boot_ms"),
     PARAM_REQUEST_READ: _layout(214, "<hBB16s", f"param_index {_TARGET} param_id"),
     PARAM_REQUEST_LIST: _layout(159, "<BB", _TARGET),
     PARAM_VALUE: _layout(220, "<fHH16sB", "param_value param_count param_index param_id param_type"),

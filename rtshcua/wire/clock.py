@@ -9,6 +9,15 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 APART_US: Final = 2_000_000
 #: how much more UTC may be off after each second, in us: the kernel takes no clock for worse (500 ppm, MAXFREQ)
 DRIFT_US: Final = 500
+#: how far the UTC of an autopilot with GPS may be off, in us. PX4 sets its clock when it is off by more than 5 s, for
+#: that stops all else for a moment (`SET_CLOCK_DRIFT_TIME_S`, src/drivers/gps/gps.cpp). ArduPilot sets its own by the
+#: receiver while it is disarmed, and leaves it alone while it is armed (AP_RTC.cpp, `set_utc_usec`): some ms at arming,
+#: and a crystal's drift since
+AUTOPILOT_US: Final = {"px4": 6_000_000, "ardupilot": 1_000_000}
+#: SYSTEM_TIME says when it was made in whole ms
+STAMP_US: Final = 1_000
+#: a time since the epoch that a vehicle knows is above this (2001); what is below counts from its boot
+UNIX_US: Final = 10**15
 
 
 class Source(IntEnum):

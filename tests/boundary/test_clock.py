@@ -12,12 +12,12 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from boundary import shadow
 from boundary.together import PIN, SIGNED_ROOT
 from reference.documents import approval
+from reference.own_clock import ARDUPILOT_US, CHALLENGE_US, VEHICLE_US, OwnClock
 from reference.world import ROOT, SESSION_KEY, START, VEHICLE, request_for, sealed
 from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
-from rtshcua.onboard.enforcement.clock import ARDUPILOT_US, CHALLENGE_US, VEHICLE_US, OwnClock
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
 from rtshcua.wire.clock import APART_US, Source, bears_out
 from rtshcua.wire.receipt import Receipt

@@ -41,7 +41,7 @@ class Aboard:
 
     def run(self, bundle: int = 0, *words: str) -> Any:
         where = ("--connect", f"udpin:127.0.0.1:{self.port}", "--vehicle", "quad-07", "--unsigned-radio")
-        socket = ("--boundary-socket", str(self.made.socket), "--utc-error", "1s")
+        socket = ("--boundary-socket", str(self.made.socket))
         return self.ground.run(self.bundles[bundle], *where, *socket, *words, speed=SPEED)
 
     def verified(self, folder: Path) -> tuple[int, dict[str, Any]]:
@@ -249,7 +249,7 @@ WRONG = [
         (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", name, *value), f"`{name}` does")
         for name, *value in (
             ("--signing-key", "k"), ("--boundary-user", "nobody"), ("--log-key", "k"), ("--boundary-key", "k"),
-            ("--passphrase-file", "k"), ("--set", "GF_ACTION=2"), ("--dry-run",),
+            ("--passphrase-file", "k"), ("--set", "GF_ACTION=2"), ("--dry-run",), ("--utc-error", "1s"),
         )
     ),
 ]  # fmt: skip

@@ -30,6 +30,7 @@ from rtshcua.codec.frames import Received
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.onboard.enforcement.frames import OURS
+from rtshcua.wire.clock import UNIX_US
 
 # ---------------------------------------------------------------- the vehicle's clock
 
@@ -173,7 +174,6 @@ GAP_US: Final = 500_000
 #: How long the link holds frames back is the longest within this time, and at most twice as long.
 WINDOW_US: Final = 1_000_000
 
-_UNIX_US: Final = 10**15  # 2001; as a time since boot it would be 31 years
 _WRAP, _HALF = 1 << 32, 1 << 31
 _NUMBERS, _AHEAD = 256, 128
 #: frames whose numbers go on from before a jump, until it counts as none of the vehicle's
@@ -245,7 +245,7 @@ class SourceTime:
         at_us: int | None = None
         if stamp is not None:
             at_us = self._at(name, message, stamp, now_us)
-            if name == "SYSTEM_TIME" and message.time_unix_usec >= _UNIX_US and message.time_boot_ms:
+            if name == "SYSTEM_TIME" and message.time_unix_usec >= UNIX_US and message.time_boot_ms:
                 self._unix_us = message.time_unix_usec - message.time_boot_ms * 1_000
         elif name == "WIND":
             return self._of_unstamped(message, self._follow(number, None, now_us))
@@ -286,7 +286,7 @@ class SourceTime:
         if told is not None and told[0] == raw:
             return told[1]
         boot = raw
-        if not short and raw >= _UNIX_US:
+        if not short and raw >= UNIX_US:
             if self._unix_us is None:
                 return None
             boot, us, short = (raw - self._unix_us) // 1_000 % _WRAP, 1_000, True

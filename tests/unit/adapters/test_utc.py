@@ -6,8 +6,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference import flat_case as flat
-from rtshcua.adapters.clock import DRIFT_US, PacedClock, SystemClock
-from rtshcua.adapters.utc import VEHICLE_US, UtcWatch, kernel_error_us, synchronised_us
+from rtshcua.adapters.clock import PacedClock, SystemClock
+from rtshcua.adapters.utc import UtcWatch, kernel_error_us, synchronised_us
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.codec.frames import Received
 from rtshcua.decision.decide import decide
@@ -16,7 +16,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.isolated import OwnTime
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import AUTOPILOT_US, DRIFT_US, Source
 
 NOW_US = 1_800_000_000_000_000
 
@@ -60,7 +60,7 @@ def test_this_machines_kernel_is_asked_and_answers_or_does_not() -> None:
     ("kernel_us", "ahead_us", "stated_us", "source", "error_us"),
     [
         (3_000, 5, 9, "kernel", 3_000),
-        (None, 5, 9, "vehicle", VEHICLE_US["px4"] + 3_000),
+        (None, 5, 9, "vehicle", AUTOPILOT_US["px4"] + 3_000),
         (None, None, 500_000, "operator", 500_000),
         (None, None, None, "unknown", UTC_UNKNOWN_US),
     ],

@@ -1,4 +1,5 @@
-"""The time of day that a boundary apart holds to: its own, never what the runtime names (boundary/enforcement/clock.c).
+"""The oracle of `boundary/enforcement/clock.c`: the time of day that a boundary apart holds to, its own, never what the
+runtime names. Written apart from it; only tests use it.
 
 Its sources, the first that tells: the machine's clock, where the kernel says that it is synchronised; the vehicle's
 SYSTEM_TIME, in frames of which the boundary verified the link's signature itself; what an operator stated when the
@@ -14,22 +15,18 @@ from typing import Final, NamedTuple
 
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import CHECKSUM, HEADER, MARKER
-from rtshcua.mavlink.layouts import TIMESYNC
+from rtshcua.mavlink.layouts import SYSTEM_TIME, TIMESYNC
 from rtshcua.mavlink.signing import Stream
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
-from rtshcua.wire.clock import DRIFT_US, Source
+from rtshcua.wire.clock import DRIFT_US, UNIX_US, Source
 
-#: how far the vehicle's own UTC may be off, in us (`adapters.utc.VEHICLE_US`), and a stamp that is in whole ms: of
+#: how far the vehicle's own UTC may be off, in us (`wire.clock.AUTOPILOT_US`), and a stamp that is in whole ms: of
 #: ArduPilot, and the worse of both autopilots
 ARDUPILOT_US: Final = 1_001_000
 VEHICLE_US: Final = 6_001_000
 #: how long a challenge may be answered, in us: the time between is part of the error
 CHALLENGE_US: Final = 5_000_000
-#: message number of SYSTEM_TIME: time_unix_usec (u64), time_boot_ms (u32)
-SYSTEM_TIME: Final = 2
-#: a time since the epoch that a vehicle knows is above this (2001); what is below counts from its boot
-UNIX_US: Final = 10**15
 
 _TIMES: Final = 16  # the octets of a payload that are looked at
 _SECOND_US: Final = 1_000_000

@@ -21,6 +21,8 @@ TICK_US = 20_000
 SECOND = 1_000_000
 #: datagrams that a socket holds while nobody reads, as Linux comes (`net.core.rmem_max`); what comes then is lost
 MOST_WAITING = 500
+#: and how many of them are taken in by one poll
+AT_ONCE = 256
 #: where the clock starts: a monotonic time that is not 0, and a UTC time
 START = Now(7_000_000, 1_767_225_600_000_000, 1_000)
 
@@ -80,8 +82,11 @@ class VirtualVehicle:
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
         """Let time pass, at most `timeout_us`; comes back early for anything but readings."""
         events, self._pending = self._pending, []
-        waiting, self._waiting = self._waiting, []
-        self._take(waiting, events)
+        if self._waiting:
+            waiting, self._waiting = self._waiting[:AT_ONCE], self._waiting[AT_ONCE:]
+            self._take(waiting, events)
+            if self._waiting:
+                return events
         clock, driver, advance, tick_us = self.clock, self.driver, self.simulation.advance, self._tick_us
         start_us, elapsed_us = clock.start_us, clock.elapsed_us
         end_us = elapsed_us + timeout_us

@@ -617,7 +617,7 @@ class Driver:
         if self._gate_may_be_lost and self.link.is_mute:
             watch.unasked()
         changed = watch.look(now_us)
-        self.seen.up_us = watch.up_us
+        self.seen.up_us, self.seen.stood_us = watch.up_us, watch.stood_us
         if watch.mute != self._was_mute:
             self._was_mute = watch.mute
             events.append(ports.Answering(now_us, answers=not self._was_mute))

@@ -175,6 +175,8 @@ class VehicleLink:
 SILENT_US: Final = 1_000_000
 #: Nothing that was asked was answered for this long, though the autopilot is heard: it does not hear us.
 UNANSWERED_US: Final = 3_000_000
+#: Between two looks: the computer stood still, and what is read next waited.
+STOOD_US: Final = 500_000
 
 SILENT: Final = "silent"
 UNANSWERED: Final = "heard, but it answers nothing"
@@ -190,6 +192,7 @@ class LinkWatch:
 
     def __init__(self, slack: int = 1) -> None:
         self._silent_us, self._unanswered_limit_us = SILENT_US * slack, UNANSWERED_US * slack
+        self._stood_us = STOOD_US * slack
         #: when a frame of the autopilot last came
         self.heard_us: int | None = None
         self._unanswered_us: int | None = None  # since when a question stands open
@@ -204,6 +207,8 @@ class LinkWatch:
         self.mute = False
         #: why the link is down; None while it is up
         self.down: str | None = None
+        #: when the computer last went on that had stood still
+        self.stood_us: int | None = None
 
     def asked(self, now_us: int) -> None:
         """Something was asked that the autopilot answers."""
@@ -224,6 +229,8 @@ class LinkWatch:
         if heard_us is None:
             return False
         self._seen_us = now_us
+        if seen_us is not None and now_us - seen_us > self._stood_us:
+            self.stood_us = now_us
         if seen_us is not None and was is None:
             self.up_us += min(now_us - seen_us, silent_us)  # we may have been held up
         down, asked_us = None, self._unanswered_us

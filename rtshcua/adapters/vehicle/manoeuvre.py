@@ -199,6 +199,7 @@ class WhoFliesQuery:
         self._target = False  # the frame waits for a target, too,
         self._twice = False  # and for two answers,
         self._first_us: int | None = None  # of which this is when the first came
+        self._since_us = 0  # when the frame began to wait
         self._asked = 0  # how often it was asked for the frame,
         self._every_us = AGAIN_US  # and so often it is, where no answer comes
         self._commanded_us: int | None = None  # when somebody else was last seen to be obeyed
@@ -215,9 +216,13 @@ class WhoFliesQuery:
         """Whether a frame waits for the answer, or something else does."""
         return self._came is not None or self.wants_target
 
-    def is_young(self, seen: ObservedVehicle, now_us: int) -> bool:
-        """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down."""
+    def is_young(self, seen: ObservedVehicle, now_us: int, trip_us: int = 0) -> bool:
+        """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down. What came
+        just now, and waited while nobody read for longer than a round trip takes, is not young.
+        """
         if seen.heartbeat_us is None or now_us - seen.heartbeat_us > self._within_us:
+            return False
+        if seen.waited(now_us - self._within_us - trip_us):
             return False
         return self._tells_of_commanded(seen.heartbeat_us)
 
@@ -230,11 +235,13 @@ class WhoFliesQuery:
         """
         if self._came is None:
             self._came, self._first_us, self._asked = (seen.beats, seen.targets), None, 0
-            self._asked_us, self.due_us = None, 0  # ask at once
+            self._asked_us, self.due_us, self._since_us = None, 0, now_us  # ask at once
         self._target, self._twice = target, twice and self._lag_us > 0
         self._every_us = min(again_us, AGAIN_US)
         beats, targets = self._came
         if seen.beats == beats or seen.heartbeat_us is None or not self._tells_of_commanded(seen.heartbeat_us):
+            return False
+        if seen.waited(self._since_us):
             return False
         if self._twice:
             if self._first_us is None:
@@ -358,15 +365,20 @@ class Aids:
 
     def is_near_ours(self, up_us: int) -> bool:
         """Whether a frame of ours may have undone by now what a report shows."""
-        within_us = CROSSED_US * self.commander.slack + (self._clock.round_trip_us or 0)
+        within_us = CROSSED_US * self.commander.slack + self.trip_us
         return self.sent_us is not None and up_us - self.sent_us <= within_us
+
+    @property
+    def trip_us(self) -> int:
+        """What a round trip takes, as far as it is known."""
+        return self._clock.round_trip_us or 0
 
     @property
     def answer_us(self) -> int:
         """How long a frame that would undo a pilot's mode waits at most for the answer to its own question: what a
         round trip takes, unless reports come later than would ever do, and `ANSWER_MOST_US`.
         """
-        trip_us = min(self._clock.round_trip_us or 0, self.flavour.mode_within_us)
+        trip_us = min(self.trip_us, self.flavour.mode_within_us)
         return ANSWER_MOST_US * self.commander.slack + trip_us
 
     def sure(self, found: tuple[str, str, int] | None, seen: ObservedVehicle) -> str | None:
@@ -531,7 +543,7 @@ class Manoeuvre:
             if now_us - self._unnamed_us <= UNNAMED_MOST_US:
                 query.is_newer(seen, now_us, target=True)  # it is asked for
                 return False
-        if urgent and self._answers_late(seen, now_us) and query.is_young(seen, now_us):
+        if urgent and self._answers_late(seen, now_us) and query.is_young(seen, now_us, self._aids.trip_us):
             return True
         again_us = AGAIN_US if self._asked_us is None else self._aids.answer_us // 2  # a question may be lost
         targets = self._aids.targets.compares and not urgent

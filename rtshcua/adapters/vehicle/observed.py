@@ -35,6 +35,10 @@ FALLS: Final = 3_000
 STOPPED: Final = 500
 #: us after its motors stopped, what falls is faster than that
 SETTLES_US: Final = 400_000
+#: us: what has no stamp of its own may be younger than the last one before it by this;
+STAMPED_US: Final = 300_000
+#: and so long after the computer stood still all that waited meanwhile was read
+UNREAD_US: Final = 2_000_000
 
 _WHERE: Final = POSITION | VELOCITY_HORIZONTAL | ATTITUDE
 _HIGH: Final = HEIGHT | VELOCITY_VERTICAL | ATTITUDE
@@ -178,13 +182,14 @@ class ObservedVehicle:
     Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
     so now, of a position that is not old; `placed` is the last report of all, however old. `target` is where the
     autopilot says that it flies to. `speed_us` is the link time at which the last speed that is known was measured:
-    after a hold-up what waited is of long before. `descent` is how fast it sinks and `tilt` how many degrees it leans
-    (`tilt_us`: measured then), whoever vouches for that. `beats` counts heartbeats and `targets` reports of a target
-    (`target_us`: told last); `up_us` is link time, see `LinkWatch`. `heard` counts frames of the autopilot, `numbered`
-    those that it sent by then, as their numbers tell, and `answers` its answers to questions for messages. `ahead` is
-    what its range finder last saw in front, at `ahead_us`. `notes` collects what an operator should know. `disarms`:
-    one heartbeat says that the motors are off; they count as off when the next one says so, too, or, while two speak
-    under its ids (`disputed`), when nothing else is said for a while. `landings` counts reports of `landed_state`.
+    after a hold-up what waited is of long before. `descent` is how fast it sinks and `tilt` how many degrees it
+    leans (`tilt_us`: measured then), whoever vouches for that. `beats` counts heartbeats and `targets` reports of a
+    target (`target_us`: told last); `up_us` is link time, see `LinkWatch`, `stood_us` when the computer last went
+    on that stood still. `heard` counts frames of the autopilot, `numbered` those that it sent by then, as their
+    numbers tell, and `answers` its answers to questions for messages. `ahead` is what its range finder last saw in
+    front, at `ahead_us`. `notes` collects what an operator should know. `disarms`: one heartbeat says that the
+    motors are off; they count as off when the next one says so, too, or, while two speak under its ids
+    (`disputed`), when nothing else is said for a while. `landings` counts reports of `landed_state`.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -225,6 +230,7 @@ class ObservedVehicle:
     made_us: dict[str, int] = field(default_factory=dict)  # when the last of each message was made
     places: dict[str, int] = field(default_factory=dict)  # and its place in the order of sending
     now_us: int = 0
+    stood_us: int | None = None
     up_us: int = 0
     critical: bool = False
     notes: list[str] = field(default_factory=list)
@@ -300,6 +306,12 @@ class ObservedVehicle:
                 self.estimator.take(message.flags, at_us)
                 return self._doubt(now_us)
         return False
+
+    def waited(self, since_us: int) -> bool:
+        """Whether the last heartbeat was read only now that the computer goes on, and is of before `since_us`."""
+        if self.stood_us is None or (self.heartbeat_us or 0) - self.stood_us > UNREAD_US:
+            return False
+        return self.made_us.get("HEARTBEAT", since_us) + STAMPED_US < since_us
 
     def count(self, place: int) -> None:
         """A frame came that the autopilot sent in this place."""

@@ -25,6 +25,7 @@ def test_what_the_boundary_does_not_let_out_has_failed() -> None:
     assert not [event for event in target.driver.tick(10_000_000)[0] if isinstance(event, Failed)], "told once"
     target.frames.open(LAND)
     target.now_us = 11_000_000
+    target.receive(target.says(mavlink.MAVLink_attitude_message(11_900, 0, 0, 0, 0, 0, 0)))  # what follows is of now:
     target.receive(target.says(greeting("px4")[0]))  # its mode is known
     assert target.driver.begin(LAND, 11_000_000)[0] == []
     events, _ = target.driver.tick(11_050_000)
@@ -47,10 +48,11 @@ def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
     target.frames.close()
     target.now_us = 1_500_000
     target.sent.clear()
+    target.receive(target.says(mavlink.MAVLink_attitude_message(2_400, 0, 0, 0, 0, 0, 0)))  # what follows is of now
     target.receive(target.says(mavlink.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3)))
-    events, due = target.driver.tick(1_600_000)  # it waited for an answer first
+    events, due = target.driver.tick(1_600_000)
     failed = [event for event in (*target.events, *events) if isinstance(event, Failed)]
-    assert failed == [Failed(1_600_000, 5, NO_SESSION.slug)]
+    assert failed == [Failed(1_500_000, 5, NO_SESSION.slug)], "by what came after it was due"
     frames = [*target.sent, *due]
     messages = [received.message for frame in frames for received in Codec(9, 9).parse(frame)]
     assert mavlink.MAV_CMD_DO_SET_MODE not in [getattr(message, "command", None) for message in messages]

@@ -1,0 +1,53 @@
+"""What waited on the link while the computer stood still is of then: it tells neither who flies now, nor that what we
+sent is somebody else's.
+"""
+
+from functools import cache
+
+import pytest
+
+from rtshcua.model.faults import Mode, PilotMode
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Succeeded, TakenOver
+from virtual.copying import copied
+from virtual.flyer import Flyer, climbed
+from virtual.sampling import each_once
+
+MS, S = 1_000, 1_000_000
+FLAVOURS = ("px4", "ardupilot")
+
+
+@cache
+def in_a_leg(flavour: str) -> Flyer:
+    """Five seconds of a leg are flown."""
+    one: Flyer = copied(climbed(flavour, 20_000))
+    one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
+    one.wait(5)
+    return one
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_where_it_came_to_stand_for_us_meanwhile_is_ours(flavour: str) -> None:
+    """It was told to stop just before, and to come home just after: it names its place between the two."""
+    one = copied(in_a_leg(flavour))
+    one.begin(MotionKind.HOLD)
+    one.wait(0.2)
+    one.vehicle.stand_still(6 * S)
+    one.begin(MotionKind.HOME)
+    end = one.until((Succeeded, TakenOver))
+    assert isinstance(end, Succeeded), end
+
+
+@pytest.mark.parametrize(
+    ("taken_us", "kind", "flavour"),
+    each_once((100 * MS, 3 * S, 5_300 * MS), (MotionKind.HOME, MotionKind.LAND, MotionKind.HOLD), FLAVOURS),
+)
+def test_a_pilot_who_took_over_meanwhile_is_not_flown_over(taken_us: int, kind: MotionKind, flavour: str) -> None:
+    """Reports of the mode before that waited are no answer to who flies."""
+    one = copied(in_a_leg(flavour))
+    one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us + taken_us, Mode.POSITION))
+    one.vehicle.stand_still(6 * S)
+    one.begin(kind)
+    end = one.until((Succeeded, TakenOver), 20)
+    assert isinstance(end, TakenOver), end
+    assert one.truth.mode is Mode.POSITION

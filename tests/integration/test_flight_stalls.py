@@ -40,12 +40,15 @@ def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
     stalls: dict[int, int], mode: Mode, flavour: str, attested: bool, lost: int | None
 ) -> None:
     """Two verifiers, written apart, agree (`audit`); no decision is derived otherwise, nothing is called forged. That
-    its boundary is lost, if it is, is told as that alone.
+    its boundary is lost, if it is, is told as that alone. Nothing is called crashed, or taken over, that is not.
     """
     flight = StallingFlight(bundle(), flavour, stalls, mode=mode, attested=attested, lost=lost)
     flown = flight.fly()
     report = flown.audit().report
     assert report.failure is None, report.failure
+    truth, told = flown.vehicle.simulation.truth(), {record.get("event") for record in flown.records}
+    assert truth.crashed or "crashed" not in told
+    assert truth.taken_over_us is not None or "taken-over" not in told
     gone = any(record.get("event") == "boundary-lost" for record in flown.records)
     assert (report.verdict is Verdict.VERIFIED) or (gone and attested), report
     assert {(gap.record, gap.us) for gap in report.gaps if gap.us > TOLD_US} == set(silences(flown))

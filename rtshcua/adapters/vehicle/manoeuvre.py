@@ -335,8 +335,8 @@ _URGENT: Final = (MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
 _LEGS: Final = (MotionKind.FLY, MotionKind.COVER)
 #: a frame that stops the vehicle, or brings it home or down, waits no longer than this to know whether its target is
-#: its own still, in us
-UNNAMED_MOST_US: Final = 1_000_000
+#: its own still, in us: with all else that it waits for no longer than its permit lasts
+UNNAMED_MOST_US: Final = 600_000
 #: so long, and what a round trip takes, a frame that brings it home or down waits for a report of the mode that is of
 #: now, in us: then the last one will do, if that is young
 ANSWER_MOST_US: Final = 50_000

@@ -19,7 +19,7 @@ from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import ExpectedTarget
-from rtshcua.adapters.vehicle.manoeuvre import TARGET_US
+from rtshcua.adapters.vehicle.manoeuvre import ANSWER_MOST_US, TARGET_US, UNNAMED_MOST_US
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.supervision import TargetWatch
 from rtshcua.codec.frames import Codec
@@ -41,6 +41,7 @@ from rtshcua.model.faults import (
 )
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Failed, Hindered, Noted, Ready, Succeeded, TakenOver
+from rtshcua.wire.permit import LINK_VALID_US
 from virtual.copying import copied
 from virtual.flyer import Flyer, climbed
 from virtual.policy import POLICY, geo
@@ -186,6 +187,12 @@ def test_reports_that_are_lost_are_no_takeover(loss: int) -> None:
     one = copied(in_a_leg("ardupilot"))
     one.vehicle.simulation.inject(LinkLoss(0, loss))
     assert not any(isinstance(event, TakenOver) for event in one.wait(40))
+
+
+def test_a_way_home_waits_no_longer_than_its_permit_lasts() -> None:
+    """It waited a second for a target, and then came too late: the vehicle was landed where it was."""
+    for flavour in (PX4, ARDUPILOT):
+        assert UNNAMED_MOST_US + ANSWER_MOST_US + flavour.mode_within_us < LINK_VALID_US - TICK_US
 
 
 def test_a_velocity_is_noticed_where_half_of_all_is_lost() -> None:

@@ -17,7 +17,7 @@ from rtshcua.cli.sources import compile_sources, meant, no_source
 from rtshcua.cli.stdout import out
 from rtshcua.cli.unlock import another_key, check_trusted, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.ground.compiler.pins import Pins
+from rtshcua.ground.compiler.pins import Pins, undeclared
 from rtshcua.ground.compiler.sign import sign
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -102,6 +102,9 @@ def compile(
     compiled, sources = compile_sources(
         sources_given, mission=mission, issued_at_us=issued_at, values=tuple(set_ or ()), pins=pins
     )
+    unknown = undeclared(pins, compiled.declared, compiled.diagnostics)
+    if unknown is not None:
+        return findings.end(unknown)
     told = meant(compiled.diagnostics, sources, sources_given)
     if findings.report(told, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))

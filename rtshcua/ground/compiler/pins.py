@@ -4,11 +4,13 @@ What a mission says of its own source, role and policy is a claim. A mission spe
 source is `agent` unless whoever compiles it says otherwise, and its policy is the one that they name or hand in.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
-from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.suggest import listed, nearest
 from rtshcua.ground.compiler.closure import Imports
 from rtshcua.ground.language.load import Program
 from rtshcua.model.ir.missions import MissionDecl
@@ -53,6 +55,27 @@ def claims(mission: MissionDecl, pins: Pins) -> Iterator[Diagnostic]:
         named = f"`{policy.text}@{mission.policy_version}`"
         text = f"says that it flies under {named}, and is compiled for version {pins.version}"
         yield _claim(policy, text, f"write `{policy.text}@{pins.version}`")
+
+
+def undeclared(pins: Pins, declared: frozenset[tuple[str, int]], found: Iterable[Diagnostic]) -> Refusal | None:
+    """Why the policy that whoever compiles named is none of those `declared` (name and version): a slip in an option is
+    no fault of the mission. None where it is one of them, and where errors other than a claim may have kept its source
+    from being read.
+    """
+    claimed = (codes.CLAIMED_AUTHORITY, codes.POLICY_NOT_NAMED)
+    if not pins.policies or has_errors(each for each in found if each.code not in claimed):
+        return None
+    versions = sorted(version for name, version in declared if name in pins.policies)
+    if pins.version in versions or (versions and pins.version is None):
+        return None
+    word = min(pins.policies)
+    if versions:
+        help = f"the sources declare `{word}@{versions[-1]}`; `--with` hands in the source of another"
+        return Refusal("usage", f"there is no policy `{word}@{pins.version}`", help)
+    names = sorted({name for name, _ in declared})
+    near = nearest(word, names)
+    known = f"the sources declare {listed(names) or 'none'}; `--with` hands in the source of another"
+    return Refusal("usage", f"there is no policy `{word}`", f"did you mean `--policy {near}`?" if near else known)
 
 
 def _either(word: str, claimed: str, pinned: str) -> str:

@@ -45,7 +45,7 @@ class Compiled:
     """A flat policy and mission, both None where there are errors; the mission is not yet bound to the policy.
 
     `bounds` is what the mission takes at most; `sources` are the texts that findings speak of, the program's and what
-    was given for the mission's parameters.
+    was given for the mission's parameters; `declared` are all policies of the program, by name and version.
     """
 
     policy: Policy | None
@@ -53,6 +53,7 @@ class Compiled:
     diagnostics: tuple[Diagnostic, ...]
     bounds: Bounds | None = None
     sources: Mapping[str, Source] = field(default_factory=dict)
+    declared: frozenset[tuple[str, int]] = frozenset()
 
 
 class Planned(NamedTuple):
@@ -101,9 +102,10 @@ def compile_program(
         run.report.found += claims(chosen, pins)
     compiled = run.lowered(chosen)
     found = run.diagnostics()
+    declared = frozenset((each.name.text, each.version) for unit in program.units for each in unit.policies)
     if compiled is None or run.report.failed() or chosen is None:
-        return Compiled(None, None, found, None, run.report.sources)
-    return Compiled(*compiled, found, run.bounds.get(chosen.name.text), run.report.sources)
+        return Compiled(None, None, found, None, run.report.sources, declared)
+    return Compiled(*compiled, found, run.bounds.get(chosen.name.text), run.report.sources, declared)
 
 
 def check_program(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:

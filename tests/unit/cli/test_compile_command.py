@@ -259,3 +259,23 @@ def test_a_key_that_others_may_read_says_what_to_do(
     source = str(checkout / "missions" / "short.rts")
     assert main(["compile", source, "-o", "made", "--policy-key", str(key), *AT]) == ExitCode.UNTRUSTED
     assert "its mode is 0644\n help: `chmod 600` it; " in capsys.readouterr().err
+
+
+def test_a_slip_in_an_option_is_not_blamed_on_the_file(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = str(checkout / "missions" / "proposal.json")
+    for named, text, help in (
+        ("bridge_inspectoin", "`bridge_inspectoin`", "did you mean `--policy bridge_inspection`?"),
+        ("bridge_inspection@8", "`bridge_inspection@8`", "`bridge_inspection@7`"),
+        ("zzz", "`zzz`", "the sources declare `bridge_inspection`"),
+    ):
+        assert main(["compile", source, "--policy", named, "--json"]) == ExitCode.USAGE
+        error = json.loads(capsys.readouterr().out)["error"]
+        assert error["slug"] == "usage"
+        assert f"no policy {text}" in str(error)
+        assert help in error["help"]
+
+
+def test_a_source_that_cannot_be_read_comes_before_a_policy_that_is_not_there(here: Path, checkout: Path) -> None:
+    text = proposal(checkout).replace("lib:policies/bridge_inspection.rts", "lib:policies/none.rts")
+    (here / "spec.json").write_text(text, encoding="utf-8")
+    assert main(["compile", "spec.json", "--policy", "bridge_inspection"]) == ExitCode.DIAGNOSTICS

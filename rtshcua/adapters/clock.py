@@ -32,6 +32,12 @@ class LinkClock(Clock, Protocol):
         """A frame of the vehicle said how long it has been up, in us."""
         ...
 
+    def tell(self, whom: Callable[[int], object]) -> None:
+        """From now on tell, several times a second, how long the vehicle had been up, in us, when it was last heard: it
+        waits for us. A clock that goes on by itself tells nothing.
+        """
+        ...
+
     def real_seconds(self, us: int) -> float:
         """How long `us` of this clock last on the machine's, for waiting."""
         ...
@@ -71,6 +77,9 @@ class SystemClock:
 
     def heard(self, boot_us: int) -> None:
         """The vehicle's own time does not matter here."""
+
+    def tell(self, whom: Callable[[int], object]) -> None:
+        """Nor does whoever lives by it."""
 
     def real_seconds(self, us: int) -> float:
         """The same in seconds."""
@@ -119,6 +128,7 @@ class PacedClock:
     """
 
     LEAD_US = 200_000
+    TELL_US = 100_000
     PATIENCE_NS = 500_000_000  # from ten times as fast on
     _PATIENCE_FROM = 10
 
@@ -133,6 +143,8 @@ class PacedClock:
         self._base_us = self._last_us = self._heard_ns // 1_000
         self._boot_us: int | None = None
         self._ahead_us = time.time_ns() // 1_000 - self._base_us
+        self._tell: Callable[[int], object] = int
+        self._told_us = -self.TELL_US
 
     def now(self) -> Now:
         """The present moment; never before the last."""
@@ -160,6 +172,13 @@ class PacedClock:
         else:
             return
         self._boot_us, self._heard_ns = boot_us, self._machine_ns()
+        if boot_us - self._told_us >= self.TELL_US:
+            self._told_us = boot_us
+            self._tell(boot_us)
+
+    def tell(self, whom: Callable[[int], object]) -> None:
+        """See `LinkClock`."""
+        self._tell = whom
 
     def real_seconds(self, us: int) -> float:
         """The same on the machine's clock."""

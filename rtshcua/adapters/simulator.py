@@ -47,6 +47,8 @@ class Simulator:
             usage = self._process.returncode == _USAGE
             raise SimulatorError(f"the simulated vehicle did not start: {reason}", usage=usage)
         self.ready: dict[str, Any] = json.loads(line)
+        assert self._process.stdin is not None
+        os.set_blocking(self._process.stdin.fileno(), False)
 
     def wait(self) -> int:
         """Wait until the process ends by itself; its exit code."""
@@ -60,6 +62,14 @@ class Simulator:
             self._process.stdin.flush()
         except OSError as error:
             raise SimulatorError(f"the simulated vehicle is gone: {error.strerror or error}") from error
+
+    def heard(self, boot_us: int) -> None:
+        """Tell it which of its positions was heard last, by its time since boot: faster than life it waits for us. That
+        never waits for it.
+        """
+        assert self._process.stdin is not None
+        with suppress(OSError, ValueError):  # it reads nothing now, or is gone
+            os.write(self._process.stdin.fileno(), b"heard %d\n" % boot_us)
 
     def stop(self) -> None:
         """End it: by closing its input, and, should it not listen, by signals."""

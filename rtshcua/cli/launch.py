@@ -200,6 +200,7 @@ def _launch(order: Launch) -> ExitCode:
                 raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
             if isinstance(transport, UdpTransport) and order.link is None and order.wait_s is None:
                 simulator = stack.enter_context(_simulate(order, loaded, transport.port))
+                clock.tell(simulator.heard)
                 if order.incidents is not None:
                     order.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)
             agents = agents or _agents(order, loaded, stack)

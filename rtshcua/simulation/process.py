@@ -3,7 +3,8 @@
 A thin loop around `world.Simulation`: one UDP socket on the loopback interface, real time times `--speed`. It sends to
 one peer and hears only that one, as a real link does. When it is up it prints one line of JSON. It ends on SIGTERM,
 and, if its standard input is a pipe, when the other end of that closes, so that it never outlives who started it. Each
-line that comes from there is a fault as `--fault` has it, its time counted from then on.
+line that comes from there is a fault as `--fault` has it, its time counted from then on, or says `heard` and the time
+since boot, in us, of the position that was heard last (`Pace`).
 """
 
 import argparse
@@ -18,6 +19,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.simulation.autopilot import TICK_US
@@ -193,6 +195,8 @@ EXIT_PORT = 3
 
 _LEAP_US = 250_000
 """The simulation never catches up by more than this at once: a process that was stopped loses the time."""
+HEARD = b"heard "
+"""What a line begins with that tells the time since boot, in us, of the position that was heard last."""
 _SHORTEST_SLEEP_S, _LONGEST_SLEEP_S = 0.001, 0.05
 _LARGEST_DATAGRAM = 65_535
 
@@ -231,6 +235,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return EXIT_OK
 
 
+class Pace:
+    """Whether time waits for whoever started the simulation, faster than life: a computer that is busy would fall
+    behind for good, and fly what was long ago. It tells what it has heard; one that tells nothing is not waited for.
+    """
+
+    #: us of the vehicle's time by which what was said may be ahead of what was heard, and s of the machine's
+    AHEAD_US: Final = 1_000_000
+    PATIENCE_S: Final = 0.5
+    _POSITION: Final = (33).to_bytes(3, "little")  # GLOBAL_POSITION_INT begins with the time since boot, in ms
+
+    def __init__(self) -> None:
+        self._said_us = self._heard_us = 0
+        self._told_s: float | None = None
+
+    def says(self, frame: bytes) -> None:
+        """This frame goes out."""
+        if frame[7:10] == self._POSITION:
+            self._said_us = int.from_bytes(frame[10 : 10 + min(4, frame[1])], "little") * 1_000
+
+    def hears(self, boot_us: int, at_s: float) -> None:
+        """It was told that a position of this time since boot was heard."""
+        self._heard_us, self._told_s = boot_us, at_s
+
+    def waits(self, at_s: float) -> bool:
+        """Whether time stands still now."""
+        if self._told_s is None or at_s - self._told_s > self.PATIENCE_S:
+            return False
+        return self._said_us - self._heard_us > self.AHEAD_US
+
+
 class _Loop:
     def __init__(self, simulation: Simulation, link: socket.socket, peer: tuple[str, int], speed: float) -> None:
         self._simulation = simulation
@@ -239,6 +273,7 @@ class _Loop:
         self._speed = speed
         self._ended = False
         self._unread = b""
+        self._pace = Pace()
 
     def listen(self, selector: selectors.BaseSelector) -> None:
         """Begins to listen to the peer, and to whoever may end the process."""
@@ -258,7 +293,8 @@ class _Loop:
         while not self._ended:
             ready = [key.fileobj for key, _ in selector.select(self._until_next(sleep, now_us))]
             now = time.monotonic()
-            now_us += min((now - last) * self._speed * 1_000_000, _LEAP_US)
+            if not self._pace.waits(now):
+                now_us += min((now - last) * self._speed * 1_000_000, _LEAP_US)
             last = now
             if sys.stdin in ready and not self._told(os.read(sys.stdin.fileno(), 4096), int(now_us)):
                 return
@@ -286,6 +322,9 @@ class _Loop:
         """Takes in what came from who started it; whether that goes on."""
         *lines, self._unread = (self._unread + data).split(b"\n")
         for line in lines:
+            if line.startswith(HEARD) and line[len(HEARD) :].isdigit():
+                self._pace.hears(int(line[len(HEARD) :]), time.monotonic())
+                continue
             try:
                 fault = parse_fault(line.decode("ascii", "replace"))
             except ValueError as error:
@@ -296,6 +335,7 @@ class _Loop:
 
     def _send(self, frames: list[bytes]) -> None:
         for frame in frames:
+            self._pace.says(frame)
             try:
                 self._link.sendto(frame, self._peer)
             except BlockingIOError:

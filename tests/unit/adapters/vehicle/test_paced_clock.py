@@ -94,12 +94,21 @@ def test_utc_goes_with_it() -> None:
     assert (clock.real_seconds(4_000_000), clock.us_in(2)) == (2.0, 4_000_000)
 
 
-def test_the_systems_clock_does_not_listen() -> None:
-    clock = SystemClock(utc_error_us=5)
+def test_the_systems_clock_does_not_listen_nor_tell() -> None:
+    clock, told = SystemClock(utc_error_us=5), list[int]()
+    clock.tell(told.append)
     before = clock.now()
     clock.heard(10**12)
     after = clock.now()
     assert before.monotonic_us <= after.monotonic_us < before.monotonic_us + 10_000_000
     assert after.utc_us - before.utc_us == after.monotonic_us - before.monotonic_us
     assert 5 <= after.utc_error_us < 5 + 10 * 500, "it grows"
-    assert (clock.real_seconds(1_500_000), clock.us_in(1.5)) == (1.5, 1_500_000)
+    assert (clock.real_seconds(1_500_000), clock.us_in(1.5), told) == (1.5, 1_500_000, [])
+
+
+def test_tells_how_far_the_vehicle_was_heard() -> None:
+    clock, told = PacedClock(20, machine_ns=Machine()), list[int]()
+    clock.tell(told.append)
+    for boot_us in (500_000, 550_000, 600_000, 400_000, 720_000):
+        clock.heard(boot_us)
+    assert told == [500_000, 600_000, 720_000]

@@ -1,0 +1,51 @@
+"""Faster than life the simulated vehicle waits for a computer that is busy, and not for one that stands still."""
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rtshcua.codec.frames import Codec
+from rtshcua.simulation.process import Pace
+
+CODEC = Codec(1, 1)
+
+
+def position(boot_ms: int) -> bytes:
+    return CODEC.pack(mavlink.MAVLink_global_position_int_message(boot_ms, 0, 0, 0, 0, 0, 0, 0, 0))
+
+
+def test_waits_while_it_is_ahead_of_what_was_heard() -> None:
+    pace = Pace()
+    pace.says(position(70_000))
+    pace.hears(69_000_000, 5.0)
+    assert not pace.waits(5.1)
+    pace.says(position(70_100))
+    assert pace.waits(5.1)
+    pace.hears(69_100_000, 5.2)
+    assert not pace.waits(5.2)
+
+
+def test_waits_for_nobody_who_tells_nothing() -> None:
+    """A link that is cut, or a computer that stands still: the vehicle flies on."""
+    pace = Pace()
+    pace.says(position(70_000))
+    assert not pace.waits(100.0), "nobody ever told"
+    pace.hears(1_000_000, 5.0)
+    assert [pace.waits(5.0 + s) for s in (0.4, 0.6)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [mavlink.MAVLink_attitude_message(90_000, 0, 0, 0, 0, 0, 0), mavlink.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)],
+)
+def test_only_a_position_says_how_far_it_is(message: object) -> None:
+    pace = Pace()
+    pace.hears(1_000_000, 5.0)
+    pace.says(CODEC.pack(message))
+    assert not pace.waits(5.1)
+
+
+def test_what_begins_anew_is_not_waited_for() -> None:
+    pace = Pace()
+    pace.hears(90_000_000, 5.0)
+    pace.says(position(100))
+    assert not pace.waits(5.1)

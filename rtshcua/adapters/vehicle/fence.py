@@ -127,10 +127,9 @@ RETRIES: Final = 8
 SILENCE_US: Final = 8_000_000
 
 _RESULTS: Final = {
-    1: "error", 2: "unsupported frame", 4: "no space", 5: "invalid", 13: "invalid sequence", 14: "denied",
-    15: "cancelled",
+    1: "error", 2: "unsupported frame", 4: "no space", 5: "invalid", 14: "denied", 15: "cancelled",
 }  # fmt: skip
-_ACCEPTED, _UNSUPPORTED = 0, 3
+_ACCEPTED, _UNSUPPORTED, _OUT_OF_ORDER = 0, 3, 13
 
 
 class UploadState(Enum):
@@ -150,7 +149,8 @@ class Upload:
     little (docs/adr/0019-what-a-vehicle-says.md). `problem` says what went wrong when it FAILED.
 
     Source: https://mavlink.io/en/services/mission.html; PX4 asks with MISSION_REQUEST_INT, and at times with both,
-    ArduCopter with the older MISSION_REQUEST and takes MISSION_ITEM_INT for an answer (recorded).
+    ArduCopter with the older MISSION_REQUEST and takes MISSION_ITEM_INT for an answer (recorded). It says of an item
+    that it does not ask for now that its number is wrong, and goes on (MissionItemProtocol.cpp, `handle_mission_item`).
     """
 
     def __init__(self, items: tuple[FenceItem, ...], frame: int, slack: int = 1) -> None:
@@ -192,6 +192,8 @@ class Upload:
                     return self._ask(UploadState.COUNTING, messages.fence_list(system), now_us)
                 if message.type == _UNSUPPORTED:
                     self.state = UploadState.UNSUPPORTED
+                    return []
+                if message.type == _OUT_OF_ORDER:  # an item came twice: what is late is asked for twice
                     return []
                 return self._fail(f"refuses it ({_RESULTS.get(message.type, f'result {message.type}')})")
             case "MISSION_COUNT", UploadState.COUNTING:

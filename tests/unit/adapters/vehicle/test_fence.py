@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
 from rtshcua.adapters.px4.flavour import PX4
@@ -13,6 +14,8 @@ from rtshcua.adapters.vehicle.fence import (
     INCLUDE_CIRCLE,
     INCLUDE_VERTEX,
     Fence,
+    Upload,
+    UploadState,
     fence_of,
 )
 from rtshcua.model.flat.policy import Airspace
@@ -127,3 +130,27 @@ def test_a_zone_of_two_parts_is_there_where_inclusions_are_joined() -> None:
 
 def test_without_an_airspace_there_is_no_fence() -> None:
     assert fence_of(POLICY, PX4.fence) == Fence((), ("the policy has no airspace",))
+
+
+def acknowledged(result: int) -> Any:
+    return mavlink.MAVLink_mission_ack_message(255, 191, result, 1)
+
+
+def test_an_item_that_came_twice_ends_no_upload() -> None:
+    """A vehicle that waits for long asks again, and gets two answers: to the second it says `invalid sequence`."""
+    items = fence(ARDUPILOT, [zone()]).items
+    upload = Upload(items, ARDUPILOT.fence.frame)
+    upload.due(1, 0)
+
+    def takes(message: Any) -> list[str]:
+        return [each.get_type() for each in upload.take(message.get_type(), message, 1, 0)]
+
+    for number in range(len(items)):
+        for _ in range(2):
+            asked = mavlink.MAVLink_mission_request_message(255, 191, number, 1)
+            assert takes(asked) == ["MISSION_ITEM_INT"]
+        assert takes(mavlink.MAVLink_mission_ack_message(255, 191, mavlink.MAV_MISSION_INVALID_SEQUENCE, 1)) == []
+    assert takes(mavlink.MAVLink_mission_ack_message(255, 191, mavlink.MAV_MISSION_ACCEPTED, 1)) == [
+        "MISSION_REQUEST_LIST"
+    ]
+    assert upload.state is UploadState.COUNTING

@@ -8,7 +8,7 @@ from typing import Any
 
 from rtshcua.cli.faults import code_of, fail, say, say_lines, say_rendered
 from rtshcua.cli.stdout import out_json
-from rtshcua.cli.width import fitted
+from rtshcua.cli.width import columns, fitted
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -39,7 +39,7 @@ class Findings:
             self._object = as_json(found, sources)
         elif found:
             found = folded(found)
-            text = _laid_out(render(most_severe(found), sources))
+            text = _laid_out(render(most_severe(found), sources, columns()))
             say_rendered((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say_lines(f"\n{_count(found)}")
             if len(found) > MOST_SHOWN:

@@ -11,6 +11,11 @@ _LEAST: Final = 40
 
 def fitted(line: str) -> list[str]:
     """A line as lines of 80 columns, or of as many as `COLUMNS` says."""
+    return wrapped(line, columns())
+
+
+def columns() -> int:
+    """How many columns text is laid out for."""
     asked = os.environ.get("COLUMNS", "")
     width = int(asked) if asked.isascii() and asked.isdecimal() and len(asked) < 6 else WIDTH
-    return wrapped(line, max(width, _LEAST))
+    return max(width, _LEAST)

@@ -29,7 +29,7 @@ _HIDING = pattern(
 Mark = tuple[Span, str, str]
 
 
-def together(source: Source, number: int, marks: Sequence[Mark]) -> list[list[Mark]]:
+def together(source: Source, number: int, marks: Sequence[Mark], width: int = MAX_WIDTH) -> list[list[Mark]]:
     """The marks of a line in groups, such that of each mark of a group at least the beginning is in view at once."""
     text = source.line(number)
     groups: list[tuple[tuple[int, int], list[Mark]]] = []
@@ -42,13 +42,14 @@ def together(source: Source, number: int, marks: Sequence[Mark]) -> list[list[Ma
         else:
             begun = max(column - NEAR, 0)
             starts = _starts([_cell(character) for character in text[begun : column + NEAR]])
-            first, last = _window(starts, (column - begun, column - begun))
+            first, last = _window(starts, (column - begun, column - begun), width)
             groups.append(((begun + first, begun + last), [mark]))
     return [group for _, group in groups]
 
 
-def excerpt(source: Source, number: int, marks: Sequence[Mark]) -> tuple[str, list[str]]:
-    """The text of a line, and an underline for each mark: a span that begins on the line, a character, and words.
+def excerpt(source: Source, number: int, marks: Sequence[Mark], width: int = MAX_WIDTH) -> tuple[str, list[str]]:
+    """The text of a line, in at most `width` columns, and an underline for each mark: a span that begins on the line, a
+    character, and words, which stand beneath where there is no room beside.
 
     A span that goes on over further lines is underlined up to the end of this one; an empty one has one character.
     """
@@ -61,10 +62,10 @@ def excerpt(source: Source, number: int, marks: Sequence[Mark]) -> tuple[str, li
     cells = [_cell(character) for character in text]
     starts = _starts(cells)
     columns = [(min(max(span.start - offset, 0), len(text)), min(span.end - offset, len(text))) for span, _, _ in marks]
-    first, last = _window(starts, columns[0])
+    first, last = _window(starts, columns[0], width)
     rendered = "".join(
-        shown if width >= 0 else " " * (starts[at + 1] - starts[at])
-        for at, (shown, width) in enumerate(cells[first:last], start=first)
+        shown if columns_taken >= 0 else " " * (starts[at + 1] - starts[at])
+        for at, (shown, columns_taken) in enumerate(cells[first:last], start=first)
     )
     before, after = CUT if first > 0 or cut[0] else "", CUT if last < len(text) or cut[1] else ""
     underlines = []
@@ -72,7 +73,11 @@ def excerpt(source: Source, number: int, marks: Sequence[Mark]) -> tuple[str, li
         begin, end = min(max(begin, first), last), min(max(end, first), last)
         indent = " " * (len(before) + starts[begin] - starts[first])
         underline = character * max(starts[max(end, begin)] - starts[begin], 1)
-        underlines.append(f"{indent}{underline} {visible(words)}".rstrip())
+        said = visible(words)
+        if len(indent) + len(underline) + 1 + len(said) <= width:
+            underlines.append(f"{indent}{underline} {said}".rstrip())
+        else:
+            underlines += [indent + underline, " " * max(0, min(len(indent), width - len(said))) + said]
     return before + rendered + after, underlines
 
 
@@ -84,16 +89,17 @@ def _starts(cells: Sequence[tuple[str, int]]) -> list[int]:
     return starts
 
 
-def _window(starts: Sequence[int], column: tuple[int, int]) -> tuple[int, int]:
-    """The characters of a line to show: all, or those around a column that fit."""
+def _window(starts: Sequence[int], column: tuple[int, int], width: int) -> tuple[int, int]:
+    """The characters of a line to show: all, or those around a column that fit, with room for what marks a cut."""
     count = len(starts) - 1
-    if starts[-1] <= MAX_WIDTH:
+    if starts[-1] <= width:
         return 0, count
+    width -= 2 * len(CUT)
     first = column[0]
     while first > 0 and starts[column[0]] - starts[first - 1] <= BEFORE:
         first -= 1
     last = first
-    while last < count and starts[last + 1] - starts[first] <= MAX_WIDTH:
+    while last < count and starts[last + 1] - starts[first] <= width:
         last += 1
     return first, last
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.diagnostics.excerpt import Mark, excerpt, together, visible
+from rtshcua.diagnostics.excerpt import MAX_WIDTH, Mark, excerpt, together, visible
 from rtshcua.diagnostics.span import Source
 
 PRIMARY, SECONDARY = "^", "-"
@@ -29,12 +29,14 @@ def most_severe(diagnostics: Sequence[Diagnostic], most: int = MOST_SHOWN) -> tu
     return tuple(diagnostics[number] for number in sorted(order[:most]))
 
 
-def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> str:
-    """All findings, parted by empty lines; ends in a newline unless there are none."""
-    return "\n".join(render_one(diagnostic, sources) for diagnostic in diagnostics)
+def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source], width: int = MAX_WIDTH) -> str:
+    """All findings, parted by empty lines; ends in a newline unless there are none. Lines of sources take at most
+    `width` columns, with their numbers.
+    """
+    return "\n".join(render_one(diagnostic, sources, width) for diagnostic in diagnostics)
 
 
-def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
+def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source], width: int = MAX_WIDTH) -> str:
     """One finding, ending in a newline."""
     code = diagnostic.code
     lines = [f"{diagnostic.severity.value}[{code.id}]: {_shown(diagnostic.message)}"]
@@ -43,6 +45,7 @@ def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
     places = places[:MOST_PLACES]
     gutter = max((len(str(line)) for _, line, _ in places), default=1)
     margin = " " * gutter
+    room = width - gutter - len(" | ")
     shown: str | None = None
     for file, line, marks in places:
         source = sources[file]
@@ -54,8 +57,8 @@ def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> str:
         elif shown is not None:
             lines.append(f"{margin} :")
         shown = file
-        for group in together(source, line, marks):
-            text, underlines = excerpt(source, line, group)
+        for group in together(source, line, marks, room):
+            text, underlines = excerpt(source, line, group, room)
             lines.append(f"{line:>{gutter}} | {text}".rstrip())
             lines += [f"{margin} | {underline}" for underline in underlines]
     if diagnostic.span is not None and not places:

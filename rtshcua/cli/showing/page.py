@@ -21,8 +21,8 @@ class Page:
         """A heading, after an empty line unless it is the first."""
         if self._lines:
             self._lines.append("")
-        text = visible(title)
-        self._lines.append(f"\033[1m{text}\033[0m" if self._bold else text)
+        lines = fitted(visible(title))
+        self._lines += [f"\033[1m{line}\033[0m" for line in lines] if self._bold else lines
 
     def row(self, name: str, value: str, *, indent: int = 2, width: int = _NAME) -> None:
         """A name and its value, wrapped beneath itself."""

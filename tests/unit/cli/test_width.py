@@ -16,7 +16,7 @@ from rtshcua.cli.showing.page import Page
 from rtshcua.cli.stdout import out
 from rtshcua.cli.verdict import HELPS, MEANINGS
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, REGISTRY
-from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.evidence.finding import Claim
@@ -38,7 +38,7 @@ def too_wide(text: str) -> list[str]:
 
 def _page() -> None:
     page = Page()
-    page.head("Policy")
+    page.head(LONG)
     page.row("digest", LONG)
     page.rows("rules", [LONG, "short"])
     page.text(LONG)
@@ -46,8 +46,9 @@ def _page() -> None:
 
 
 def _findings() -> None:
-    source = Source("a.rts", "policy p {}\n")
-    found = Diagnostic(NO_SUCH_FILE, LONG, Span("a.rts", 0, 6), LONG)
+    source = Source("a.rts", f"policy p {{}} // {'word ' * 14}\n{'word ' * 40}\n")
+    labels = (Label(Span("a.rts", 76, 80), "declared here"), Label(Span("a.rts", 200, 204), LONG[-40:]))
+    found = Diagnostic(NO_SUCH_FILE, LONG, Span("a.rts", 0, 6), LONG, labels)
     Findings(json=False).report([found], {"a.rts": source})
 
 

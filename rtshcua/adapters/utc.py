@@ -73,18 +73,42 @@ def synchronised_us(state: int, status: int, maxerror: int) -> int | None:
     return None if wrong or maxerror < 0 else maxerror
 
 
+def vehicle_counts(*, apart: bool, keyed: bool) -> bool:
+    """Whether a run takes the vehicle's own time. A boundary `apart`, in a process of its own, believes it over a link
+    with a key alone: anybody could say it on another (ADR 78).
+    """
+    return keyed or not apart
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOfDay:
+    """What a run would take the time of day from: what this machine's is off by at most, in us, None where the kernel
+    does not say; whether the vehicle's own would count; what the operator stated; whether a boundary that listens
+    decides, in whose command line that stands.
+    """
+
+    machine_us: int | None
+    vehicle: bool = True
+    stated_us: int | None = None
+    listens: bool = False
+
+
 class UtcWatch:
     """Bounds a clock's UTC by the best that is known, once; `bound` is what it has come to so far.
 
     `stated_us` is what the operator says, None for nothing. While only that is known, or nothing, `look` takes the
-    vehicle's own time where it comes; until `settle` says that no more is waited for.
+    vehicle's own time where it comes; until `settle` says that no more is waited for. `vehicle`: whether that counts,
+    as `vehicle_counts` has it of what is rehearsed here and decided apart.
     """
 
     def __init__(
-        self, clock: LinkClock, stated_us: int | None = None, kernel_us: Callable[[], int | None] | None = None
-    ) -> None:
+        self, clock: LinkClock, stated_us: int | None = None, kernel_us: Callable[[], int | None] | None = None, *,
+        vehicle: bool = True,
+    ) -> None:  # fmt: skip
         self._clock = clock
         self._stated_us = stated_us
+        #: whether the vehicle's own time would be taken at all
+        self.vehicle_counts = vehicle
         self._own: Callable[[bool], OwnTime | None] | None = None
         kernel = (kernel_us or kernel_error_us)()
         self.bound = UtcBound("unknown", UTC_UNKNOWN_US)
@@ -134,13 +158,13 @@ class UtcWatch:
         """Whether the vehicle is to be asked for its time: a boundary of its own takes it in answer to a number alone,
         which it draws where the link has a key.
         """
-        return self.waits and (self._own is None or self.question() != 0)
+        return self.waits and self.vehicle_counts and (self._own is None or self.question() != 0)
 
     def look(self, told: SourceTime, flavour: str, now_us: int) -> bool:
         """Take the vehicle's own time, if it is needed and told. Whether it was taken."""
         if self._own is not None:
             return self.waits and self._follow(self._own(False))
-        utc = told.utc(now_us) if self.waits else None
+        utc = told.utc(now_us) if self.waits and self.vehicle_counts else None
         if utc is None:
             return False
         ahead_us, open_us = utc

@@ -32,14 +32,14 @@ from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.signing import LinkKeyError
 from rtshcua.adapters.qualification.standing import standing
 from rtshcua.adapters.store.reading import read_regular
-from rtshcua.adapters.utc import kernel_error_us
+from rtshcua.adapters.utc import TimeOfDay, kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli.configured import MeantSettings, settings_of
-from rtshcua.cli.connection import Connect, LinkKey, System, UnsignedRadio
+from rtshcua.cli.connection import Connect, LinkKey, System, UnsignedRadio, UtcError, duration_us
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.launch import expect_no_source
 from rtshcua.cli.meeting import unmet, unopened
@@ -49,12 +49,15 @@ from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.parameters import shown
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
+from rtshcua.wire.clock import Source
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -78,6 +81,7 @@ def doctor(
         str | None, typer.Option(metavar="USER", help="who the agent runs as: is it told apart from operators?")
     ] = None,
     set_: MeantSettings = None,
+    utc_error: UtcError = None,
     boundary_socket: Annotated[
         Path | None, typer.Option(metavar="PATH", help="where a boundary listens that is to decide: look at that one")
     ] = None,
@@ -93,6 +97,9 @@ def doctor(
         return misaddressed("--connect", error)
     if unsigned_radio and signing_key is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
+    if utc_error is not None and boundary_socket is not None:
+        text = "`--utc-error` does not go with `--boundary-socket`: the boundary there is told in its own command line"
+        return fail(ExitCode.USAGE, text)
     try:
         agents = [] if agent_user is None else [told_apart(agent_user, pwd.getpwnam(agent_user).pw_uid, os.geteuid())]
     except KeyError:
@@ -126,10 +133,12 @@ def doctor(
             return refuse(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
+        keyed = signing_key is not None
         findings = _boundary(boundary_socket) + agents + _settle(socket, vehicle, clock)
         findings += list(
             diagnose(
-                vehicle, policy, mission, keyed=signing_key is not None, utc_error_us=kernel_error_us(),
+                vehicle, policy, mission, keyed=keyed,
+                time=_time_of_day(boundary_socket, duration_us(utc_error), keyed=keyed),
                 unheard=signing.unheard, named=system is not None,
                 qualified=None if root is None else partial(
                     standing, record_of(policy.vehicle.identity, root, clock.now().utc_us)
@@ -169,6 +178,28 @@ def _boundary(socket: Path | None = None) -> list[VehicleFinding]:
             name = f"boundary/{str(measure.name).lower().replace('_', '-')}"
             found.append(VehicleFinding(name, MissionVerdict.WARN, f"that process would be without {text}"))
     return found
+
+
+def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool) -> TimeOfDay:
+    """What a run would take the time of day from: one as it begins by itself, or one by the boundary that listens."""
+    if socket is None:
+        return TimeOfDay(kernel_error_us(), vehicle_counts(apart=program() is not None, keyed=keyed), stated_us)
+    try:
+        listening = ListeningBoundary(socket)
+    except BoundaryError:  # nothing flies by it, and that was said
+        return TimeOfDay(kernel_error_us(), listens=True)
+    try:
+        has_key = listening.link_name is not None
+        said = Caller(listening.call, signs=has_key).time(settle=True)
+    finally:
+        listening.close()
+    if isinstance(said, Refusal) or said.source is Source.SHARED:  # it has none of its own: that of the run counts
+        return TimeOfDay(kernel_error_us(), listens=True)
+    error_us, counts = said.now.utc_error_us, vehicle_counts(apart=True, keyed=has_key)
+    return TimeOfDay(
+        error_us if said.source is Source.KERNEL else None, counts,
+        error_us if said.source is Source.OPERATOR else None, listens=True,
+    )  # fmt: skip
 
 
 def _owed(debts: OwedParameters) -> list[VehicleFinding]:

@@ -20,7 +20,7 @@ from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, make_folder
-from rtshcua.adapters.utc import UtcWatch
+from rtshcua.adapters.utc import UtcWatch, vehicle_counts
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
@@ -226,7 +226,7 @@ def _launch(order: Launch) -> ExitCode:
 
                 return dry_run(
                     loaded, vehicle, clock, interrupts, events, as_json=order.style == "json",
-                    notes=(*signing.notes, *would_set(order.settings)),
+                    notes=(*signing.notes, *would_set(order.settings), *_utc_notes(utc, apart, listens=False)),
                     refusal=flown_before(order.state, loaded), unheard=signing.unheard, sets=tuple(order.settings),
                 )  # fmt: skip
             assert past is not None
@@ -778,9 +778,13 @@ def _expect_log_key(key: SigningKey | VerificationKey, root: TrustRoot) -> None:
 
 
 def _utc(order: Launch, clock: LinkClock) -> UtcWatch:
-    """Who vouches for UTC; a simulation has that of the machine that it runs on."""
+    """Who vouches for UTC; a simulation has that of the machine that it runs on. A rehearsal, which is decided here,
+    takes what the boundary of a flight would take.
+    """
     if order.link is not None and order.speed == 1:
-        return UtcWatch(clock, order.utc_error_us)
+        apart = order.dry_run and order.mode is Mode.PROCESS
+        counts = vehicle_counts(apart=apart, keyed=order.signing_key is not None)
+        return UtcWatch(clock, order.utc_error_us, vehicle=counts)
     return UtcWatch.simulated(clock)
 
 
@@ -796,7 +800,8 @@ def _utc_notes(utc: UtcWatch, apart: Apart | None, *, listens: bool) -> list[str
         return []
     if listens:
         return [LISTENING_UTC_NOTE]
-    return [UTC_NOTE if apart is None or apart.process.link_name is not None else APART_UTC_NOTE]
+    unkeyed = apart is not None and apart.process.link_name is None
+    return [APART_UTC_NOTE if unkeyed or not utc.vehicle_counts else UTC_NOTE]
 
 
 def _lapsed(bundle: bytes, signed_root: bytes, log_key: bytes, loaded: Loaded, clock: LinkClock) -> Refused | None:

@@ -117,7 +117,7 @@ def await_utc(
     """
     events: list[Event] = []
     until_s = time.monotonic() + (UTC_S if patient or listens else 0)
-    while utc.waits:
+    while utc.waits and utc.vehicle_counts:
         flavour = vehicle.driver.flavour
         taken = flavour is not None and utc.look(vehicle.driver.source, flavour.name, clock.now().monotonic_us)
         if taken or time.monotonic() >= until_s or (hurried and vehicle.driver.seen.armed):

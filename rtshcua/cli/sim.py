@@ -1,14 +1,17 @@
 """`rtshcua sim`: the simulated vehicle alone, for any ground station that speaks MAVLink."""
 
 import json
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from rtshcua.adapters.boundary_process import program
 from rtshcua.adapters.files.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.simulator import Simulator, SimulatorError
+from rtshcua.adapters.utc import kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError, Way
 from rtshcua.cli import simulated
@@ -111,7 +114,7 @@ def sim(
         if as_json:
             out_json(json.dumps(vehicle.ready), flush=True)
         else:
-            out(*_introduction(vehicle.ready, port, signing_key), flush=True)
+            out(*_introduction(vehicle.ready, port, signing_key, speed), flush=True)
         try:
             code = vehicle.wait()
         except KeyboardInterrupt:
@@ -119,15 +122,28 @@ def sim(
     return fail(ExitCode.FAULT, f"the simulated vehicle ended by itself, with code {code}")
 
 
-def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None) -> list[str]:
+def _options(signing_key: Path | None, speed: float) -> str:
+    """What `run` needs to fly it on this machine, besides where it is. It shares the machine's clock: no more is stated
+    of that where it lives faster, or where its time counts.
+    """
+    words = [] if signing_key is None else [f"--signing-key {shlex.quote(str(signing_key))} --unsigned-radio"]
+    if speed != 1:
+        words.append(f"--speed {speed:g}")
+    elif not vehicle_counts(apart=program() is not None, keyed=signing_key is not None) and kernel_error_us() is None:
+        words.append("--utc-error 500ms")
+    return " ".join(words)
+
+
+def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None, speed: float) -> list[str]:
     """What was started, and what a person types to fly it."""
     flavour = Kind(ready["flavour"])
-    key = f" --signing-key {signing_key} --unsigned-radio" if signing_key is not None else ""
+    more = _options(signing_key, speed)
     finds = "start it: it listens on this port by itself"
     adds = f"Application Settings, Comm Links, Add: type UDP, port {port}"
     return [
         f"a simulated {flavour} vehicle, system {ready['system']}, sends to udp port {port}",
-        f"  fly it           rtshcua run BUNDLE --connect udpin:127.0.0.1:{port} --vehicle IDENTITY{key}",
+        f"  fly it           rtshcua run BUNDLE --connect udpin:127.0.0.1:{port} \\",
+        f"                     --vehicle IDENTITY{' ' if more else ''}{more}",
         f"  QGroundControl   {finds if port == PORT else adds}",
         f"  MAVProxy         mavproxy.py --master=udpin:127.0.0.1:{port}",
         f"                   then: {', '.join(f'`{step}`' for step in _FIRST_STEPS[flavour])}",

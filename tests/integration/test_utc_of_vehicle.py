@@ -11,8 +11,8 @@ from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
 
 
-def rehearsed(ground: Any, capfd: Any, port: int, *words: str) -> dict[str, Any]:
-    """What a rehearsal on a vehicle that lives as fast as we do says of the first step."""
+def rehearsal(ground: Any, capfd: Any, port: int, *words: str) -> dict[str, Any]:
+    """What a rehearsal on a vehicle that lives as fast as we do says."""
     code = main(
         [
             "run", ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--dry-run",
@@ -21,7 +21,13 @@ def rehearsed(ground: Any, capfd: Any, port: int, *words: str) -> dict[str, Any]
     )  # fmt: skip
     out, err = capfd.readouterr()
     assert code in (ExitCode.OK, ExitCode.REFUSED), err
-    step: dict[str, Any] = json.loads(out)["steps"][0]
+    told: dict[str, Any] = json.loads(out)
+    return told
+
+
+def rehearsed(ground: Any, capfd: Any, port: int, *words: str) -> dict[str, Any]:
+    """What it says of the first step of a flight that is decided in one process."""
+    step: dict[str, Any] = rehearsal(ground, capfd, port, "--mode", "software", *words)["steps"][0]
     return step
 
 
@@ -46,6 +52,21 @@ def test_without_it_freshness_is_unknown_until_somebody_states_a_bound(
     step = rehearsed(ground, capfd, port)
     assert (step["outcome"], step["reason"]) == ("defer", "freshness/clock-uncertain"), step
     assert rehearsed(ground, capfd, port, "--utc-error", "200ms")["outcome"] == "allow"
+
+
+def test_a_rehearsal_takes_no_time_that_the_boundary_of_the_flight_would_not_take(
+    ground: Any, capfd: Any, port: int
+) -> None:
+    """Apart from the run, the boundary believes the vehicle's time over a link with a key alone."""
+    ground.vehicle(port, 1, "--flavour", "ardupilot")
+    told = rehearsal(ground, capfd, port, "--mode", "process")
+    step = told["steps"][0]
+    assert (step["outcome"], step["reason"]) == ("defer", "freshness/clock-uncertain"), step
+    assert told["exit_code"] == ExitCode.REFUSED
+    assert any("`--utc-error 500ms`" in note and "`--signing-key`" in note for note in told["notes"]), told["notes"]
+    stated = rehearsal(ground, capfd, port, "--mode", "process", "--utc-error", "500ms")
+    assert stated["steps"][0]["outcome"] == "allow", stated
+    assert not any("--utc-error" in note for note in stated["notes"])
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from rtshcua.adapters.doctor.examination import ExaminingDriver, Talker
 from rtshcua.adapters.doctor.settings import SETTINGS, Setting
 from rtshcua.adapters.qualification.identity import firmware_of, those_that_matter
 from rtshcua.adapters.qualification.standing import Standing
+from rtshcua.adapters.utc import TimeOfDay
 from rtshcua.adapters.vehicle.bounds import Reach, reach_of
 from rtshcua.adapters.vehicle.drain import drained
 from rtshcua.adapters.vehicle.preflight import SAME_MM
@@ -68,22 +69,22 @@ def told_apart(agent: str, user: int, own: int) -> VehicleFinding:
 
 
 def diagnose(
-    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, utc_error_us: int | None,
+    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, time: TimeOfDay,
     unheard: frozenset[int] = frozenset(), named: bool = False,
     qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing] | None = None,
 ) -> Iterator[VehicleFinding]:  # fmt: skip
     """What was found. `flown` is the mission that the vehicle is to fly, None where only signals were asked about.
 
     `keyed`: a link key was given, and what is not signed with it was dropped. `unheard` are the slots of signals that
-    cannot come on this link, for nobody signs what carries them. `utc_error_us` is what the kernel says that
-    this machine's UTC is off by at most, None where it does not say. `named`: the operator said which system is meant.
+    cannot come on this link, for nobody signs what carries them. `time` is what a run would take the time of
+    day from. `named`: the operator said which system is meant.
     `qualified` says how this vehicle stands to its qualification record; None where it is not known which one it is.
 
     Before a heartbeat of an autopilot was heard there is nothing to say.
     """
     if vehicle.flavour is None:
         return
-    found = _found(vehicle, policy, flown, keyed, utc_error_us, unheard, named, qualified)
+    found = _found(vehicle, policy, flown, keyed, time, unheard, named, qualified)
     if keyed or not locked(vehicle):
         yield from found
         return
@@ -96,7 +97,7 @@ def diagnose(
 
 
 def _found(
-    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, keyed: bool, utc_error_us: int | None,
+    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, keyed: bool, time: TimeOfDay,
     unheard: frozenset[int], named: bool,
     qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing] | None,
 ) -> Iterator[VehicleFinding]:  # fmt: skip
@@ -117,7 +118,7 @@ def _found(
     yield from _signals(vehicle, policy, flown, unheard)
     if flown is not None:
         yield _place(vehicle)
-        yield _clock(vehicle, utc_error_us)
+        yield _clock(vehicle, time)
     yield from _settings(vehicle, flavour, policy, flown)
 
 
@@ -488,20 +489,31 @@ def _place(vehicle: ExaminingDriver) -> VehicleFinding:
     return VehicleFinding("mission/place", OK, "home and return altitude are those of the policy")
 
 
-def _clock(vehicle: ExaminingDriver, utc_error_us: int | None) -> VehicleFinding:
+_UNSYNCHRONISED: Final = "this machine's clock is not synchronised"
+_STATE: Final = "`--utc-error 500ms`, here and for `run`, states how far its time of day is off"
+_STATE_THERE: Final = "`--utc-error US` in the boundary's own command line states how far its time of day is off"
+
+
+def _clock(vehicle: ExaminingDriver, time: TimeOfDay) -> VehicleFinding:
+    """By which time of day a run would judge, in the order in which it takes them."""
     ahead_us = vehicle.ahead_us
-    if utc_error_us is None:
-        return _graded(
-            "mission/clock",
-            "this machine's clock is not synchronised, and the vehicle's own time counts (SYSTEM_TIME)"
-            if ahead_us is not None
-            else "nothing tells how far UTC is off: this machine is not synchronised, and the vehicle tells no time",
-            "the time of day, and how far it may be off", "synchronise this machine, or state it: `run --utc-error 1s`",
-            stops=ahead_us is None,
-        )  # fmt: skip
+    if time.machine_us is None:
+        if time.vehicle and ahead_us is not None:
+            found = f"{_UNSYNCHRONISED}, and the vehicle's own time counts (SYSTEM_TIME)"
+            return VehicleFinding("mission/clock", OK, found)
+        if time.stated_us is not None:
+            found = f"{_UNSYNCHRONISED}; it is off by {time.stated_us / 1_000:g} ms at most, as the operator says"
+            return VehicleFinding("mission/clock", OK, found)
+        why = "the vehicle tells no time (SYSTEM_TIME)"
+        help = f"synchronise this machine; {_STATE_THERE if time.listens else _STATE}"
+        if not time.vehicle:
+            why = "a boundary in a process of its own takes the vehicle's time over a link with a key alone"
+            help += "; or give a key" + ("" if time.listens else " (`--signing-key`)")
+        found = f"{_UNSYNCHRONISED}, and {why}: every step would be deferred"
+        return VehicleFinding("mission/clock", STOP, found, "the time of day, and how far it may be off", help)
     if ahead_us is None:
         return VehicleFinding("mission/clock", UNKNOWN, "the vehicle does not tell the time (SYSTEM_TIME)")
-    if abs(ahead_us) <= _CLOCK_US + utc_error_us:
+    if abs(ahead_us) <= _CLOCK_US + time.machine_us:
         return VehicleFinding("mission/clock", OK, "the vehicle's clock agrees with this machine's")
     found = f"the vehicle's clock and this machine's are {abs(ahead_us) // 1_000_000} s apart"
     advice = "one of them is wrong; validity and times of day are judged by this machine's"

@@ -19,6 +19,7 @@ from rtshcua.adapters.doctor.diagnosis import (
     told_apart,
 )
 from rtshcua.adapters.doctor.examination import ExaminingDriver
+from rtshcua.adapters.utc import TimeOfDay
 from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.parameters import bits_of
@@ -48,6 +49,8 @@ def examine(
     seconds: int = 14,
     utc_error_us: int | None = 1_000,
     meant: dict[str, int] | None = None,
+    vehicle_counts: bool = True,
+    stated_us: int | None = None,
 ) -> dict[str, VehicleFinding]:
     """The findings after so many seconds, by slug; of several with one slug, the worst. An ArduCopter acts on a low
     battery, as its owner set it, unless `config` says otherwise.
@@ -62,7 +65,8 @@ def examine(
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
     found: dict[str, VehicleFinding] = {}
-    for each in diagnose(vehicle.driver, policy, MISSION, keyed=False, utc_error_us=utc_error_us):
+    time = TimeOfDay(utc_error_us, vehicle=vehicle_counts, stated_us=stated_us)
+    for each in diagnose(vehicle.driver, policy, MISSION, keyed=False, time=time):
         if each.slug not in found or each.verdict is MissionVerdict.STOP:
             found[each.slug] = each
     return found
@@ -405,6 +409,19 @@ def test_where_the_kernel_vouches_for_no_clock_the_vehicles_time_counts(flavour:
     silent = case.simulated(flavour, faults=(MessageSilence(0, "SYSTEM_TIME"),))
     assert "mission/clock" in stops(examine(silent, utc_error_us=None))
     assert "mission/clock" not in stops(examine(silent))
+    assert "mission/clock" not in stops(examine(silent, utc_error_us=None, stated_us=500_000))
+
+
+@FLAVOURS
+def test_where_the_boundary_would_not_take_it_the_vehicles_time_does_not_count(flavour: str) -> None:
+    config = case.simulated(flavour, utc_us=case.flat.ISSUED)
+    stop = examine(config, utc_error_us=None, vehicle_counts=False)["mission/clock"]
+    assert stop.verdict is MissionVerdict.STOP
+    assert "over a link with a key alone" in stop.found
+    assert "`--signing-key`" in stop.advice
+    assert "`--utc-error 500ms`" in stop.advice
+    stated = examine(config, utc_error_us=None, vehicle_counts=False, stated_us=500_000)["mission/clock"]
+    assert (stated.verdict, "500 ms" in stated.found) == (MissionVerdict.OK, True)
 
 
 @FLAVOURS
@@ -450,7 +467,7 @@ def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, VehicleFi
     vehicle.driver = ExaminingDriver(policy, clock, frames, link)
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
-    findings = diagnose(vehicle.driver, policy, MISSION, keyed=True, utc_error_us=1_000, **words)
+    findings = diagnose(vehicle.driver, policy, MISSION, keyed=True, time=TimeOfDay(1_000), **words)
     return {each.slug: each for each in findings}
 
 

@@ -1,6 +1,7 @@
 """`rtshcua sim`: what it starts, and what it tells a person to type."""
 
 import json
+import shlex
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -51,10 +52,41 @@ def test_it_says_how_to_fly_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.sim() == ExitCode.OK
     out = capsys.readouterr().out
     assert "a simulated px4 vehicle, system 1, sends to udp port 14550" in out
-    assert "rtshcua run BUNDLE --connect udpin:127.0.0.1:14550 --vehicle IDENTITY\n" in out
+    assert typed(out)[:7] == AS_QUAD
     assert "QGroundControl   start it" in out
     assert "mavproxy.py --master=udpin:127.0.0.1:14550" in out
     assert "`arm throttle`, `long NAV_TAKEOFF -1 0 0 nan nan nan nan`" in out
+
+
+AS_QUAD = ["rtshcua", "run", "BUNDLE", "--connect", "udpin:127.0.0.1:14550", "--vehicle", "IDENTITY"]
+
+
+def typed(out: str) -> list[str]:
+    """The words that a shell makes of what is to be copied."""
+    return shlex.split(out[out.index("rtshcua run") : out.index("  QGroundControl")].replace("\\\n", " "))
+
+
+@pytest.mark.parametrize(
+    ("apart", "kernel_us", "keyed", "speed", "needs"),
+    [
+        (True, None, False, 1, ["--utc-error", "500ms"]),
+        (True, 1_000, False, 1, []),
+        (False, None, False, 1, []),
+        (True, None, True, 1, ["--signing-key", "KEY", "--unsigned-radio"]),
+        (True, None, False, 5, ["--speed", "5"]),
+    ],
+)
+def test_what_flies_it_flies_it_on_this_machine_when_copied(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    apart: bool, kernel_us: int | None, keyed: bool, speed: float, needs: list[str],
+) -> None:  # fmt: skip
+    """The boundary apart takes no time from a link without a key, and this machine's may be nobody's."""
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(command, "program", lambda: Path("rtshcua-boundary") if apart else None)
+    monkeypatch.setattr(command, "kernel_error_us", lambda: kernel_us)
+    key = key_file(tmp_path) if keyed else None
+    assert command.sim(signing_key=key, speed=speed) == ExitCode.OK
+    assert typed(capsys.readouterr().out) == AS_QUAD + [str(key) if each == "KEY" else each for each in needs]
 
 
 def test_another_port_flavour_and_id(capsys: pytest.CaptureFixture[str]) -> None:

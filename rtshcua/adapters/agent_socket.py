@@ -33,12 +33,18 @@ from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT, MAX_WITHOUT_MISSIO
 MOST_READERS: Final = 8
 #: how many of them may be of one process; one more takes the place of one of its own
 MOST_OF_A_PEER: Final = 4
-#: how many are welcomed in one turn of the flight, and how many may wait for that
-MOST_WELCOMED: Final = 32
+#: how many are welcomed in one turn of the flight: each costs some 50 us. How many are taken from the queue for that,
+#: most of them to be hung up on, at 15 us; and how many may wait in the queue
+MOST_WELCOMED: Final = 2
+MOST_TAKEN: Final = 8
+MOST_QUEUED: Final = 32
+#: one process is welcomed once in so long, in us, and may be so often ahead of that: who comes oftener is hung up on
+WELCOME_US: Final = 20_000
+AHEAD: Final = 4
 #: how much may wait for one reader, in bytes
 MOST_WAITING: Final = 4 << 20
 #: how much is told one reader at once, in bytes: more waits for the next turn
-AT_ONCE: Final = 1 << 16
+AT_ONCE: Final = 1 << 14
 #: the longest line that may come in: a document in base64, with what stands around it
 LONGEST: Final = MAX_DOCUMENT * 4 // 3 + 1024
 #: a document comes in no sooner than this after the one before it, in us: verifying takes a third of a millisecond
@@ -52,6 +58,7 @@ WORK_AT_ONCE: Final = 1 << 19
 SHORT: Final = MAX_WITHOUT_MISSION * 4 // 3 + 64
 _CHUNK: Final = 1 << 16
 _CREDENTIALS: Final = struct.Struct("iII")
+_TIME: Final = struct.Struct("ll")  # timeval
 _PATIENCE_S: Final = 1.0
 #: after how long who found no place tries again
 AGAIN_S: Final = 0.02
@@ -144,7 +151,7 @@ class _Reader:
     @property
     def unread(self) -> bool:
         """Whether something came of it that was not looked at yet."""
-        if b"\n" in self.incoming:
+        if self.incoming.find(b"\n", self.seen) >= 0:
             return True
         try:
             return bool(self.link.recv(1, socket.MSG_PEEK))
@@ -204,12 +211,13 @@ class AgentSocket:
         self._numbers = count(1) if numbers is None else numbers
         self._next_us = 0
         self._budgets: dict[int | None, tuple[int, int]] = {}  # by user: when it was counted, and what was left
+        self._welcomed: dict[int, int] = {}  # by process: until when it has been welcomed often enough
         self._listener = _listen(path, group)
         self._place = _place(path)
 
     def poll(self, now_us: int) -> Presented | Encoded | None:
         """The next document, if one came in: one of each reader in turn, and at most one in `GAP_US`."""
-        self._welcome()
+        self._welcome(now_us)
         for reader in list(self.readers):
             if not reader.flush():
                 self._drop(reader)
@@ -251,21 +259,37 @@ class AgentSocket:
             if self._place == _place(self.path):  # what somebody put there since is theirs
                 self.path.unlink()
 
-    def _welcome(self) -> None:
-        for _ in range(MOST_WELCOMED):  # and no more: whoever connects again and again must not keep us here
+    def _welcome(self, now_us: int) -> None:
+        """Take in some of who waits, and no more: whoever connects again and again must not keep us here."""
+        welcomed = 0
+        for _ in range(MOST_TAKEN):
             try:
                 link, _ = self._listener.accept()
             except OSError:
                 return
             link.setblocking(False)
             reader = _Reader(link, peer_of(link))
-            if not self._has_place(reader.peer):
+            if not self._may_come(reader.peer.process, now_us) or not self._has_place(reader.peer):
                 link.close()  # it may come again
                 continue
             self.readers.append(reader)
             if reader.peer.user is not None:
                 self.users.add(reader.peer.user)
             self._send(reader, self._greeting())
+            welcomed += 1
+            if welcomed == MOST_WELCOMED:
+                return
+
+    def _may_come(self, process: int, now_us: int) -> bool:
+        """Whether a process may be welcomed once more now; that it may, is counted. 0: nobody says which one it is."""
+        if process == 0:
+            return True
+        until_us = max(self._welcomed.get(process, 0), now_us)
+        if until_us > now_us + (AHEAD - 1) * WELCOME_US:
+            return False
+        self._welcomed = {each: until for each, until in self._welcomed.items() if until > now_us}
+        self._welcomed[process] = until_us + WELCOME_US
+        return True
 
     def _has_place(self, peer: Peer) -> bool:
         """Whether one more of this peer is taken in; who makes place for it was quiet for longest, and is of the same
@@ -364,7 +388,7 @@ def _listen(path: Path, group: int | None) -> socket.socket:
         if group is not None:
             os.chown(path, -1, group)
             path.chmod(0o660)
-        listener.listen(MOST_WELCOMED)
+        listener.listen(MOST_QUEUED)
     except OSError as error:
         listener.close()
         if error.errno == errno.EADDRINUSE:
@@ -446,8 +470,8 @@ class FlightFollower:
         #: the id of the flight, as it says itself
         self.flight = b""
         try:
+            _connect(self._link, path, patience_s)
             self._link.settimeout(patience_s)
-            _connect(self._link, path)
             while not self.flight:
                 told = self.receive()
                 if told is None:
@@ -542,8 +566,8 @@ def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s:
 
 def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_s: float) -> _Line:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        _connect(link, path, max(until_s - time.monotonic(), AGAIN_S))
         link.settimeout(max(until_s - time.monotonic(), AGAIN_S))
-        _connect(link, path)
         link.sendall(line)
         waiting = b""
         while (left_s := until_s - time.monotonic()) > 0:
@@ -561,11 +585,16 @@ def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_
     raise TimeoutError("the flight did not answer")
 
 
-def _connect(link: socket.socket, path: Path) -> None:
-    """Raises OSError, which names the path; BlockingIOError where others wait to be taken in, as many as may."""
+def _connect(link: socket.socket, path: Path, patience_s: float) -> None:
+    """Raises OSError, which names the path; BlockingIOError where others wait to be taken in, as many as may, for so
+    long.
+    """
+    patience = divmod(max(1, int(patience_s * 1e6)), 1_000_000)
+    link.settimeout(None)  # with Python's own it would not wait for a place in the queue, and others were faster
+    link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _TIME.pack(*patience))
     try:
         link.connect(str(path))
-    except BlockingIOError:  # unix(7) does not let us wait too
+    except BlockingIOError:
         raise
     except OSError as error:
         if path.exists() and not path.is_socket():

@@ -7,7 +7,8 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from itertools import count, repeat
+from contextlib import ExitStack
+from itertools import chain, count, repeat
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,13 @@ import pytest
 
 from rtshcua.adapters import agent_socket
 from rtshcua.adapters.agent_socket import (
+    AHEAD,
+    AT_ONCE,
     MOST_OF_A_PEER,
     MOST_READERS,
+    MOST_TAKEN,
     MOST_WELCOMED,
+    WELCOME_US,
     AgentSocket,
     Peer,
     SocketTaken,
@@ -56,7 +61,62 @@ def test_the_flight_goes_on_however_many_connect(path: Path, monkeypatch: pytest
         patched.setattr(agents, "_listener", endless)
         for turn in range(1, 5):
             assert agents.poll(turn * 1_000_000) is None
-            assert endless.accepted <= turn * MOST_WELCOMED
+            assert endless.accepted <= turn * MOST_TAKEN
+    agents.close()
+
+
+def test_one_turn_greets_few_and_sends_little_to_each(path: Path) -> None:
+    """A greeting tells of a mission of any size, and whoever hangs up and comes again is sent it each time."""
+    greeting, greeted = b"x" * 150_000 + b"\n", list[int]()
+
+    def greet() -> bytes:
+        greeted.append(1)
+        return greeting
+
+    agents = AgentSocket(path, greet)
+    with ExitStack() as held:
+        links = [held.enter_context(socket.socket(socket.AF_UNIX)) for _ in range(MOST_OF_A_PEER)]
+        for each in links:
+            each.connect(str(path))
+        came = 0
+        for turn in range(1, 15):
+            before = len(greeted)
+            agents.poll(turn * WELCOME_US)
+            if turn == 1:
+                assert len(agents.readers) == MOST_WELCOMED
+            assert len(greeted) - before <= MOST_WELCOMED
+            told = _now(links[0])
+            came += len(told)
+            assert len(told) <= 2 * AT_ONCE, "as it is greeted, and of what waits"
+        assert came == len(greeting)
+        assert len(greeted) == len(links)
+    agents.close()
+
+
+def _now(link: socket.socket) -> bytes:
+    try:
+        return link.recv(1 << 20, socket.MSG_DONTWAIT)
+    except BlockingIOError:
+        return b""
+
+
+def test_a_process_that_connects_all_the_time_is_welcomed_once_in_a_while(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The others do not wait until all of its connections were greeted."""
+    agents = AgentSocket(path, lambda: b"{}\n")
+    peers, welcomed = chain(repeat(7, 3 * MOST_TAKEN), repeat(8)), list[int]()
+    endless: Any = Endless()
+    monkeypatch.setattr(agent_socket, "peer_of", lambda _: Peer(next(peers), None))
+    with monkeypatch.context() as patched:
+        patched.setattr(agents, "_listener", endless)
+        patched.setattr(agents, "_send", lambda reader, line: welcomed.append(reader.peer.process))
+        turns = 0
+        while 8 not in welcomed:
+            agents.poll(1_000_000)
+            turns += 1
+    assert welcomed.count(7) == AHEAD
+    assert turns == AHEAD // MOST_WELCOMED + 3, "its first connections, and the rest as fast as they are hung up on"
     agents.close()
 
 
@@ -104,7 +164,7 @@ FLOOD = """
 import select, socket, sys, time
 held, made = [], 0
 print("begun", flush=True)
-while made < 400 or not select.select([sys.stdin], [], [], 0)[0]:
+while made < 100 or not select.select([sys.stdin], [], [], 0)[0]:
     link = socket.socket(socket.AF_UNIX)
     link.setblocking(False)
     try:
@@ -154,5 +214,5 @@ def test_a_recall_gets_through_a_flood(path: Path, operators: bool) -> None:
         flight.join()
         agents.close()
         own.close()
-    assert min(made) >= 400
+    assert min(made) >= 100
     assert len(agents.users) == 1

@@ -54,6 +54,7 @@ class Flooded(Run):
         self.link.connect(str(folder / "s"))
         self.decoded: Counter[int] = Counter()
         self.looked_at: list[bytes] = []
+        self.came = b""  # of what came in, the line that has no end yet
         self.me = threading.get_ident()
         self.most = 0
         self.busy: Counter[str] = Counter()  # what takes long, by name, as far as the flight's thread did it
@@ -108,9 +109,10 @@ class Flooded(Run):
 
     def _answer(self) -> str:
         try:
-            lines = [json.loads(line) for line in self.link.recv(1 << 22, socket.MSG_DONTWAIT).splitlines()]
+            *came, self.came = (self.came + self.link.recv(1 << 22, socket.MSG_DONTWAIT)).split(b"\n")
         except BlockingIOError:
             return ""
+        lines = [json.loads(line) for line in came]
         return next((line["slug"] for line in lines if line["type"] == "answer"), "")
 
 

@@ -235,9 +235,11 @@ def test_nobody_makes_place_whose_words_were_not_looked_at(
     links = [reader(agents) for _ in range(most)]
     for number, link in enumerate(links):
         link.sendall(handed(b"%d" % number, number) * 2)
-    assert agents.poll(0) is not None, "one has been looked at, and the second waits in its buffer"
+    welcomed = [agents.poll(at_us) for at_us in range(most)]
+    assert welcomed[0] is not None, "one has been looked at, and the second waits in its buffer"
+    assert len(agents.readers) == most
     with reader(agents) as late:
-        agents.poll(1)
+        agents.poll(most)
         heard_last = late.recv(1)
         assert heard_last == b"", "there was no place: it may come again"
     taken = [agents.poll(at_us) for at_us in range(GAP_US, 2 * most * GAP_US, GAP_US)]

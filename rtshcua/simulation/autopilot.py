@@ -222,6 +222,9 @@ class Autopilot:
             ),
         ]
         self.battery_reports = 0
+        #: of each by id: how often it is reported at the most, and when it was last
+        self.battery_every_us = [0, *(other.every_us for other in config.other_batteries)]
+        self.battery_told_us: dict[int, int] = {}
         self._fast = config.boot is Boot.FAST
         pace = flavour.boot.all_s / FAST_S if self._fast else 1.0
         self.sensors = Sensors(
@@ -331,6 +334,7 @@ class Autopilot:
         self.vehicle.restart(self.flavour.modes.start)
         self._pass_away(self.now_us)
         self.now_us = 0
+        self.battery_told_us.clear()
         self.outbox.clear()
 
     def _drain(self, load: float) -> None:

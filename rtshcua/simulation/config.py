@@ -85,6 +85,8 @@ class OtherBattery:
 
     purpose: Purpose
     level: int
+    every_us: int = 0
+    """It is reported no more often than this: a smart battery on a slow bus. 0: in turn with the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +140,7 @@ class SimulationConfig:
             raise ValueError("system is an id from 1 to 255")
         if not 0 <= self.battery <= 10_000:
             raise ValueError("battery is from 0 to 10000, in 1/10000")
-        if not all(0 <= other.level <= 10_000 for other in self.other_batteries):
+        if not all(0 <= other.level <= 10_000 and other.every_us >= 0 for other in self.other_batteries):
             raise ValueError("the level of another battery is from 0 to 10000, in 1/10000")
         if self.hover_us <= 0:
             raise ValueError("hover time is more than nothing")

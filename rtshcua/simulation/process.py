@@ -63,8 +63,8 @@ def parser() -> argparse.ArgumentParser:
         type=_other_battery,
         action="append",
         default=[],
-        metavar="PURPOSE,LEVEL",
-        help=f"another battery: {', '.join(Purpose)}, and %% at the start; may be repeated",
+        metavar="PURPOSE,LEVEL[,SECONDS]",
+        help=f"another battery: {', '.join(Purpose)}, %% at the start, and how seldom it is reported; may be repeated",
     )
     add("--hover", type=_number(float, 0.1, 600), default=18.0, help="minutes that a full battery hovers")
     add("--cruise", type=_number(float, 0.1, 12), default=5.0, help="m/s")
@@ -131,10 +131,12 @@ def _number(kind: type[int] | type[float], low: float, high: float) -> Callable[
 
 
 def _other_battery(text: str) -> OtherBattery:
-    purpose, _, level = text.partition(",")
+    purpose, _, rest = text.partition(",")
+    level, _, every = rest.partition(",")
     if purpose not in set(Purpose):
         raise argparse.ArgumentTypeError(f"`{purpose}` is none of {', '.join(Purpose)}")
-    return OtherBattery(Purpose(purpose), round(_number(float, 0, 100)(level) * 100))
+    percent, seconds = _number(float, 0, 100)(level), _number(float, 0, 3_600)(every or "0")
+    return OtherBattery(Purpose(purpose), round(percent * 100), round(seconds * 1_000_000))
 
 
 def _listed(shape: str, least: int, most: int) -> Callable[[str], list[float]]:

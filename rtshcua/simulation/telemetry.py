@@ -170,9 +170,12 @@ _FUNCTIONS = {
 
 
 def battery_status(a: Autopilot) -> Message:
-    """BATTERY_STATUS of each battery in turn."""
+    """BATTERY_STATUS of each battery in turn, and of the first one in place of one whose report is not due."""
     number = a.battery_reports % len(a.batteries)
     a.battery_reports += 1
+    if number in a.battery_told_us and a.now_us - a.battery_told_us[number] < a.battery_every_us[number]:
+        number = 0
+    a.battery_told_us[number] = a.now_us
     purpose, battery = a.batteries[number]
     told = a.flavour.names_batteries  # ArduPilot says of no battery what it feeds (recorded)
     if battery.level <= 0.07:

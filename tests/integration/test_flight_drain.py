@@ -106,6 +106,13 @@ def test_more_wind_than_declared_is_measured_by_distance_and_brings_it_home(tmp_
     assert ("a minute declared" in minute, "a km declared" in km) == (True, True)
 
 
+def test_nothing_begins_on_a_second_battery_that_is_nearly_empty_and_seldom_reported(tmp_path: Path) -> None:
+    second = OtherBattery(Purpose.FLIGHT, 500, every_us=7 * case.S)
+    found = flown(tmp_path, "px4", "", 18 * 60 * case.S, other_batteries=(second,))
+    assert (found.ending.name, found.dispatched()) == ("REFUSED", [])
+    assert any("0 with 99 %, 1 with 4 %" in str(each) for each in found.records)
+
+
 def test_a_second_battery_that_runs_low_brings_it_home_while_the_first_is_full(tmp_path: Path) -> None:
     """Of two that feed the motors the one with less counts; it is not the one with the lower number."""
     second = OtherBattery(Purpose.FLIGHT, 4_200)

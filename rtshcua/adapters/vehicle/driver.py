@@ -219,7 +219,17 @@ class Driver:
             or mute
             or self.preflight.astray
         )
-        return waits or self.seen.unready or self.preflight.unready or self._undated
+        return waits or self.seen.unready or self.preflight.unready or self._uncounted or self._undated
+
+    @property
+    def _uncounted(self) -> str | None:
+        """That it is not known yet which batteries count, in words: meanwhile the deadline of the first step would
+        pass.
+        """
+        number = self.batteries.awaited(self.seen.now_us)
+        return (
+            None if number is None else f"battery {number} was reported once: whether it is one, a second report tells"
+        )
 
     @property
     def _undated(self) -> str | None:
@@ -516,6 +526,7 @@ class Driver:
             events.append(ports.Crashed(now_us, crashed))
             self._others = "crashed"
         if name == "HEARTBEAT":
+            self.batteries.armed = seen.armed
             self._watch_mode(before, now_us, events)
             self._doubt(now_us, send)
         elif name == "STATUSTEXT":

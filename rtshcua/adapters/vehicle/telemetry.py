@@ -166,32 +166,50 @@ _CHARGE: Final = ("battery_remaining",)
 _FEEDS_NO_MOTOR: Final = frozenset({MAV_BATTERY_FUNCTION_AVIONICS, MAV_BATTERY_FUNCTION_PAYLOAD})
 #: how often another battery was reported since one that counts as silent was
 _AMONG: Final = 3
+#: us: two reports that lie no further apart make a battery, and none that counts is silent for longer
+COUNTS_US: Final = 60_000_000
+#: A battery that is reported seldom is silent after so many times as long as usual, by so many of the last times.
+_SELDOM: Final = 3
+_TIMES: Final = 5
 
 
 @dataclass(slots=True)
 class _Charge:
-    """Of one battery: what it told last, by slot, when, whether it counts, how many reports of others came since."""
+    """Of one battery: what it told last, by slot, when, whether it counts, how many reports of others came since, how
+    long it was between its last reports, and whether more than one was told while it did not count.
+    """
 
     values: Mapping[int, int | None]
     at_us: int
     counts: bool
     since: int = 0
+    between_us: tuple[int, ...] = ()
+    now_and_then: bool = False
+
+    @property
+    def usual_us(self) -> int:
+        """How long it is between two reports as a rule; 0 where that is not known."""
+        return sorted(self.between_us)[(len(self.between_us) - 1) // 2] if self.between_us else 0
 
 
 class Batteries:
     """The batteries that a vehicle flies by, of which the one with the least charge counts.
 
     Those are all but what is said to feed avionics or a payload; ArduPilot says of no battery what it feeds, so there
-    all count. A battery counts from its second report on, if it was not silent between the two: a single report with
-    another number is odd, or somebody else's. Nothing is told before it is known of all that were heard whether they
-    count. One that counts and does not know its charge, or is silent for as long
-    as makes it stale, makes the charge unknown.
+    all count. A battery counts from its second report on, if that came within a minute or it was not silent between the
+    two: a single report with another number is odd, or somebody else's. Nothing is told before it is known of all that
+    were heard whether they count; before the motors turn, that takes a minute after a single report, once for each
+    number. One that counts and does not know its charge makes the charge unknown. So does one that is silent for as
+    long as makes it stale, or, where its reports are further apart, for `_SELDOM` times as long as is usual for it, and
+    a minute at the most.
     """
 
     def __init__(self, stale_us: int) -> None:
         self._stale_us = stale_us
         self._charges: dict[tuple[int, bool], _Charge] = {}  # by number, and whether it feeds motors
         self._known = False
+        #: the motors may turn, so what comes new now is waited for no more
+        self.armed = False
         #: of each battery that was reported twice: what it feeds (MAV_BATTERY_FUNCTION), and its charge in %
         self.told: dict[int, tuple[int, int]] = {}
         #: what an operator should know, to be taken
@@ -208,31 +226,52 @@ class Batteries:
         """One BATTERY_STATUS and what it says by itself; the readings that count."""
         number, function = message.id, message.battery_function
         flies, charges = self.flies(function), self._charges
-        before = charges.get((number, flies))
-        counts = before is not None and (before.counts or not self._is_silent(before, now_us))
-        charges[number, flies] = _Charge(dict(readings), now_us, counts)
+        charges[number, flies] = self._after(charges.get((number, flies)), dict(readings), now_us)
+        counts = charges[number, flies].counts
         if counts:
             self._tell(number, function, message.battery_remaining)
         if not flies:
             return ()
         for other, each in charges.items():
             each.since += other != (number, flies)
-        if not counts or not self._are_known(now_us):
+        if not self._are_known(now_us):
+            return [(slot, None) for slot, _ in readings] if self._known else ()
+        if not counts:
             return ()
         counted = [each for (_, flying), each in charges.items() if flying and each.counts]
         if any(self._is_silent(each, now_us) for each in counted):
             return [(slot, None) for slot, _ in readings]
         return [(slot, _least([each.values[slot] for each in counted])) for slot, _ in readings]
 
+    def _after(self, before: _Charge | None, values: Mapping[int, int | None], now_us: int) -> _Charge:
+        """One more report of a battery, which was like `before`."""
+        if before is None:
+            return _Charge(values, now_us, counts=False)
+        between_us = max(now_us - before.at_us, 0)
+        counts = before.counts or between_us <= COUNTS_US or not self._is_silent(before, now_us)
+        times = (*before.between_us[1 - _TIMES :], between_us) if counts else ()
+        return _Charge(values, now_us, counts, between_us=times, now_and_then=not counts)
+
+    def awaited(self, now_us: int) -> int | None:
+        """The number of a battery of which one report came, so that it is not known yet whether it counts."""
+        for (number, flying), each in self._charges.items():
+            if not flying or each.counts or each.now_and_then:
+                continue
+            if not self._is_silent(each, now_us) or (not self.armed and now_us - each.at_us <= COUNTS_US):
+                return number
+        return None
+
     def _are_known(self, now_us: int) -> bool:
-        """Whether each battery that was heard counts, or was heard once and no more; once so, that is what is known."""
-        if not self._known:
-            heard = (each for (_, flying), each in self._charges.items() if flying)
-            self._known = all(each.counts or self._is_silent(each, now_us) for each in heard)
-        return self._known
+        """Whether each battery that was heard counts, or was heard once and no more; with the motors on, once so that
+        is what is known.
+        """
+        known = (self.armed and self._known) or self.awaited(now_us) is None
+        self._known = self._known or known
+        return known
 
     def _is_silent(self, battery: _Charge, now_us: int) -> bool:
-        return now_us - battery.at_us > self._stale_us and battery.since >= _AMONG
+        most_us = max(self._stale_us, min(_SELDOM * battery.usual_us, COUNTS_US))
+        return now_us - battery.at_us > most_us and battery.since >= _AMONG
 
     def _tell(self, number: int, function: int, remaining: int) -> None:
         new = number not in self.told

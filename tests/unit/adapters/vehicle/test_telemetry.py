@@ -171,56 +171,115 @@ def test_a_flight_battery_that_falls_silent_makes_the_charge_unknown() -> None:
 @pytest.mark.parametrize("function", [mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD])
 def test_one_report_of_a_battery_with_a_new_number_counts_for_nothing(function: int) -> None:
     """Somebody else's frame on a link without a key, or an odd one of the vehicle's; also of one that says that the
-    battery feeds no motor. Such a frame now and then is no battery either.
+    battery feeds no motor. Such a frame every other minute is no battery either.
     """
     telemetry = Telemetry(POLICY)
     charge(telemetry, 0, 80)
-    for second in range(1, 120):
-        if second % 20 == 5:
+    telemetry.batteries.armed = True
+    for second in range(1, 300):
+        if second % 70 == 5:
             assert charge(telemetry, 7, 1, function, second * S) == ()
             assert charge(telemetry, 0, 1, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD, second * S) == ()
         assert charge(telemetry, 0, 80, 1, second * S) == ((BATTERY, 8_000),)
     assert telemetry.batteries.notes == []
 
 
-def naive(reports: list[tuple[int, int, int | None]], *, begun: bool) -> Any:
+@pytest.mark.parametrize("every", [6, 7, 10, 30, 60])
+def test_a_battery_that_is_reported_seldom_counts_and_is_missed_by_its_own_distance(every: int) -> None:
+    """A smart battery on a slow bus, or a link that loses its reports."""
+    telemetry, said = Telemetry(POLICY), dict[int, Any]()
+    for second in range(5 * every):
+        if second % every == 0 and second < 4 * every:
+            charge(telemetry, 1, 5, at_us=second * S)
+        said[second] = charge(telemetry, 0, 90, at_us=second * S)
+    begun = every
+    assert {said[each] for each in range(begun)} == {()}, "until it is known whether it counts nothing is"
+    assert {said[each] for each in range(begun, 4 * every)} == {((BATTERY, 500),)}
+    for second in range(5 * every, 8 * every + 1):
+        said[second] = charge(telemetry, 0, 90, at_us=second * S)
+    ends = 3 * every + min(3 * every, 60)
+    assert said[ends] == ((BATTERY, 500),), "the next one may still come"
+    assert {said[each] for each in range(ends + 1, 8 * every)} == {((BATTERY, None),)}
+
+
+def test_one_report_before_the_motors_turn_is_waited_on_for_a_minute_and_once() -> None:
+    telemetry = Telemetry(POLICY)
+    assert [charge(telemetry, 0, 90, at_us=second * S) for second in (0, 1)] == [(), ((BATTERY, 9_000),)]
+    assert charge(telemetry, 7, 5, at_us=2 * S) == ((BATTERY, None),)
+    for second in range(3, 200):
+        known = charge(telemetry, 0, 90, at_us=second * S)
+        assert known == ((BATTERY, None if second <= 62 else 9_000),)
+        assert telemetry.batteries.awaited(second * S) == (7 if second <= 62 else None)
+        if second == 100:
+            charge(telemetry, 7, 5, at_us=second * S)
+
+
+Reports = list[tuple[int, int, int | None]]
+
+
+def silent(reports: Reports, battery: int, heard: int, until: int, most_us: int) -> bool:
+    """Whether a battery whose report is the one at `heard` is silent when that at `until` comes."""
+    others = [each for each in reports[heard + 1 : until + 1] if each[1] != battery]
+    return len(others) >= 3 and reports[until][0] - reports[heard][0] > most_us
+
+
+def usual(reports: Reports, battery: int) -> int | None:
+    """How long it is between two reports of a battery as a rule; None: it does not count."""
+    own = [index for index, each in enumerate(reports) if each[1] == battery]
+    apart = [
+        (reports[after][0] - reports[before][0], silent(reports, battery, before, after, STALE_US))
+        for before, after in pairwise(own)
+    ]
+    counting = [number for number, (us, lost) in enumerate(apart) if us <= 60 * S or not lost]
+    if not counting:
+        return None
+    times = sorted(us for us, _ in apart[counting[0] :][-5:])
+    return times[(len(times) - 1) // 2]
+
+
+def naive(reports: Reports, armed: list[bool], *, begun: bool) -> Any:
     """What the last of these reports (when, battery, charge) says, by all of them: () where it says nothing. `begun`:
     one before said something.
     """
+    last = {battery: index for index, (_, battery, _) in enumerate(reports)}
+    often = {battery: usual(reports, battery) for battery in last}
+    now = len(reports) - 1
 
-    def silent(battery: int, heard: int, until: int) -> bool:
-        """Whether a battery whose report is the one at `heard` is silent when that at `until` comes."""
-        others = [each for each in reports[heard + 1 : until + 1] if each[1] != battery]
-        return len(others) >= 3 and reports[until][0] - reports[heard][0] > STALE_US
+    def known(battery: int, index: int) -> bool:
+        """Whether it is known whether a battery counts."""
+        if often[battery] is not None or len([each for each in reports if each[1] == battery]) > 1:
+            return True
+        over = armed[-1] or reports[now][0] - reports[index][0] > 60 * S
+        return over and silent(reports, battery, index, now, STALE_US)
 
-    def counts(battery: int) -> bool:
-        own = [index for index, each in enumerate(reports) if each[1] == battery]
-        return any(not silent(battery, *pair) for pair in pairwise(own))
-
-    def known() -> bool:
-        """Whether of each that was heard it is known whether it counts."""
-        heard = {each: index for index, (_, each, _) in enumerate(reports)}
-        return all(counts(each) or silent(each, index, len(reports) - 1) for each, index in heard.items())
-
-    if not counts(reports[-1][1]) or not (begun or known()):
+    if not (begun and armed[-1]) and not all(known(*each) for each in last.items()):
+        return ((BATTERY, None),) if begun else ()
+    if often[reports[-1][1]] is None:
         return ()
-    last = {battery: index for index, (_, battery, _) in enumerate(reports) if counts(battery)}
-    charges = [reports[index][2] for index in last.values()]
-    if None in charges or any(silent(battery, index, len(reports) - 1) for battery, index in last.items()):
+    charges = []
+    for battery, index in last.items():
+        us = often[battery]
+        if us is not None:
+            lost = silent(reports, battery, index, now, max(STALE_US, min(3 * us, 60 * S)))
+            charges.append(None if lost else reports[index][2])
+    if None in charges:
         return ((BATTERY, None),)
     return ((BATTERY, min(each * 100 for each in charges if each is not None)),)
 
 
 @given(st.lists(st.tuples(
-    st.sampled_from([0, S, 2 * S, STALE_US, STALE_US + 1]), st.integers(0, 3), st.sampled_from([None, 20, 50, 90]),
-), max_size=16))  # fmt: skip
-def test_the_charge_is_that_of_the_batteries_that_count(steps: list[tuple[int, int, int | None]]) -> None:
-    telemetry, reports, at_us, begun = Telemetry(POLICY), list[tuple[int, int, int | None]](), 0, False
-    for later_us, number, percent in steps:
+    st.sampled_from([0, S, 2 * S, STALE_US, STALE_US + 1, 20 * S, 60 * S + 1]), st.sampled_from([0, 0, 1, 2, 3]),
+    st.sampled_from([None, 20, 50, 90]), st.sampled_from([False, False, False, True]),
+), max_size=20))  # fmt: skip
+def test_the_charge_is_that_of_the_batteries_that_count(steps: list[tuple[int, int, int | None, bool]]) -> None:
+    telemetry, reports, armed, at_us, begun = Telemetry(POLICY), Reports(), list[bool](), 0, False
+    for later_us, number, percent, arms in steps:
         at_us += later_us
         reports.append((at_us, number, percent))
+        armed.append(arms or armed[-1:] == [True])
+        telemetry.batteries.armed = armed[-1]
         said = charge(telemetry, number, -1 if percent is None else percent, at_us=at_us)
-        assert said == naive(reports, begun=begun)
+        assert said == naive(reports, armed, begun=begun)
         begun = begun or said != ()
 
 

@@ -133,8 +133,13 @@ class VirtualVehicle:
     def _send(self, frames: Sequence[bytes], events: list[Event]) -> None:
         for frame in frames:
             self.sent += 1
-            if not self.lose(frame):
-                self._take(self.simulation.receive(frame, self.clock.elapsed_us), events)
+            if self.lose(frame):
+                continue
+            answers = self.simulation.receive(frame, self.clock.elapsed_us)
+            if self._waiting:  # what is said now comes behind
+                self._waiting = (self._waiting + answers)[:MOST_WAITING]
+            else:
+                self._take(answers, events)
 
     def _take(self, datagrams: Iterable[bytes], events: list[Event]) -> None:
         now_us, hurt, receive = self.clock.monotonic_us, self.hurt, self.driver.receive

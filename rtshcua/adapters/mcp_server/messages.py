@@ -12,8 +12,9 @@ from typing import Any, Final, NamedTuple
 
 from rtshcua.ground.language.size import bare_of, values_of
 
-#: octets and values (`without_texts`) of one message: a mission of any size that is read, however it is written
-MOST_OCTETS: Final = 16 << 20
+#: octets and values (`without_texts`) of one message: the largest mission that a flight takes has 250 KB. Python needs
+#: many times the octets, where one character of a text is beyond U+FFFF
+MOST_OCTETS: Final = 4 << 20
 MOST_VALUES: Final = 1 << 16
 #: objects and lists in one another: a mission has 16, and its message 4 around it
 MOST_DEPTH: Final = 64

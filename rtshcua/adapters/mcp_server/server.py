@@ -25,6 +25,7 @@ from pydantic import AnyUrl
 from rtshcua import __version__
 from rtshcua.adapters.mcp_server.access import refusal
 from rtshcua.adapters.mcp_server.arguments import Unfit, fitted
+from rtshcua.adapters.mcp_server.bodies import Bodies
 from rtshcua.adapters.mcp_server.connections import CONNECTION, MOST, Connection
 from rtshcua.adapters.mcp_server.messages import writable
 from rtshcua.adapters.mcp_server.stdio import streams
@@ -169,11 +170,13 @@ async def _speak_http(opening: Opening, listener: socket.socket, token: bytes) -
             made(opening, others), max_sessions=_MOST_SESSIONS, session_idle_timeout=_IDLE_S
         )
 
+        bodies = Bodies(manager.handle_request)
+
         async def answer(scope: dict[str, Any], receive: Any, send: Any) -> None:
             refused = refusal(scope["path"], scope["headers"], token, port)
             if refused is None:
                 scope["state"][CONNECTION].admit()
-                await manager.handle_request(scope, receive, send)
+                await bodies.answer(scope, receive, send)
                 return
             headers = [(b"content-length", b"0"), *([(b"www-authenticate", b"Bearer")] if refused == 401 else [])]
             await send({"type": "http.response.start", "status": refused, "headers": headers})

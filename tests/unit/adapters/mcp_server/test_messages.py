@@ -86,7 +86,7 @@ def test_what_is_no_message_is_refused_with_the_id_that_it_certainly_has() -> No
 
 def test_a_line_that_was_cut_off_is_refused_with_the_id_at_its_beginning() -> None:
     assert read_message(asked(), whole=False) == Wrong(
-        NO_REQUEST, "the message is larger than 16 MiB or 65536 values", 1
+        NO_REQUEST, "the message is larger than 4 MiB or 65536 values", 1
     )
 
 

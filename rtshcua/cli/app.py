@@ -9,6 +9,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from importlib import import_module
 from typing import Any, cast
 
@@ -78,6 +79,7 @@ def _call(row: Row, words: list[str]) -> int:
         import typer
         from typer.main import get_command
 
+        from rtshcua.cli.interrupts import breakable
         from rtshcua.cli.option_groups import grouped
 
         command = get_command(import_module(row.module).app)
@@ -88,7 +90,10 @@ def _call(row: Row, words: list[str]) -> int:
     _reflowed(command)
     grouped(command, row.name)
     try:
-        with command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context:
+        with (
+            command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context,
+            breakable() if row.ends_in_order else nullcontext(),
+        ):
             return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
     except typer.Exit as end:
         return end.exit_code
@@ -183,4 +188,6 @@ def _wants_colour() -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from rtshcua.cli.door import main as opened
+
+    sys.exit(opened())

@@ -17,6 +17,21 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
+def breakable() -> Iterator[None]:
+    """Within this, in the main thread, Ctrl-C raises KeyboardInterrupt, as Python has it: what is under way is put in
+    order. Elsewhere it ends a command by the signal itself (`door`).
+    """
+    if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
     """Within this, in the main thread, SIGTERM is what Ctrl-C is."""
     if current_thread() is not main_thread():

@@ -32,7 +32,7 @@ from rtshcua.cli.attesting import UNNAMED, BoundarySession, Elsewhere, boundary_
 from rtshcua.cli.configured import would_set
 from rtshcua.cli.faults import code_of, say, untrusted, words_of
 from rtshcua.cli.flight import Flight
-from rtshcua.cli.interrupts import Interrupts
+from rtshcua.cli.interrupts import Interrupts, breakable
 from rtshcua.cli.isolating import CODES, IN_USE, Apart, connected, started
 from rtshcua.cli.live.feed import Feed
 from rtshcua.cli.live.story import Note
@@ -176,6 +176,7 @@ def _launch(order: Launch) -> ExitCode:
     if not order.dry_run:
         past = Past(order.state, loaded.vehicle, log_key.key() if order.boundary_socket is None else None)
     with ExitStack() as view:  # it may still be shown when everything else is over
+        view.enter_context(breakable())
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
             sets = None if order.dry_run else bool(order.settings)

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.cli.faults import fail
+from rtshcua.cli.interrupts import breakable
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.library import root
 
@@ -35,5 +36,6 @@ def lsp(
         )
     if tcp is not None and (stdio or not 0 < tcp < 1 << 16):
         return fail(ExitCode.USAGE, "`--tcp` takes a port from 1 to 65535, and goes without `--stdio`")
-    serve(str(root()), tcp)
+    with breakable():
+        serve(str(root()), tcp)
     return ExitCode.OK

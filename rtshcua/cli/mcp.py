@@ -14,6 +14,7 @@ from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.mcp_server.access import HOST, PATH, BadToken, token_of
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.cli.faults import distrust, fail, say, words_of
+from rtshcua.cli.interrupts import breakable
 from rtshcua.cli.recognising import read_bundle
 from rtshcua.cli.unlock import check_trusted, unlock
 from rtshcua.diagnostics.exits import ExitCode
@@ -92,7 +93,8 @@ def mcp(
         return desk
 
     if http is None or token_file is None:
-        serve(make)
+        with breakable():
+            serve(make)
         return ExitCode.OK
     try:
         token = token_of(token_file)
@@ -106,7 +108,8 @@ def mcp(
         except OSError as error:
             return fail(ExitCode.INPUT, f"cannot listen at {HOST}:{http}: {words_of(error)}", "choose another port")
         say(f"serves http://{HOST}:{listener.getsockname()[1]}{PATH} to whoever sends the token in `{token_file}`")
-        serve_http(make, listener, token)
+        with breakable():
+            serve_http(make, listener, token)
     return ExitCode.OK
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore, KeyStoreError, read_key, whose
 from rtshcua.adapters.store.reading import exposed
 from rtshcua.cli.faults import untrusted
+from rtshcua.cli.interrupts import breakable
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
@@ -36,7 +37,9 @@ def unlock(
     except KeyFileError as error:
         if error.slug != "passphrase-needed" or given is not None or not terminal():
             raise
-    return _load(store, duty, path, getpass(f"passphrase of the `{duty}` key: ").encode(), whose)
+    with breakable():  # the terminal shows again what is typed
+        typed = getpass(f"passphrase of the `{duty}` key: ").encode()
+    return _load(store, duty, path, typed, whose)
 
 
 def unlock_for(

@@ -37,7 +37,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = (
         130,
         "interrupted",
-        "stopped by Ctrl-C; a flight falls back and closes its log first, a waiting witness ends with 0",
+        "stopped by Ctrl-C, or by its signal itself (-2); a flight closes its log first, a waiting witness ends with 0",
     )
 
     def __new__(cls, value: int, slug: str, meaning: str) -> "ExitCode":

@@ -1,0 +1,97 @@
+"""Ctrl-C while a command starts and works: the signal ends it, in silence, at whatever moment it comes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rtshcua import library
+from rtshcua.cli import interrupts
+from rtshcua.cli.door import main
+from rtshcua.cli.table import COMMANDS
+from rtshcua.diagnostics.exits import ExitCode
+
+PATIENCE_S = 60.0
+TICK_S = 1 / os.sysconf("SC_CLK_TCK")
+#: from when the door is open, in seconds of CPU time: what is imported, checked and written in this time
+MOMENTS_S = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3)
+
+
+def raises(process: subprocess.Popen[str]) -> bool | None:
+    """Whether Python makes an exception of SIGINT in the process by now; None before it is ready for any signal."""
+    status = dict(line.split(":", 1) for line in Path(f"/proc/{process.pid}/status").read_text().splitlines())
+    return bool(int(status["SigCgt"], 16) & 1 << signal.SIGINT - 1)
+
+
+def used_s(process: subprocess.Popen[str]) -> float:
+    """The CPU time that it has used."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) * TICK_S
+
+
+def until(found: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    until_s = time.monotonic() + PATIENCE_S
+    while not found():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < until_s
+        time.sleep(0.002)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the moment is read from /proc")
+def test_a_command_that_starts_or_works_is_ended_by_the_signal_and_says_nothing() -> None:
+    words = [sys.executable, "-m", "rtshcua.cli.door", "check", str(library.root() / "missions/short.rts")]
+    found: dict[float, tuple[int, str, str]] = {}
+    for moment_s in MOMENTS_S:
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            until(lambda: bool(raises(process)), process)
+            until(lambda: not raises(process), process)
+            begun_s = used_s(process)
+            until_s = time.monotonic() + PATIENCE_S
+            while process.poll() is None and used_s(process) - begun_s < moment_s and time.monotonic() < until_s:
+                time.sleep(0.002)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=PATIENCE_S)
+            found[moment_s] = process.returncode, out, err
+    ended = {code for code, _, _ in found.values()}
+    assert ended <= {-signal.SIGINT, ExitCode.OK}, found  # the last may have come when all was said
+    assert found[MOMENTS_S[0]][0] == -signal.SIGINT
+    assert not any(err for _, _, err in found.values()), found
+
+
+@pytest.mark.parametrize(("before", "after"), [("SIG_IGN", "SIG_IGN"), ("default_int_handler", "SIG_DFL")])
+def test_the_door_leaves_alone_what_whoever_starts_it_wants(
+    monkeypatch: pytest.MonkeyPatch, before: str, after: str
+) -> None:
+    """A shell starts what runs in the background with SIGINT ignored."""
+    was = signal.signal(signal.SIGINT, getattr(signal, before))
+    monkeypatch.setattr("rtshcua.cli.app.main", lambda: 0)
+    try:
+        assert main() == ExitCode.OK
+        assert signal.getsignal(signal.SIGINT) == getattr(signal, after)
+        with interrupts.breakable():
+            within = signal.default_int_handler if after == "SIG_DFL" else signal.SIG_IGN
+            assert signal.getsignal(signal.SIGINT) == within
+        assert signal.getsignal(signal.SIGINT) == getattr(signal, after)
+    finally:
+        signal.signal(signal.SIGINT, was)
+
+
+def test_what_puts_something_in_order_is_told_of_ctrl_c() -> None:
+    """Terminals whose echo is off, children, temporary folders, tables that are half written."""
+    orderly = {row.name for row in COMMANDS if row.ends_in_order}
+    assert orderly >= {"sim", "campaign", "witness", "operator", "qualify", "archive", "verify-log", "keys", "init"}
+    assert not orderly & {"check", "lint", "fmt", "show", "explain", "docs"}
+
+
+def test_the_door_imports_nothing_of_ours_before_it_is_open() -> None:
+    code = (
+        "import sys, signal; from rtshcua.cli.door import main\n"
+        "print([name for name in sys.modules if name.startswith('rtshcua.')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['rtshcua.cli', 'rtshcua.cli.door']"

@@ -4,6 +4,7 @@ group of processes, a hypervisor, a debugger. Its log proves itself, and tells h
 
 from functools import cache
 from itertools import pairwise
+from random import Random
 
 import pytest
 from hypothesis import given
@@ -14,7 +15,7 @@ from rtshcua.model.faults import MessageSilence
 from rtshcua.model.faults import Mode as FlightMode
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending
-from virtual import case
+from virtual import case, shipped
 from virtual.flight import Flight
 from virtual.sampling import each_once
 from virtual.stalling import TOLD_US, StallingFlight, silences
@@ -115,3 +116,21 @@ def test_a_wait_for_parameters_is_sealed_as_a_flight_is() -> None:
     assert not flown.effects("stalled")
     report = flown.audit().report
     assert (report.failure, report.gaps) == (None, ())
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(1_000, 1_060))
+def test_a_mission_on_a_computer_that_stalls_is_nobody_elses(seed: int) -> None:
+    """The standard mission, with stalls of 1 to 20 s, in each third flight one soon after the other."""
+    chance, flavour = Random(seed), ("px4", "ardupilot")[seed % 2]
+    at, apart = chance.randrange(4_800), 60 if seed % 3 == 0 else 4_800
+    stalls = {
+        (at + chance.randrange(apart)) % 4_800: chance.randint(case.S, 20 * case.S) for _ in range(chance.randint(1, 6))
+    }
+    mode = (Mode.SOFTWARE, Mode.PROCESS)[seed // 2 % 2]
+    config = shipped.simulated(flavour)
+    flown = StallingFlight(shipped.shipped("standard"), flavour, stalls, mode=mode, config=config).fly(most_s=7_200)
+    truth = flown.vehicle.simulation.truth()
+    assert [record["event"] for record in flown.records if record.get("event") in ("crashed", "taken-over")] == []
+    assert (truth.crashed, truth.in_air) == (False, False)
+    assert flown.audit().report.failure is None

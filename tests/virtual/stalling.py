@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from rtshcua.model.flat.situation import Now
+from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.vehicle import VirtualClock
 from virtual import case
 from virtual.flight import Flight, Flown
@@ -22,9 +23,10 @@ class StallingFlight(Flight):
     """
 
     def __init__(
-        self, bundle: bytes, flavour: str, stalls: Mapping[int, int], lost: int | None = None, **more: Any
-    ) -> None:
-        super().__init__(bundle, case.simulated(flavour), **more)
+        self, bundle: bytes, flavour: str, stalls: Mapping[int, int], lost: int | None = None,
+        config: SimulationConfig | None = None, **more: Any,
+    ) -> None:  # fmt: skip
+        super().__init__(bundle, config or case.simulated(flavour), **more)
         self.stalls = dict(stalls)
         self.looks = 0
         #: in total, in us

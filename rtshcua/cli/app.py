@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any, cast
 
 from rtshcua import __version__
-from rtshcua.cli.faults import as_json, barrier, fail, say, say_lines
+from rtshcua.cli.faults import as_json, barrier, fail
 from rtshcua.cli.streams import mend_streams
 from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
 from rtshcua.cli.width import fitted
@@ -141,15 +141,13 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
         meant = (verb[2] or "").replace("'", "").removeprefix("one of: ").partition(", ")[0]
         help = f"did you mean `{path} {meant}`?" if meant else f"`{path} --help` lists the commands"
         return fail(ExitCode.USAGE, f"no such command: `{path.partition(' ')[2]} {verb[1]}`", help)
+    help = f"`{path} --help` explains it"
     if row.name in _REPORTING and "--json" in given:
         from rtshcua.cli.findings import Findings
 
-        return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, f"`{path} --help` explains it")
-    code = fail(ExitCode.USAGE, words)
-    if context is not None:
-        say_lines(f"usage: {context.get_usage().removeprefix('Usage: ')}")
-    say(f" help: `{path} --help` explains it")
-    return code
+        return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, help)
+    usage = None if context is None else context.get_usage().removeprefix("Usage: ")
+    return fail(ExitCode.USAGE, words, help, usage=usage)
 
 
 def overview(*, bold: bool) -> str:

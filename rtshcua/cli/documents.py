@@ -13,7 +13,7 @@ from rtshcua.adapters.files.keystore import KeyStore, read_root
 from rtshcua.adapters.files.roots import opened
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
-from rtshcua.cli.faults import fail
+from rtshcua.cli.faults import error_object, fail
 from rtshcua.cli.recognising import read_bundle
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.trusting import LAPSED, REVOKED
@@ -127,11 +127,12 @@ def deliver(
 def _say(code: ExitCode, slug: str, text: str, *, as_json: bool, help: str | None = None) -> ExitCode:
     text = visible(text)  # names of the mission's, of files, and the words of who listens at the socket
     if as_json:
-        out_json(json.dumps({"slug": slug, "text": text, "exit": code.slug}, ensure_ascii=False))
+        error = {} if code is ExitCode.OK else error_object(code, text, help, slug=slug)
+        out_json(json.dumps({"slug": slug, "text": text, "exit": code.slug} | error, ensure_ascii=False))
     elif code is ExitCode.OK:
         out(text)
     else:
-        return fail(code, text, help)
+        return fail(code, text, help, slug=slug)
     return code
 
 

@@ -44,6 +44,10 @@ _CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "outside", "
 _CODES |= {"not-flown": ExitCode.TESTS}
 
 
+#: errors that are told with the slug of their exit code, where they have none of their own
+_NAMED = (ExitCode.USAGE, ExitCode.INPUT, ExitCode.UNTRUSTED)
+
+
 @contextmanager
 def as_json(*, wanted: bool) -> Iterator[None]:
     """Within this, `fail` also prints {"error": {"slug", "text", "help"}, "exit_code"}, if that is wanted."""
@@ -54,14 +58,29 @@ def as_json(*, wanted: bool) -> Iterator[None]:
         _json.reset(before)
 
 
-def fail(code: ExitCode, message: str, help: str | None = None, *, slug: str | None = None) -> ExitCode:
+def fail(
+    code: ExitCode, message: str, help: str | None = None, *, slug: str | None = None, usage: str | None = None
+) -> ExitCode:
     """Says `message` (and `help`) on the standard error, and gives `code` back: `return fail(ExitCode.INPUT, ...)`.
 
-    `slug` is for programs, where there is a more exact one than the exit code's own.
+    `slug` is given where there is a more exact one than the exit code's own; `usage` is how the command is called.
     """
     if _json.get():
-        _print_object(code, slug or code.slug, message, help or None)
-    return tell(code, message, help)
+        _print_object(error_object(code, message, help, slug=slug))
+    return tell(code, message, help, slug=slug, usage=usage)
+
+
+def error_object(
+    code: ExitCode,
+    text: str,
+    help: str | None,
+    *,
+    slug: str | None = None,
+    at: Mapping[str, str | int] | None = None,
+) -> dict[str, object]:
+    """The one form of errors for programs, whatever stands beside it: `help` is null where there is none."""
+    error = {"slug": slug or code.slug, "text": text, "help": help or None}
+    return {"error": error | ({} if at is None else {"at": at}), "exit_code": int(code)}
 
 
 def misaddressed(option: str, error: "AddressError") -> ExitCode:
@@ -70,8 +89,8 @@ def misaddressed(option: str, error: "AddressError") -> ExitCode:
 
     span: dict[str, str | int] = {"option": option, "value": error.address, "start": error.start, "end": error.end}
     if _json.get():
-        _print_object(ExitCode.USAGE, ExitCode.USAGE.slug, error.text, error.help, at=span)
-    say(f"error: {error.text}")
+        _print_object(error_object(ExitCode.USAGE, error.text, error.help, at=span))
+    say(f"{_head(ExitCode.USAGE)}: {error.text}")
     say(f"   --> {option}")
     say(f"    | {error.address}")
     width = len(visible(error.address[: error.start]))
@@ -104,22 +123,29 @@ def code_of(slug: str) -> ExitCode:
     return _CODES.get(slug, ExitCode.UNTRUSTED)
 
 
-def tell(code: ExitCode, message: str, help: str | None = None) -> ExitCode:
+def tell(
+    code: ExitCode, message: str, help: str | None = None, *, slug: str | None = None, usage: str | None = None
+) -> ExitCode:
     """`fail` for a person alone: of a command that has told the program in its own way."""
-    say(f"error: {message}")
+    say(f"{_head(code, slug)}: {message}")
+    if usage:
+        say_lines(f"usage: {usage}")
     if help:
         say(f" help: {help}")
     return code
 
 
-def _print_object(
-    code: ExitCode, slug: str, text: str, help: str | None, at: Mapping[str, str | int] | None = None
-) -> None:
+def _head(code: ExitCode, slug: str | None = None) -> str:
+    """How an error begins: with its slug where a person may look it up, or tell somebody of it."""
+    slug = slug or code.slug
+    return f"error[{slug}]" if slug != code.slug or code in _NAMED else "error"
+
+
+def _print_object(told: Mapping[str, object]) -> None:
     import json
 
-    error = {"slug": slug, "text": text, "help": help} | ({} if at is None else {"at": at})
     try:
-        print(json.dumps({"error": error, "exit_code": int(code)}), flush=True)
+        print(json.dumps(told), flush=True)
     except OSError:
         _discard("stdout")
 

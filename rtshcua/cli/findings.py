@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rtshcua.cli.faults import code_of, fail, say, say_lines, say_rendered
+from rtshcua.cli.faults import code_of, error_object, fail, say, say_lines, say_rendered
 from rtshcua.cli.stdout import out_json
 from rtshcua.cli.width import columns, fitted
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
@@ -30,11 +30,12 @@ class Findings:
     def __init__(self, *, json: bool, deny_warnings: bool = False) -> None:
         self._json = json
         self._deny_warnings = deny_warnings
+        self._found: tuple[Diagnostic, ...] = ()
         self._object: dict[str, Any] = as_json((), {})
 
     def report(self, diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> bool:
         """Report findings; true when they forbid going on."""
-        found = tuple(diagnostics)
+        self._found = found = tuple(diagnostics)
         if self._json:
             self._object = as_json(found, sources)
         elif found:
@@ -50,8 +51,8 @@ class Findings:
     def refuse(self, code: ExitCode, slug: str, message: str, help: str | None = None) -> ExitCode:
         """End with a refusal that is about no source."""
         if not self._json:
-            return fail(code, message, help)
-        return self.finish(code, error={"slug": slug, "message": message, "help": help or None})
+            return fail(code, message, help, slug=slug)
+        return self.finish(code, **_error(code, message, help, slug))
 
     def end(self, refusal: Refusal) -> ExitCode:
         """`refuse` for a value, whose slug says the exit code."""
@@ -60,14 +61,32 @@ class Findings:
     def finish(self, code: ExitCode, **result: Any) -> ExitCode:
         """End; with `json`, print everything."""
         if self._json:
-            out_json(json.dumps(self._object | {"exit": code.slug} | result, indent=2, ensure_ascii=False))
+            told = self._object | ended(code, self._found) | result
+            out_json(json.dumps(told, indent=2, ensure_ascii=False))
         return code
+
+
+def ended(code: ExitCode, found: Iterable[Diagnostic]) -> dict[str, Any]:
+    """How a command that reports findings ended; a file that cannot be read is an error in the one form, too."""
+    unread = next((each for each in found if _is_unreadable(each)), None)
+    error = {} if unread is None or code is not ExitCode.INPUT else _error(code, unread.message, unread.help)
+    return {"exit": code.slug, "exit_code": int(code)} | error
+
+
+def _error(code: ExitCode, text: str, help: str | None, slug: str | None = None) -> dict[str, Any]:
+    """An error in the one form of errors; `message` is what its text was called first."""
+    told: dict[str, Any] = error_object(code, text, help, slug=slug)
+    told["error"]["message"] = text
+    return told
+
+
+def _is_unreadable(found: Diagnostic) -> bool:
+    return found.code in _UNREADABLE and found.span is None
 
 
 def exit_code(found: Iterable[Diagnostic]) -> ExitCode:
     """How a command ends that cannot go on: INPUT where a file that was asked for is none that can be read."""
-    unreadable = any(each.code in _UNREADABLE and each.span is None for each in found)
-    return ExitCode.INPUT if unreadable else ExitCode.DIAGNOSTICS
+    return ExitCode.INPUT if any(_is_unreadable(each) for each in found) else ExitCode.DIAGNOSTICS
 
 
 def _count(found: tuple[Diagnostic, ...]) -> str:

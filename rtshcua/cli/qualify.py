@@ -28,12 +28,13 @@ from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.cli.connection import Connect, LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_us
-from rtshcua.cli.faults import code_of, fail, misaddressed, say, tell, untrusted
+from rtshcua.cli.faults import code_of, fail, misaddressed, say, untrusted
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.flight import EXIT_CODES
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.launch import IDENTITY_HELP, Launch, Refused, launch
 from rtshcua.cli.opening import AIR_S
+from rtshcua.cli.refused import say_refused
 from rtshcua.cli.showing.qualification import described, told
 from rtshcua.cli.sources import compile_sources, read_text
 from rtshcua.cli.stdout import out, out_json
@@ -136,10 +137,10 @@ def qualify(
     if only:
         missing |= {name: "not flown (`--only`)" for name in named if name not in only}
         planned = [each for each in planned if each.name in only]
-    found = Findings(json=False)
+    found = Findings(json=as_json)
     compiled, sources = compile_sources([source], mission=mission, issued_at_us=time.time_ns() // 1_000)
     if found.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
-        return exit_code(compiled.diagnostics)
+        return found.finish(exit_code(compiled.diagnostics))
     if compiled.policy.vehicle.identity != vehicle:
         text = f"the policy is for `{compiled.policy.vehicle.identity}`, this vehicle is `{vehicle}`"
         return fail(ExitCode.REFUSED, text, IDENTITY_HELP, slug="wrong-vehicle")
@@ -159,9 +160,7 @@ def qualify(
             ended = plan.fly(order, as_json=as_json)
         return plan.finish(ended, as_json=as_json)
     except Refused as refused:
-        if as_json:
-            out_json(msgspec.json.encode(refused.event()).decode())
-        return (tell if as_json else fail)(refused.code, str(refused), refused.help)
+        return say_refused(refused, as_json=as_json)
 
 
 _REAL: Final = "not sent to a real vehicle: a second ground station takes over in simulation only"

@@ -1,5 +1,9 @@
 """A flight that does not begin."""
 
+import json
+
+from rtshcua.cli.faults import error_object, fail, tell
+from rtshcua.cli.stdout import out_json
 from rtshcua.diagnostics.exits import ExitCode
 
 
@@ -13,6 +17,14 @@ class Refused(Exception):
         self.help = help
 
     def event(self) -> dict[str, object]:
-        """The event that says so with `--json`."""
-        said = {"event": "refused", "slug": self.slug, "text": str(self), "exit_code": int(self.code)}
-        return said if self.help is None else said | {"help": self.help}
+        """The event that says so with `--json`: an error in the one form of errors, and the same beside it."""
+        told = error_object(self.code, str(self), self.help, slug=self.slug)
+        return {"event": "refused", "slug": self.slug, "text": str(self), "help": self.help or None} | told
+
+
+def say_refused(refused: Refused, *, as_json: bool) -> ExitCode:
+    """A flight that never began: for a person, and with `--json` for a program too."""
+    if not as_json:
+        return fail(refused.code, str(refused), refused.help, slug=refused.slug)
+    out_json(json.dumps(refused.event(), ensure_ascii=False))
+    return tell(refused.code, str(refused), refused.help, slug=refused.slug)

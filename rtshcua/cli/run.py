@@ -11,7 +11,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import msgspec
 import typer
 
 from rtshcua.adapters.boundary_process import program
@@ -22,9 +21,8 @@ from rtshcua.adapters.vehicle.transport import Transport, open_transport
 from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.configured import Settings, settings_of
 from rtshcua.cli.connection import LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_text, duration_us
-from rtshcua.cli.faults import fail, misaddressed, tell
-from rtshcua.cli.refused import Refused
-from rtshcua.cli.stdout import out_json
+from rtshcua.cli.faults import fail, misaddressed
+from rtshcua.cli.refused import Refused, say_refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.simulation.config import Kind
@@ -174,7 +172,7 @@ def run(
         try:
             incidents = None if scenario is None else _incidents(scenario, flavour, seed)
         except Refused as refused:
-            return _say(refused, as_json=as_json)
+            return say_refused(refused, as_json=as_json)
         order = Launch(
             bundle=bundle,
             link=link,
@@ -211,7 +209,7 @@ def run(
         try:
             return launch(order)
         except Refused as refused:
-            return _say(refused, as_json=as_json)
+            return say_refused(refused, as_json=as_json)
 
 
 def _listening(link: Address | None, stack: ExitStack) -> Transport | None:
@@ -326,10 +324,3 @@ def _style(*, plain: bool, as_json: bool) -> str:
         return "json"
     terminal = sys.stdout is not None and sys.stdout.isatty() and os.environ.get("TERM", "dumb") != "dumb"
     return "screen" if terminal and not plain else "lines"
-
-
-def _say(refused: Refused, *, as_json: bool) -> ExitCode:
-    """A flight that never began: for a person, and with `--json` for a program too."""
-    if as_json:
-        out_json(msgspec.json.encode(refused.event()).decode())
-    return (tell if as_json else fail)(refused.code, str(refused), refused.help)

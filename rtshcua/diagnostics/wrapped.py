@@ -7,7 +7,7 @@ WIDTH: Final = 80
 #: the least room for text beneath what stands before it
 _ROOM: Final = 32
 #: what stands before the text of a line: marks, and names in columns, parted by two spaces or more
-_BEFORE: Final = re.compile(r" *(?:[-+=·] +|\d+\. )?(?:(?:error|warning|note|help)(?:\[\w+\])?: )?")
+_BEFORE: Final = re.compile(r" *(?:[-+=·] +|\d+\. )?(?:(?:error|warning|note|help)(?:\[[\w/-]+\])?: )?")
 _COLUMN: Final = re.compile(r"(?:[^ ]| (?! ))*? {2,}(?=[^ ])")
 #: a word, or words in backticks, which are one: a command or a name is not taken apart where it fits
 _WORD: Final = re.compile(r"( *)([^ `]*(?:`[^`]*`[^ `]*)+|[^ ]+)")

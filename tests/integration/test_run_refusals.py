@@ -29,7 +29,7 @@ def refused(capfd: Any, *words: str) -> tuple[int, str]:
     code = main(["run", *words])
     out, err = capfd.readouterr()
     assert "Traceback" not in err
-    assert err.startswith("error: ")
+    assert err.startswith("error[")
     assert out == ""
     return code, err
 
@@ -112,7 +112,7 @@ def test_a_source_is_not_flown_but_compiled(ground: Any, capfd: Any) -> None:
 
 def test_a_missing_bundle(ground: Any, capfd: Any) -> None:
     code, err = refused(capfd, "none.bundle")
-    assert (code, err) == (3, "error: no such file or directory: `none.bundle`\n")
+    assert (code, err) == (3, "error[input]: no such file or directory: `none.bundle`\n")
 
 
 def test_another_vehicle(ground: Any, capfd: Any) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rtshcua import __version__
+from rtshcua.cli.findings import ended
 from rtshcua.cli.linting.gathered import Gathered
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.exits import ExitCode
@@ -35,7 +36,7 @@ def written(form: str, told: Gathered, asked: Sequence[str], code: ExitCode, fai
     ignored = as_json([each.diagnostic for each in told.ignored], told.sources)["diagnostics"]
     reasons = [{"reason": each.reason} for each in told.ignored]
     tree["ignored"] = [finding | reason for finding, reason in zip(ignored, reasons, strict=True)]
-    return _dumped(tree | {"files": len(asked), "exit": code.slug})
+    return _dumped(tree | {"files": len(asked)} | ended(code, told.found))
 
 
 def _sarif(told: Gathered, code: ExitCode, here: str) -> dict[str, Any]:

@@ -84,7 +84,7 @@ def test_what_ships_is_checked_without_floating_point_geometry(checkout: Path) -
 )
 def test_unknown_words(word: str, answer: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main([word]) == ExitCode.USAGE
-    assert capsys.readouterr().err == f"error: {answer}\n"
+    assert capsys.readouterr().err == f"error[usage]: {answer}\n"
 
 
 @pytest.mark.parametrize("row", table.COMMANDS, ids=lambda row: row.name)
@@ -135,9 +135,9 @@ def test_misused_command(
     install(monkeypatch, takes)
     assert app.main(["show", *words]) == ExitCode.USAGE
     error, usage, help = capsys.readouterr().err.splitlines()
-    assert error.startswith("error: ")
+    assert error.startswith("error[usage]: ")
     assert named in error
-    assert error[7].islower()
+    assert error.removeprefix("error[usage]: ")[0].islower()
     assert not error.endswith(".")
     assert usage.startswith("usage: rtshcua show [OPTIONS] ")
     assert help == " help: `rtshcua show --help` explains it"
@@ -151,7 +151,7 @@ def test_a_typo_and_a_limit_are_told_as_every_other_error(
 
     install(monkeypatch, takes)
     assert app.main(["show", "--sped", "2"]) == ExitCode.USAGE
-    assert capsys.readouterr().err.startswith("error: no such option: --sped; did you mean --speed?\n")
+    assert capsys.readouterr().err.startswith("error[usage]: no such option: --sped; did you mean --speed?\n")
     assert app.main(["show", "--speed", "60"]) == ExitCode.USAGE
     assert "'--speed': it should be less than or equal to 50\n" in capsys.readouterr().err
 
@@ -204,8 +204,12 @@ def test_misused_verb_names_the_verb(monkeypatch: pytest.MonkeyPatch, capsys: py
         (OSError(errno.ENOSPC, "No space left on device", "x"), ExitCode.FULL, "error: no space left on device: `x`"),
         (OSError("odd"), ExitCode.FULL, "error: odd"),
         (OSError(), ExitCode.FULL, "error: the system gave no reason"),
-        (FileNotFoundError(errno.ENOENT, "No such file", "x"), ExitCode.INPUT, "error: no such file: `x`"),
-        (PermissionError(errno.EACCES, "Permission denied", "x"), ExitCode.INPUT, "error: permission denied: `x`"),
+        (FileNotFoundError(errno.ENOENT, "No such file", "x"), ExitCode.INPUT, "error[input]: no such file: `x`"),
+        (
+            PermissionError(errno.EACCES, "Permission denied", "x"),
+            ExitCode.INPUT,
+            "error[input]: permission denied: `x`",
+        ),
         (OSError(errno.EADDRINUSE, "Address already in use"), ExitCode.LINK, "error: address already in use"),
         (TimeoutError("timed out"), ExitCode.LINK, "error: timed out"),
     ],
@@ -279,7 +283,7 @@ def test_fail_gives_help() -> None:
         text=True,
         check=True,
     )
-    assert run.stderr == "error: no\n help: try\n"
+    assert run.stderr == "error[input]: no\n help: try\n"
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a disk that is always full")

@@ -97,7 +97,7 @@ def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest
     assert [each["file"] for each in answered["missions"]] == ["b/two.rts", "a/deep/er.rts", "a/one.rts"]
     assert {each["mission"] for each in answered["missions"]} == {"look"}
     told = {"missions", "versions", "left_out", "issued_now"}
-    assert set(answered) == {"format", "version", "diagnostics", "exit", *told}
+    assert set(answered) == {"format", "version", "diagnostics", "exit", "exit_code", *told}
 
 
 def test_without_a_path_it_is_this_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

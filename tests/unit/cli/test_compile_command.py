@@ -246,7 +246,7 @@ def test_a_folder_or_a_bundle_is_no_source(
         expected = ExitCode.USAGE if named == "made.bundle" else ExitCode.INPUT
         assert main(["compile", named, *output, *AT]) == expected
         what = "bundle" if named == "made.bundle" else "folder"
-        assert capsys.readouterr().err.startswith(f"error: `{named}` is a {what}, and no source\n help: ")
+        assert capsys.readouterr().err.partition("]: ")[2].startswith(f"`{named}` is a {what}, and no source\n help: ")
     assert ((here / "made.bundle").read_bytes(), names(here)) == (kept, ["made", "made.bundle"])
 
 

@@ -56,7 +56,10 @@ def tab(place: Path, capsys: pytest.CaptureFixture[str]) -> Complete:
 
 def test_another_shell_is_refused_in_our_words(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["completion", "tcsh"]) == 2
-    assert "error: invalid value for 'shell': 'tcsh' is not one of 'bash', 'zsh', 'fish'\n" in capsys.readouterr().err
+    assert (
+        "error[usage]: invalid value for 'shell': 'tcsh' is not one of 'bash', 'zsh', 'fish'\n"
+        in capsys.readouterr().err
+    )
 
 
 def test_bash_completes_all_of_it(tab: Complete) -> None:

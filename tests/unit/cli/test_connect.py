@@ -80,7 +80,7 @@ def test_a_line_that_is_no_address(capsys: pytest.CaptureFixture[str]) -> None:
     code, said = says("serial:ttyUSB0:57600", capsys)
     assert code == ExitCode.USAGE
     assert said.splitlines() == [
-        "error: `ttyUSB0` is no path of a device",
+        "error[usage]: `ttyUSB0` is no path of a device",
         "   --> --connect",
         "    | serial:ttyUSB0:57600",
         "    |        ^^^^^^^",

@@ -234,7 +234,7 @@ def test_a_bundle_that_was_cut_is_malformed_for_everybody(
 ) -> None:
     (here / "cut.bundle").write_bytes((here / "low.bundle").read_bytes()[:-100])
     assert main(words.split()) == ExitCode.INPUT
-    assert "error: " in capsys.readouterr().err
+    assert "error[" in capsys.readouterr().err
     assert main([*words.split(), "--json"]) == ExitCode.INPUT
     found = json.loads(capsys.readouterr().out)
     assert "malformed" in (found.get("slug"), found.get("error", {}).get("slug"))
@@ -272,7 +272,9 @@ def test_what_the_flight_says_is_what_the_command_says(
     assert "`--policy` calls home whatever flies" in capsys.readouterr().err
     assert main(["recall", "low.bundle", *to, "--json"]) == ExitCode.REFUSED
     said = json.loads(capsys.readouterr().out)
-    assert said == {"slug": "expired", "text": "the flight refused it: as it says (expired)", "exit": "refused"}
+    text = "the flight refused it: as it says (expired)"
+    assert (said["slug"], said["text"], said["exit"], said["exit_code"]) == ("expired", text, "refused", 5)
+    assert said["error"]["text"] == text
     assert main(["recall", "low.bundle", *to]) == ExitCode.REFUSED
     assert "the flight refused it" in capsys.readouterr().err
 

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from rtshcua.cli import app, faults
+from rtshcua.cli.table import COMMANDS
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.wire.untrusted import Untrusted
 
@@ -39,7 +40,45 @@ def test_every_error_is_one_object(words: str, code: ExitCode, slug: str, capsys
     assert set(found) == {"error", "exit_code"}
     assert set(found["error"]) - {"at"} == {"slug", "text", "help"}
     assert (found["exit_code"], found["error"]["slug"]) == (code, slug)
-    assert said.err.splitlines()[0] == f"error: {found['error']['text']}", "a person still reads it"
+    assert said.err.splitlines()[0] == f"error[{slug}]: {found['error']['text']}", "a person still reads it"
+
+
+#: what each command is given so that all that is wrong is that a file is missing; None where it takes no file
+MISSING: dict[str, str | None] = {
+    "check": "none.rts", "lint": "none.rts", "fmt": "none.rts", "test": "none.rts", "campaign": "none.rts",
+    "compile": "none.rts", "docs": "none.rts", "explain": None, "schema": None, "init": None, "lsp": None,
+    "completion": None, "keys": "accept none.trust --vehicle x", "run": "none.bundle",
+    "approve": "none --step 1 --to x",
+    "recall": "none --to x", "operator": None, "replace": "none --to x", "mcp": None,
+    "agent-bundle": "out --bundle none --with none.rts --to x", "doctor": "none --connect udpin:127.0.0.1:1",
+    "qualify": "none.rts --connect udpin:127.0.0.1:1 --vehicle x --pilot x", "sim": None,
+    "recover": "none", "witness": "none",
+    "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
+    "show": "none",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MISSING)
+def test_a_missing_file_and_wrong_usage_have_one_form_in_all_commands(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert app.main(["keys", "init"]) == ExitCode.OK
+    capsys.readouterr()
+    cases = [(f"{name} --none-such", ExitCode.USAGE)]
+    cases += [] if MISSING[name] is None else [(f"{name} {MISSING[name]}", ExitCode.INPUT)]
+    for words, code in cases:
+        assert app.main([*words.split(), "--json"]) == code, words
+        said = capsys.readouterr()
+        found = json.loads(said.out)
+        assert found["exit_code"] == code
+        assert set(found["error"]) - {"at", "message"} == {"slug", "text", "help"}
+        assert found["error"]["slug"] == code.slug
+        assert found["error"]["help"] != ""
+        assert said.err.startswith((f"error[{code.slug}]: ", "error[E0108]: ")) or not said.err
+
+
+def test_every_command_is_tried() -> None:
+    assert MISSING.keys() == {row.name for row in COMMANDS}
 
 
 def test_an_address_that_is_none_says_where_it_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:

@@ -69,7 +69,7 @@ def test_what_may_not_be_read_is_bad_input(
     monkeypatch.setattr(os, "open", denied)
     monkeypatch.setattr(Path, "open", refused)
     assert given(words, log) == ExitCode.INPUT
-    assert f"error: permission denied: `{log}`" in capsys.readouterr().err
+    assert f"error[input]: permission denied: `{log}`" in capsys.readouterr().err
 
 
 def test_where_nothing_may_be_written(
@@ -131,12 +131,12 @@ def test_a_folder_that_cannot_be_read_is_not_passed_over(
 
     monkeypatch.setattr(os, "scandir", denied)
     assert app.main([*words, "runs"]) == ExitCode.INPUT
-    assert capsys.readouterr().err.endswith("error: permission denied: `runs/locked`\n")
+    assert capsys.readouterr().err.endswith("error[input]: permission denied: `runs/locked`\n")
 
 
 def test_show_names_the_log_that_a_folder_lacks(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for folder, code in (("runs/one", ExitCode.OK), ("runs", ExitCode.INPUT)):
         assert app.main(["show", folder]) == code
     assert capsys.readouterr().err == (
-        "error: there is no `log.jsonl` in the folder `runs`\n help: name a file, or the folder of one run\n"
+        "error[input]: there is no `log.jsonl` in the folder `runs`\n help: name a file, or the folder of one run\n"
     )

@@ -135,5 +135,5 @@ def test_a_name_that_means_something_else_is_refused_or_works(tmp_path: Path, na
         assert app.main(["check", str(tmp_path / "x"), "--deny-warnings"]) == 0
     else:
         assert code == 2
-        assert err.startswith(f"error: the project cannot be called `{name}`: ")
+        assert err.startswith(f"error[name]: the project cannot be called `{name}`: ")
         assert not (tmp_path / "x").exists()

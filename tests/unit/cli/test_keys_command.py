@@ -121,7 +121,7 @@ def test_a_damaged_root_is_not_listed(capsys: pytest.CaptureFixture[str]) -> Non
     data = root.read_bytes()
     root.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
     assert app.main(["keys", "list"]) == ExitCode.UNTRUSTED
-    assert "error: " in capsys.readouterr().err
+    assert "error[" in capsys.readouterr().err
 
 
 def test_encrypted_keys_from_a_passphrase_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -435,7 +435,7 @@ def test_a_vehicle_says_what_it_accepted(tmp_path: Path, capsys: pytest.CaptureF
     accept[2] = str(damaged)
     (tmp_path / "trust" / "vehicle-quad-07").rmdir()
     assert app.main(accept) == ExitCode.INPUT
-    assert capsys.readouterr().err.startswith(f"error: `{damaged}` is no trust root: ")
+    assert capsys.readouterr().err.startswith(f"error[root-malformed]: `{damaged}` is no trust root: ")
 
 
 def test_the_list_names_files_and_the_roots_version_and_what_is_revoked_is_not_again(

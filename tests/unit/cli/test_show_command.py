@@ -202,7 +202,7 @@ def test_what_cannot_be_shown(data: bytes, code: ExitCode, tmp_path: Path, capsy
     (tmp_path / "x").write_bytes(data)
     assert app.main(["show", str(tmp_path / "x")]) == code
     err = capsys.readouterr().err
-    assert err.startswith("error: ")
+    assert err.startswith("error[")
     assert "internal fault" not in err
 
 

@@ -89,7 +89,7 @@ def test_the_key_stores_root_is_the_default(run: Path, capsys: pytest.CaptureFix
 def test_without_any_root(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["verify-log", str(run)]) == ExitCode.UNTRUSTED
     err = capsys.readouterr().err
-    assert err.startswith("error: no root to trust: there are no keys in ")
+    assert err.startswith("error[no-keys]: no root to trust: there are no keys in ")
     assert "`--root`" in err
 
 

@@ -24,7 +24,7 @@ def lint(capsys: pytest.CaptureFixture[str]) -> Lint:
     def run(*words: str) -> tuple[int, list[tuple[str, str]]]:
         code = main(["lint", *words, "--json"])
         answered: dict[str, Any] = json.loads(capsys.readouterr().out)
-        if "error" in answered:
+        if "error" in answered and not answered["diagnostics"]:
             return code, [(answered["error"]["slug"], answered["error"]["message"])]
         return code, [(each["code"], (each["at"] or {"file": ""})["file"]) for each in answered["diagnostics"]]
 

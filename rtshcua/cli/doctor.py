@@ -43,6 +43,7 @@ from rtshcua.cli.connection import Connect, LinkKey, System, UnsignedRadio, UtcE
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.launch import expect_no_source
 from rtshcua.cli.meeting import unmet, unopened
+from rtshcua.cli.opening import too_old
 from rtshcua.cli.qualified import record_of
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.signing import Signing
@@ -53,6 +54,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.parameters import shown
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.wire import cose
@@ -134,11 +136,12 @@ def doctor(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
         keyed = signing_key is not None
+        time_of_day = _time_of_day(boundary_socket, duration_us(utc_error), keyed=keyed)
         findings = _boundary(boundary_socket) + agents + _settle(socket, vehicle, clock)
         findings += list(
             diagnose(
                 vehicle, policy, mission, keyed=keyed,
-                time=_time_of_day(boundary_socket, duration_us(utc_error), keyed=keyed),
+                time=time_of_day,
                 unheard=signing.unheard, named=system is not None,
                 qualified=None if root is None else partial(
                     standing, record_of(policy.vehicle.identity, root, clock.now().utc_us)
@@ -146,6 +149,7 @@ def doctor(
             )
         )  # fmt: skip
     if mission is not None:
+        findings += _expired(policy, mission, clock.now(), time_of_day)
         findings += _owed(OwedParameters(state_folder(), policy.vehicle.identity))
     code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
     if as_json:
@@ -200,6 +204,16 @@ def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool) -> 
         error_us if said.source is Source.KERNEL else None, counts,
         error_us if said.source is Source.OPERATOR else None, listens=True,
     )  # fmt: skip
+
+
+def _expired(policy: Policy, mission: Mission, now: Now, time: TimeOfDay) -> list[VehicleFinding]:
+    """That the mission is too old, where this machine's time of day is known well enough to say so."""
+    error_us = time.stated_us if time.machine_us is None else time.machine_us
+    known = Now(now.monotonic_us, now.utc_us, UTC_UNKNOWN_US if error_us is None else error_us)
+    late = too_old(policy, mission.invocations, known)
+    if late is None:
+        return []
+    return [VehicleFinding("mission/expired", MissionVerdict.STOP, late.text, "a mission that is fresh", late.help)]
 
 
 def _owed(debts: OwedParameters) -> list[VehicleFinding]:

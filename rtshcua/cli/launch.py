@@ -39,7 +39,7 @@ from rtshcua.cli.live.story import Note
 from rtshcua.cli.live.telling import Answering
 from rtshcua.cli.log_signer import LogSigner
 from rtshcua.cli.meeting import APART_UTC_NOTE, LISTENING_UTC_NOTE, UTC_NOTE, await_utc, meet, unopened
-from rtshcua.cli.opening import broke_off, flown_before, give_back, mark_opened, not_opened, obeys, still_flies
+from rtshcua.cli.opening import broke_off, expired, flown_before, give_back, mark_opened, not_opened, obeys, still_flies
 from rtshcua.cli.past import Past
 from rtshcua.cli.qualified import record_of, unqualified
 from rtshcua.cli.recognising import no_bundle
@@ -184,6 +184,7 @@ def _launch(order: Launch) -> ExitCode:
             stack.callback(debts.close)
             slack = max(1, round(order.speed / _UNHURRIED))
             stack.enter_context(_with_the_one_before(past, loaded))
+            _expect_fresh_at_first(order, loaded, clock, owes=bool(debts.left))
             begun = _begin(order, bundle, loaded, trust, log_key, past, debts.left, clock, interrupts, slack, stack)
             bundle, loaded, trust, (own_key, keyless), apart, absent, transport, agents = begun
             root, signed_root = trust.root, trust.signed
@@ -228,7 +229,7 @@ def _launch(order: Launch) -> ExitCode:
                 return dry_run(
                     loaded, vehicle, clock, interrupts, events, as_json=order.style == "json",
                     notes=(*signing.notes, *would_set(order.settings), *_utc_notes(utc, apart, listens=False)),
-                    refusal=flown_before(order.state, loaded), unheard=signing.unheard, sets=tuple(order.settings),
+                    refusal=_not_begun(order, loaded, clock), unheard=signing.unheard, sets=tuple(order.settings),
                 )  # fmt: skip
             assert past is not None
             resumed, refusal = _opened(order, loaded, vehicle, clock, events, owes=bool(debts.left))
@@ -267,7 +268,7 @@ def _launch(order: Launch) -> ExitCode:
             code, summary = flight.fly()
             if order.sortie is not None:
                 order.sortie.after(vehicle, clock, interrupts, Ending(summary.ending), flight.final_hash)
-            if not resumed and (kept := give_back(order.state, loaded, flight)) is not None:
+            if not resumed and (kept := give_back(order.state, loaded, flight, clock.now())) is not None:
                 feed.post(Note(kept))
             if order.incidents is not None:
                 with open_regular(run.path / LOG) as log:
@@ -492,7 +493,10 @@ def _opened(
     the vehicle: then nothing flies, but that is put back first. Raises `Refused` where nothing is.
     """
     try:
-        return broke_off(order.state, loaded, vehicle, clock, events), None
+        resumed = broke_off(order.state, loaded, vehicle, clock, events)
+        if not resumed:
+            _expect_fresh(loaded, clock)
+        return resumed, None
     except Refused as refused:
         if not owes:
             raise
@@ -627,6 +631,7 @@ def _admit(
             return Refusal("waited-with", text, "sign a mission of your own under its policy")
         _expect_current(_lapsed(data, trusted.signed, log_key, loaded, clock), resumed=False)
         _hear(order, loaded, signing)
+        _expect_fresh(loaded, clock)
     except Refused as refused:
         return Refusal(refused.slug, str(refused), refused.help or "")
     refusal = not_opened(order.state, loaded)
@@ -821,6 +826,27 @@ def _lapsed(bundle: bytes, signed_root: bytes, log_key: bytes, loaded: Loaded, c
 def _expect_current(lapsed: Refused | None, *, resumed: bool) -> None:
     if lapsed is not None and not resumed:
         raise lapsed
+
+
+def _expect_fresh_at_first(order: Launch, loaded: Loaded, clock: LinkClock, *, owes: bool) -> None:
+    """Where it is known already, a mission that is too old begins nothing; but what may hang in the air is looked for,
+    and what is owed to the vehicle is put back. One that is waited with says the policy alone.
+    """
+    vain = order.wait_s is None and (order.link is None or not (owes or _may_have_flown(order, loaded)))
+    if vain:
+        _expect_fresh(loaded, clock)
+
+
+def _not_begun(order: Launch, loaded: Loaded, clock: LinkClock) -> str | None:
+    """Why a flight of the bundle would not begin, in words."""
+    late = expired(loaded, clock.now())
+    return flown_before(order.state, loaded) or (None if late is None else f"{late.text}; {late.help}")
+
+
+def _expect_fresh(loaded: Loaded, clock: LinkClock) -> None:
+    refusal = expired(loaded, clock.now())
+    if refusal is not None:
+        raise Refused(ExitCode.REFUSED, *refusal)
 
 
 def _load(order: Launch, bundle: bytes, root: TrustRoot, now: Now, flight: bytes | None = None) -> Loaded:

@@ -3,6 +3,7 @@ back after a run that sent nothing.
 """
 
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
@@ -11,8 +12,14 @@ from rtshcua.adapters.files.replay import FileReplayStore, looked_up
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.flight import Flight
 from rtshcua.cli.refused import Refused
+from rtshcua.cli.shown import utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import Now
+from rtshcua.model.step_number import number_of
+from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event, Opening
 
@@ -52,6 +59,24 @@ def _not_opened(loaded: Loaded, opening: Opening) -> Refusal:
         return Refusal(opening, text, help)
     text = f"this bundle was opened before on `{vehicle}`: a bundle flies once"
     return Refusal(opening, text, "compile the mission again, which issues it anew")
+
+
+def expired(loaded: Loaded, now: Now) -> Refusal | None:
+    """Why the mission in force could not fly to its end any more (`too_old`)."""
+    return too_old(loaded.bundle.policy, [prepared.invocation for prepared in loaded.invocations], now)
+
+
+def too_old(policy: Policy, steps: Iterable[Invocation], now: Now) -> Refusal | None:
+    """Why a mission of these steps could not fly to its end any more, whatever the vehicle says: one of them has
+    certainly expired. None where none has, or the time of day is not known.
+    """
+    for step in steps:
+        end_us = step.issued_at_us + step.contract.validity_us
+        if now.utc_us - now.utc_error_us > end_us:
+            which = f"step {number_of(step.step)}, `{call(policy, step)}`"
+            text = f"the bundle expired at {utc(end_us)}: later {which}, may not begin"
+            return Refusal("bundle-expired", text, "compile the mission again, which issues it anew")
+    return None
 
 
 def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
@@ -117,8 +142,9 @@ def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -
         raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
 
 
-def give_back(state: Path, loaded: Loaded, flight: Flight) -> str | None:
-    """After a run that ended with nothing sent: its bundle may be handed in again; that, in words. None if it was used.
+def give_back(state: Path, loaded: Loaded, flight: Flight, now: Now) -> str | None:
+    """After a run that ended with nothing sent: its bundle may be handed in again, unless it expired meanwhile; that,
+    in words. None if it was used.
 
     A run that was killed, or ended by a fault, gives nothing back: what it sent is not known.
     """
@@ -128,4 +154,7 @@ def give_back(state: Path, loaded: Loaded, flight: Flight) -> str | None:
         FileReplayStore(state, loaded.vehicle).give_back(loaded.bundle.mission_digest)
     except OSError as error:
         return f"nothing was sent, but the bundle counts as flown: {error.strerror or error}"
+    late = expired(loaded, now)
+    if late is not None:
+        return f"nothing was sent, and {late.text}; {late.help}"
     return "nothing was sent: the bundle may be handed in again"

@@ -126,11 +126,18 @@ class Ground:
         self.program = commands.program(folder / "rtshcua")
         self.started: list[Run] = []
 
-    def bundle(self, steps: Sequence[Invocation] | None = None, name: str = "flight", return_mm: int = case.LOW) -> str:
-        """A bundle issued now, of these steps or else the low ones; its file's name. 0: any height to return at."""
+    def bundle(
+        self, steps: Sequence[Invocation] | None = None, name: str = "flight", return_mm: int = case.LOW, *,
+        age_s: int = 0,
+    ) -> str:  # fmt: skip
+        """A bundle issued now, or so long ago, of these steps or else the low ones; its file's name. 0: any height to
+        return at.
+        """
         mission_key = self.store.signing_key(Duty.MISSION, whose="agent")
         keys = {Duty.POLICY: self.store.signing_key(Duty.POLICY), Duty.MISSION: mission_key}
-        mission = case.mission(case.low_steps() if steps is None else steps, time.time_ns() // 1_000)
+        mission = case.mission(
+            case.low_steps() if steps is None else steps, time.time_ns() // 1_000 - age_s * 1_000_000
+        )
         policy = case.policy()
         policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=return_mm))
         (self.folder / f"{name}.bundle").write_bytes(case.seal(mission, policy, keys))

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from rtshcua.adapters import utc
 from rtshcua.cli import meeting
 from rtshcua.cli.app import main
 
@@ -32,6 +33,22 @@ def refused(capfd: Any, *words: str) -> tuple[int, str]:
     assert err.startswith("error[")
     assert out == ""
     return code, err
+
+
+@pytest.mark.parametrize("words", [(), ("--dry-run",), ("--connect", "PORT", *IDENTITY), ("--wait",)])
+def test_a_bundle_that_expired_begins_nothing_where_the_time_is_known(
+    ground: Any, capfd: Any, port: int, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    """Before a vehicle is looked for; one that is waited with says the policy alone, and may be of any age."""
+    monkeypatch.setattr(utc, "kernel_error_us", lambda: 1_000)
+    monkeypatch.setattr("rtshcua.cli.launch._simulate", None)
+    if words == ("--wait",):
+        words = ("--connect", "PORT", *IDENTITY, "--mode", "software", "--wait", "--agent-socket", "agents")
+    link = [f"udpin:127.0.0.1:{port}" if word == "PORT" else word for word in words]
+    code, err = refused(capfd, ground.bundle(age_s=100_000), *link)
+    said = ("no heartbeat", 8) if "--wait" in words else ("the bundle expired at 2", 5)
+    assert (said[0] in err, code) == (True, said[1]), err
+    assert ("compile the mission again" in err) == (code == 5)
 
 
 def test_no_vehicle(ground: Any, capfd: Any, port: int) -> None:

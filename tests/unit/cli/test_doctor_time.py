@@ -7,11 +7,14 @@ from typing import Any
 
 import pytest
 
+from reference.flat_case import MISSION, POLICY
+from reference.world import START
 from rtshcua.adapters.boundary_process import BoundaryError
 from rtshcua.adapters.utc import TimeOfDay
 from rtshcua.cli import doctor
 from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import TIME
 from rtshcua.wire.clock import Source
 
@@ -71,3 +74,19 @@ def test_a_boundary_that_listens_is_told_in_its_own_command_line(capsys: pytest.
     words = ["doctor", "--connect", "udpin:127.0.0.1:1", "--utc-error", "1s", "--boundary-socket", str(SOCKET)]
     assert main(words) == ExitCode.USAGE
     assert "its own command line" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("time", "stops"),
+    [
+        (TimeOfDay(20_000), True),
+        (TimeOfDay(None, stated_us=500_000), True),
+        (TimeOfDay(20_000, stated_us=1 << 50), True),
+        (TimeOfDay(None), False),
+    ],
+)
+def test_a_mission_that_expired_stops_where_the_time_is_known(time: TimeOfDay, stops: bool) -> None:
+    later = Now(START.monotonic_us, START.utc_us + (1 << 40), START.utc_error_us)
+    found = doctor._expired(POLICY, MISSION, later, time)
+    assert [each.slug for each in found] == ["mission/expired"] * stops
+    assert doctor._expired(POLICY, MISSION, START, time) == []

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.flat_case import MISSION, POLICY
-from reference.world import VEHICLE, loaded
+from reference.world import START, VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files import replay
 from rtshcua.adapters.files.replay import FileReplayStore
@@ -21,6 +21,7 @@ from rtshcua.cli import launch, opening
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.signal import SignalSource
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 
 LATER = 1 << 52  # us
 
@@ -179,11 +180,34 @@ class Over:
 
 def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Path) -> None:
     opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
-    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)))
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
     assert told == "nothing was sent: the bundle may be handed in again"
     opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
-    assert opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True))) is None
+    assert opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True)), START) is None
     assert opening.flown_before(tmp_path, loaded()) is not None
+
+
+def late(us: int) -> Now:
+    """So long after the first moment at which a step of the mission may not begin any more."""
+    end_us = min(each.invocation.issued_at_us + each.invocation.contract.validity_us for each in loaded().invocations)
+    return Now(START.monotonic_us, end_us + START.utc_error_us + us, START.utc_error_us)
+
+
+def test_a_bundle_that_expired_is_said_to_have_and_may_not_be_handed_in_again(tmp_path: Path) -> None:
+    refusal = opening.expired(loaded(), late(1))
+    assert refusal is not None
+    assert refusal.slug == "bundle-expired"
+    assert "the bundle expired at 2" in refusal.text
+    assert "compile the mission again" in refusal.help
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), late(1))
+    assert told == f"nothing was sent, and {refusal.text}; {refusal.help}"
+
+
+def test_a_bundle_that_may_be_fresh_still_is_no_expired_one() -> None:
+    assert opening.expired(loaded(), late(0)) is None
+    unknown = replace(late(1 << 40), utc_error_us=UTC_UNKNOWN_US)
+    assert opening.expired(loaded(), unknown) is None, "nobody knows the time of day"
 
 
 def test_a_disk_that_does_not_give_a_bundle_back_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,6 +217,6 @@ def test_a_disk_that_does_not_give_a_bundle_back_is_told(tmp_path: Path, monkeyp
         raise OSError(30, "read-only file system")
 
     monkeypatch.setattr(FileReplayStore, "give_back", fails)
-    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)))
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
     assert told == "nothing was sent, but the bundle counts as flown: read-only file system"
     assert opening.flown_before(tmp_path, loaded()) is not None

@@ -449,15 +449,47 @@ def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> Answere
 
 def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
     """The id of the flight that listens at `path`, as it says itself. Raises OSError."""
-    said = _asked(path, b"", lambda said: said.type == "hello", patience_s)
+    return _named(_asked(path, b"", lambda said: said.type == "hello", patience_s), path)
+
+
+def _flight_of(line: bytes, path: Path) -> bytes:
+    """The id of a flight, by the first line that it says. Raises OSError where that is another."""
+    said = _told(line)
+    if said.type != "hello":
+        raise ConnectionError("what listens there is no flight: it does not say first who it is")
+    return _named(said, path)
+
+
+def _named(said: _Line, path: Path) -> bytes:
     if _FLIGHT.fullmatch(said.flight) is None:
         raise ConnectionError(f"what listens at `{path}` says no id of a flight")
     return bytes.fromhex(said.flight)
 
 
+class _Told:
+    """Lines out of octets as they come from whoever listens; none is looked through twice."""
+
+    def __init__(self) -> None:
+        self.longest = LONGEST_TOLD
+        self._rest = bytearray()
+
+    def take(self, chunk: bytes) -> list[bytes]:
+        """The lines that end in it, without their ends. Raises OSError where one does not end."""
+        first, *more = chunk.split(b"\n")
+        self._rest += first
+        if len(self._rest) > self.longest:
+            raise ConnectionError("what listens there is no flight: its line does not end")
+        if not more:
+            return []
+        lines = [bytes(self._rest), *more[:-1]]
+        self._rest = bytearray(more[-1])
+        return lines
+
+
 class FlightFollower:
     """A connection that stays: what the flight at `path` tells, and what is handed in to it. Raises OSError where none
-    listens, or it does not say which flight it is, for so long. From then on it waits for nothing.
+    listens, or its first line does not say which flight it is, for which it has so long in all. From then on nothing is
+    waited for.
     """
 
     def __init__(self, path: Path, *, patience_s: float = 10.0) -> None:
@@ -465,18 +497,14 @@ class FlightFollower:
         self._path = path
         self._unsent = bytearray()
         self._link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._waiting = b""
-        self._ahead: list[bytes | Answered] = []
+        self._lines = _Told()
         #: the id of the flight, as it says itself
         self.flight = b""
+        until_s = time.monotonic() + patience_s
         try:
             _connect(self._link, path, patience_s)
-            self._link.settimeout(patience_s)
-            while not self.flight:
-                told = self.receive()
-                if told is None:
-                    raise ConnectionResetError(errno.ECONNRESET, "the flight hung up", str(path))
-                self._ahead += told
+            self._ahead = self._first(until_s)
+            self.flight = _flight_of(self._ahead[0], path)
             self._link.setblocking(False)
         except BaseException:
             self._link.close()
@@ -486,31 +514,38 @@ class FlightFollower:
         """The descriptor to wait for before `receive`."""
         return self._link.fileno()
 
+    def _first(self, until_s: float) -> list[bytes]:
+        """The first lines, as they come in one piece; it may come in several, and all have but so long."""
+        self._lines.longest = _CHUNK
+        while (left_s := until_s - time.monotonic()) > 0:
+            self._link.settimeout(left_s)
+            chunk = self._link.recv(_CHUNK)
+            if not chunk:
+                raise ConnectionResetError(errno.ECONNRESET, "the flight hung up", str(self._path))
+            lines = self._lines.take(chunk)
+            if lines:
+                self._lines.longest = LONGEST_TOLD
+                return lines
+        raise TimeoutError("the flight did not say which one it is")
+
     def receive(self) -> list[bytes | Answered] | None:
         """What came: records as their lines, and answers; None where the flight hung up. Raises OSError for a peer that
         says what no flight says.
         """
-        if self._ahead and self.flight:
-            ahead, self._ahead = self._ahead, []
-            return ahead
-        try:
-            chunk = self._link.recv(_CHUNK)
-        except BlockingIOError:
-            return []
-        except ConnectionResetError:
-            return None
-        if not chunk:
-            return None
-        *lines, self._waiting = (self._waiting + chunk).split(b"\n")
-        if len(self._waiting) > LONGEST_TOLD:
-            raise ConnectionError("what listens there is no flight: its line does not end")
+        lines, self._ahead = self._ahead, []
+        if not lines:
+            try:
+                chunk = self._link.recv(_CHUNK)
+            except BlockingIOError:
+                return []
+            except ConnectionResetError:
+                return None
+            if not chunk:
+                return None
+            lines = self._lines.take(chunk)
         found: list[bytes | Answered] = []
         for line in lines:
             said = _told(line)
-            if said.type == "hello" and not self.flight:
-                if _FLIGHT.fullmatch(said.flight) is None:
-                    raise ConnectionError(f"what listens at `{self._path}` says no id of a flight")
-                self.flight = bytes.fromhex(said.flight)
             found.append(Answered(said.slug, said.text) if said.type == "answer" else line + b"\n")
         return found
 
@@ -569,19 +604,16 @@ def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_
         _connect(link, path, max(until_s - time.monotonic(), AGAIN_S))
         link.settimeout(max(until_s - time.monotonic(), AGAIN_S))
         link.sendall(line)
-        waiting = b""
+        told = _Told()
         while (left_s := until_s - time.monotonic()) > 0:
             link.settimeout(left_s)
             chunk = link.recv(_CHUNK)
             if not chunk:
                 raise ConnectionResetError("the flight hung up: it is over, or it did not take the document")
-            *lines, waiting = (waiting + chunk).split(b"\n")
-            for each in lines:
+            for each in told.take(chunk):
                 said = _told(each)
                 if wanted(said):
                     return said
-            if len(waiting) > LONGEST_TOLD:
-                raise ConnectionError("what listens there is no flight: its line does not end")
     raise TimeoutError("the flight did not answer")
 
 

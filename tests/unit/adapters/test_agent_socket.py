@@ -7,7 +7,7 @@ import stat
 import threading
 from base64 import b64encode
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import count, repeat
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from rtshcua.adapters.agent_socket import (
     MOST_WAITING,
     AgentSocket,
     Answered,
+    FlightFollower,
     Peer,
     SocketTaken,
     flight_at,
@@ -389,6 +390,66 @@ def test_a_client_of_what_is_no_flight(folder: Path, monkeypatch: pytest.MonkeyP
         with pytest.raises(ConnectionError, match=found):
             flight_at(folder / "s")
         thread.join(10)
+
+
+@contextmanager
+def listener(folder: Path, *says: bytes, every_s: float = 0.0) -> Iterator[Path]:
+    """Somebody who listens and says these, one after the other, until who connected hangs up."""
+    over = threading.Event()
+
+    def serve() -> None:
+        link, _ = door.accept()
+        with link, suppress(OSError):
+            for each in says:
+                link.sendall(each)
+                if over.wait(every_s):
+                    return
+            link.recv(1)
+
+    with socket.socket(socket.AF_UNIX) as door:
+        door.bind(str(folder / "l"))
+        door.listen()
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            yield folder / "l"
+        finally:
+            over.set()
+            thread.join(10)
+
+
+def test_a_follower_of_what_never_says_which_flight_it_is_waits_so_long_in_all(folder: Path) -> None:
+    """However often something comes."""
+    with listener(folder, *[b" "] * 1_000, every_s=0.01) as path, pytest.raises(TimeoutError):
+        FlightFollower(path, patience_s=0.1)
+
+
+@pytest.mark.parametrize(
+    ("says", "found"),
+    [
+        ((b'{"a":1}\n' * 8_000,) * 50, "does not say first who it is"),
+        ((b'{"type":"effect"}\n{"type":"hello","flight":"' + b"ab" * 16 + b'"}\n',), "does not say first who it is"),
+        ((b" " * 65_536,) * 50, "its line does not end"),
+        ((b'{"type":"hello"}\n',), "says no id of a flight"),
+    ],
+    ids=["a flood", "a late hello", "no end", "no id"],
+)
+def test_a_follower_of_what_is_no_flight(folder: Path, says: tuple[bytes, ...], found: str) -> None:
+    with listener(folder, *says) as path, pytest.raises(ConnectionError, match=found):
+        FlightFollower(path)
+
+
+def test_a_follower_hears_what_came_with_the_first_line_and_a_long_line_in_pieces(folder: Path) -> None:
+    hello = b'{"type":"hello","flight":"' + b"ab" * 16 + b'"}\n'
+    long = b'{"type":"mission","x":"' + b"x" * 300_000 + b'"}\n'
+    answer = b'{"type":"answer","id":1,"slug":"accepted","text":"well"}\n'
+    heard: list[bytes | Answered] = []
+    says = (hello[:9], hello[9:] + long[:1000], long[1000:], answer + answer[:9])
+    with listener(folder, *says, every_s=0.01) as path, FlightFollower(path) as follower:
+        assert follower.flight == b"\xab" * 16
+        while len(heard) < 3:
+            heard += follower.receive() or []
+    assert heard == [hello, long, Answered("accepted", "well")]
 
 
 def test_a_client_of_nobody(folder: Path) -> None:

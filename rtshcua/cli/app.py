@@ -133,8 +133,11 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
     path = context.command_path if context is not None else f"rtshcua {row.name}"
     words = words.replace("Value error, ", "")  # typer's words for what an enumeration does not have
     words = words.replace(": Input should", ": it should")
+    words = words.replace("a valid integer, unable to parse string as an integer", "a whole number")
     words, _, near = words.partition(" (Possible options: ")
-    words = f"{words}; did you mean {near.rstrip(')')}?" if near else words
+    near = _meant(words, getattr(context, "command", None)) or near.rstrip(")")
+    words = words.partition(" Did you mean ")[0].rstrip(".") if near else words
+    words = f"{words}; did you mean {near}?" if near else words
     words = words[:1].lower() + words[1:]
     verb = re.fullmatch(r"no such command '(.*?)'(?:\. Did you mean (.*?))?\??", words, re.DOTALL)
     if verb is not None:
@@ -148,6 +151,18 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
         return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, help)
     usage = None if context is None else context.get_usage().removeprefix("Usage: ")
     return fail(ExitCode.USAGE, words, help, usage=usage)
+
+
+def _meant(words: str, command: object) -> str:
+    """What was probably meant by an option that ends as others do, or by a word that is none of those accepted."""
+    from rtshcua.diagnostics.suggest import nearest
+
+    chosen = re.search(r"'([^']*)' is not one of (.+)$", words)
+    if chosen is not None:
+        return nearest(chosen[1], re.findall("'([^']*)'", chosen[2])) or ""
+    option = re.match(r"[Nn]o such option: --([a-z-]+)", words)
+    known = [each for parameter in getattr(command, "params", ()) for each in parameter.opts]
+    return "" if option is None else " or ".join(each for each in known if each.endswith(f"-{option[1]}"))
 
 
 def overview(*, bold: bool) -> str:

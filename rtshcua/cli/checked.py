@@ -84,7 +84,10 @@ def check_sources(
 
 def _tell(found: Found, since: Path | None, now_us: int) -> None:
     """What is said of sources in which nothing is wrong."""
+    empty = [name for name, source in found.sources.items() if not source.text.strip()]
     out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
+    for name in empty:
+        out(f"note: `{name}` is empty")
     for mission in found.missions:
         out(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
         for line in steps_told(mission.bounds):

@@ -1,6 +1,7 @@
 """`rtshcua explain`: the page of a diagnostic code, and what a finding of `verify-log` means."""
 
 import json
+import re
 import sys
 from textwrap import wrap
 from typing import Annotated
@@ -12,7 +13,7 @@ from rtshcua.cli.pages import read_page
 from rtshcua.cli.stdout import out, out_json, out_rendered
 from rtshcua.diagnostics.codes import REGISTRY, Code
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.suggest import nearest
+from rtshcua.diagnostics.suggest import listed, nearest
 from rtshcua.diagnostics.wrapped import WIDTH
 
 app = typer.Typer(add_completion=False)
@@ -34,6 +35,11 @@ def explain(
     if found is None and "/" in code:
         return _of_log(code, as_json=as_json)
     if found is None:
+        begun = sorted(
+            each for each in REGISTRY if re.fullmatch("[eE][0-9]{1,3}", code) and each.startswith(code.upper())
+        )
+        if begun:
+            return fail(ExitCode.USAGE, f"`{code}` is the beginning of {len(begun)} codes", f"they are {listed(begun)}")
         near = nearest(code, [*REGISTRY, *(each.slug for each in REGISTRY.values())])
         help = f"did you mean `{near}`?" if near is not None else "`rtshcua explain` lists all codes"
         return fail(ExitCode.USAGE, f"there is no code `{code}`", help)

@@ -36,6 +36,7 @@ _INPUT = {
 #: what to do about what is not to be trusted, by slug
 _REMEDIES = {
     "no-keys": "`rtshcua keys init` makes a development root",
+    "malformed": "it was cut off or damaged, or is another kind of file: make it again, or copy it again",
     "exposed": "`chmod 600` it; replace what others may have read: `rtshcua keys replace`, or another passphrase",
 }
 #: of what is refused for another reason than that it is not to be trusted, by slug
@@ -246,7 +247,12 @@ def exit_code_of(error: OSError) -> ExitCode:
 
 def unreadable(error: OSError) -> ExitCode:
     """Fails for what the operating system would not do."""
-    return fail(exit_code_of(error), _words_of(error))
+    text, help = _words_of(error), None
+    if isinstance(error, FileNotFoundError) and isinstance(error.filename, str):
+        from rtshcua.cli.nearby import missing
+
+        text, help = missing(Path(error.filename)) or (text, None)
+    return fail(exit_code_of(error), text, help)
 
 
 def of_each(paths: Iterable[Path], work: Callable[[Path, bool], ExitCode]) -> ExitCode:

@@ -44,6 +44,8 @@ def pin(given: str | None) -> Pin:
         kid = cose.unverified(data, limit=MAX_ROOT).kid
         root = open_root(data, pinned=kid, now_us=0)
     except Untrusted as error:
+        if data.startswith(b"duty: root"):
+            raise Untrusted("no-pin", f"`{path}` is its secret half: give `{path.with_suffix('.trust')}`") from None
         raise Untrusted("no-pin", f"`{path}` is neither a root key nor a trust root: {error}") from None
     return Pin(kid, f"{_kind(root)} in {path}", (data,))
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rtshcua.adapters.store.reading import open_regular, read_regular
-from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, LOG, LOOKED_AT, Kind, recognised
+from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, EMPTY, LOG, LOOKED_AT, Kind, recognised
 from rtshcua.wire.bundle import MAX_BUNDLE
 from rtshcua.wire.untrusted import Untrusted
 
@@ -20,7 +20,8 @@ def kind_of(path: Path) -> Kind | None:
     """What a file is; None where nothing tells, also where it cannot be read."""
     try:
         with open_regular(path) as file:
-            return recognised(file.read(LOOKED_AT), path.name)
+            data = file.read(LOOKED_AT)
+            return recognised(data, path.name) if data else EMPTY
     except OSError:
         return None
 

@@ -38,6 +38,7 @@ PDF: Final = Kind("a PDF document", "sources are plain text")
 HTML: Final = Kind("a web page", "sources are plain text that ends in `.rts`")
 MARKDOWN: Final = Kind("a page of text (Markdown)", "sources end in `.rts`")
 SCRIPT: Final = Kind("a script", "sources end in `.rts`")
+EMPTY: Final = Kind("an empty file", "it was not written whole: make it again, or copy it again")
 ULOG: Final = Kind("a log of PX4 (ULog)", "a run writes `log.jsonl`: name that, or the run's folder")
 DATAFLASH: Final = Kind("a log of ArduPilot (DataFlash)", "a run writes `log.jsonl`: name that, or the run's folder")
 

@@ -28,13 +28,13 @@ def _nearest(word: str, known: frozenset[str], about: str) -> str | None:
     folded = {name.casefold(): name for name in sorted(known)}
     wanted = word.casefold()
     alike = get_close_matches(wanted, list(folded), n=1, cutoff=0.6)
-    if alike and _likeness(wanted, alike[0]) >= TYPO:
+    if alike and likeness(wanted, alike[0]) >= TYPO:
         return folded[alike[0]]
     own, around = _parts(wanted), _parts(about.casefold())
     if any(len(part) >= TELLING for part in own):
         longer = [name for name in folded if own <= _parts(name)]
         if longer:
-            return folded[max(longer, key=lambda name: (len(_parts(name) & around), _likeness(wanted, name)))]
+            return folded[max(longer, key=lambda name: (len(_parts(name) & around), likeness(wanted, name)))]
     if alike:
         return folded[alike[0]]
     shorter = [name for name in folded if len(name) >= TELLING and _parts(name) <= own]
@@ -48,7 +48,8 @@ def listed(names: Iterable[str]) -> str:
     return shown if len(known) <= LISTED else f"{shown} and {len(known) - LISTED} more"
 
 
-def _likeness(one: str, other: str) -> float:
+def likeness(one: str, other: str) -> float:
+    """How much of two words is alike, from 0 to 1."""
     return SequenceMatcher(None, one, other).ratio()
 
 

@@ -12,6 +12,7 @@ from functools import cache
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from attacks.test_frames_ahead import Thief, pack
 from boundary.conftest import boundary as boundary
@@ -22,6 +23,8 @@ from reference.forgery import ROOT_KEY, edit, expect, read, signed, sound
 from reference.kept_frames import Entries, kept
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.flavour import Stage
+from rtshcua.evidence.reading import read as decoded
+from rtshcua.evidence.records import Effect
 from rtshcua.ground.auditor.audit import Auditor
 from rtshcua.ground.auditor.frames import OURS, Frames
 from rtshcua.ground.auditor.sent import Nature, nature
@@ -198,9 +201,49 @@ def test_a_frame_that_left_is_found_beside_a_log_that_says_that_nothing_did(atte
     sent = read(lines[where(lines, "dispatched")[1]])["utc_us"]
     moving = next(octets for at_us, octets in entries if at_us >= sent and is_motion(octets))
     began, over = read(lines[first])["utc_us"], read(lines[unsent])["utc_us"]
-    for at_us in (began + 1, over - 1):
+    for at_us in (began, began + 1, over - 1):
         beside = sorted([*entries, (at_us, moving)], key=lambda entry: entry[0])
         assert judged(lines, beside) == "frames/was-sent", at_us
+
+
+def test_a_frame_of_the_microsecond_in_which_a_step_ended_is_found_too() -> None:
+    """It was allowed until then; the record which says that nothing was sent comes later."""
+    lines, entries = tried_twice(False)
+    (failed,), again = where(lines, "failed"), read(lines[where(lines, "dispatched")[1]])["utc_us"]
+    sent = next(octets for at_us, octets in entries if at_us >= again and is_motion(octets))
+    ended = read(lines[failed])["utc_us"] - 1_000
+    earlier = [*lines[:failed], edit(lines[failed], utc_us=ended), *lines[failed + 1 :]]
+    beside = sorted([*entries, (ended, sent)], key=lambda entry: entry[0])
+    assert judged(signed(earlier), list(entries)) is None
+    assert judged(signed(earlier), beside) == "frames/was-sent"
+
+
+def test_a_frame_that_may_be_the_step_before_is_held_against_none() -> None:
+    """Two dispatches of one target in one microsecond, of which the first ended then: its frame may be either's."""
+    lines, entries = tried_twice(False)
+    up, (failed,), (unsent,) = where(lines, "dispatched")[0], where(lines, "failed"), where(lines, "refused")
+    frames = Frames(iter(()))
+    auditor = Auditor(ROOT_KEY, frames=frames)
+    for line in lines:
+        auditor.take(line)
+    dispatched, ended, withdrawn = (effect(lines[number]) for number in (up, failed, unsent))
+    sent = next(octets for at_us, octets in entries if at_us >= dispatched.utc_us and is_motion(octets))
+    for first, slug in ((True, None), (False, "frames/was-sent")):
+        beside = Frames(iter([*(each for each in entries if each[0] < dispatched.utc_us), (dispatched.utc_us, sent)]))
+        beside.begin(frames._basis)  # type: ignore[arg-type]
+        if first:
+            beside.happened(replace(dispatched, utc_us=dispatched.utc_us - 1, token=7))
+            beside.happened(replace(dispatched, utc_us=dispatched.utc_us, token=7, event="succeeded"))
+        for each in (dispatched, ended, withdrawn):
+            beside.happened(each)
+        found = beside.over()
+        assert (found and found.slug) == slug
+
+
+def effect(line: bytes) -> Effect:
+    record = decoded(line)
+    assert isinstance(record, Effect)
+    return record
 
 
 def is_motion(octets: bytes) -> bool:

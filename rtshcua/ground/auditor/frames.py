@@ -67,6 +67,7 @@ class _Running(NamedTuple):
     token: int
     since_us: int
     record: int
+    before: tuple[Target, ...]  # what was allowed until that very moment
 
 
 class _Allowed(NamedTuple):
@@ -167,7 +168,8 @@ class Frames:
         self._types: dict[int, float] = {}  # FENCE_TYPE
         self._listed: tuple[Listed, ...] = ()  # the parameters that may be written
         self._running: _Running | None = None
-        self._left: _Suspect | None = None  # the first frame that carries out what was dispatched last
+        self._latest: _Running | None = None  # what was dispatched last, whether it runs or not,
+        self._left: _Suspect | None = None  # and the first frame that carries it out
         self.begun = False
         self._changed_us = -1  # when the last record was made,
         self._before = _Allowed()  # and what was allowed until that moment, or since then until a later record of it
@@ -233,8 +235,8 @@ class Frames:
         if suspect is not None:
             early = self._any(suspect.frame, targets)
             self._finding = _early(suspect, record.utc_us, record.seq) if early else _unrecorded(suspect)
-        self._running = _Running(targets, record.token, record.utc_us, record.seq)
-        self._left = None
+        self._running = _Running(targets, record.token, record.utc_us, record.seq, self._before.targets)
+        self._latest, self._left = self._running, None
         self.begun = True
 
     def _targets(self, record: Effect) -> tuple[Target, ...]:
@@ -299,8 +301,15 @@ class Frames:
             self._suspect = suspect
         elif running is not None and entry.at_us < running.since_us:  # frames do not stand in the order of their times
             self._finding = _early(suspect, running.since_us, running.record)
-        elif running is not None and entry.at_us > running.since_us and self._left is None:
-            self._left = suspect if self._any(frame, running.targets) else None
+        elif self._left is None and self._carries_out_the_latest(frame, entry.at_us):
+            self._left = suspect
+
+    def _carries_out_the_latest(self, frame: Frame, at_us: int) -> bool:
+        """Whether a frame is part of what was dispatched last, and of nothing that was allowed until that moment."""
+        latest = self._latest
+        if latest is None or not self._any(frame, latest.targets):
+            return False
+        return at_us > latest.since_us or (at_us == latest.since_us and not self._any(frame, latest.before))
 
     def _set(self, frame: Frame, entry: _Entry, allowed: _Allowed) -> None:
         """Judges a write of a parameter: it is listed, and the vehicle stands; or it switches a fence on, before."""

@@ -106,6 +106,10 @@ class Hindered(Event, frozen=True):
     text: str
 
 
+#: what showed a takeover: it stands still far from its target, and nothing else tells who flies it
+PAUSED: Final = "paused"
+
+
 class TakenOver(Event, frozen=True):
     """Someone else flies the vehicle now: the pilot, a ground station, or the autopilot's own failsafe. They win.
 

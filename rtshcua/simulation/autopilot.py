@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import StrEnum
 from functools import partial
-from math import sin
+from math import inf, sin
 from random import Random
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
@@ -241,6 +241,7 @@ class Autopilot:
             land_speed=flavour.handling.land_speed if config.land_mm_s is None else config.land_mm_s / 1000,
         )  # fmt: skip
         self.vehicle = Vehicle(handling, flavour.modes.start)
+        self.vehicle.ceiling = inf if config.ceiling_mm is None else config.ceiling_mm / 1000
         self.parameters = Parameters(flavour.parameters, handling, flavour.bytewise)
         for name in SYSTEM_PARAMETERS:
             self.parameters.assign(name, config.system)

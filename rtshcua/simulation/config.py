@@ -103,6 +103,8 @@ class SimulationConfig:
     """How long a full battery hovers."""
     cruise_mm_s: int = 5_000
     max_speed_mm_s: int = 12_000
+    ceiling_mm: int | None = None
+    """It rises no higher above home than this: too heavy, its motors weak, or a fence above (FENCE_ALT_MAX)."""
     return_mm: int = 30_000
     """The height above home that a return climbs to, as its owner has set it; ArduCopter comes with 15 m."""
     land_mm_s: int | None = None

@@ -101,6 +101,8 @@ class Vehicle:
         self.crashed = False
         self.touched_m_s = 0.0  # how fast it last came down on the ground
         self.paused = False
+        self.ceiling = inf
+        """It rises no higher, in m."""
         """Whether it stands still on its way to a target, until told to go on (ArduCopter)."""
         self._stood_s = 0.0  # since it was armed, or came down
         self._lifting_s: float | None = None  # until the motors carry it, if it is to lift off
@@ -475,7 +477,10 @@ class Vehicle:
             self.events.append(Event.HOME)
 
     def _climb_rate(self, north: float, east: float) -> float:
-        """Upwards; (north, east) is the target as it is steered to."""
+        """Upwards, as far as it can; (north, east) is the target as it is steered to."""
+        return min(self._wanted_climb(north, east), max(self.ceiling - self.body.up, 0.0))
+
+    def _wanted_climb(self, north: float, east: float) -> float:
         activity, body = self._activity, self.body
         if activity is _CRUISE:
             return self._velocity[2] if self._waiting_s > 0 else 0.0

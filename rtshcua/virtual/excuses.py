@@ -8,7 +8,8 @@
 | `battery` | a collision, coming down too hard | the battery was made empty, and is |
 | `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
 | `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | ArduCopter's pause until it stands, or near an end; a velocity in its takeoff |
+| `unseen` | motion after a takeover | ArduCopter's pause until it stands, or near an end |
+| `unseen` | motion after a takeover | a velocity or a pause in its takeoff |
 | `unseen` | motion after a takeover | a go-to in its takeoff to where that ends |
 | `unseen` | motion after a takeover | sticks that nudge; PX4's pause in a stop, or a climb's end |
 | `unseen` | motion after a takeover | the mode is the one that our last frame asked for, which was lost |

@@ -591,6 +591,7 @@ class Driver:
         if what is None or message.result not in others.GRANTED:
             return
         self._aids.query.commanded(now_us)
+        self._aids.granted_us = self.seen.up_us
         self._tell_crossed(f"{message.target_system}/{message.target_component} was granted {what}", now_us, events)
 
     def _tell_crossed(self, what: str, now_us: int, events: list[Event]) -> None:

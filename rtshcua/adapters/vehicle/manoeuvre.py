@@ -29,7 +29,7 @@ from rtshcua.adapters.vehicle.supervision import (
 )
 from rtshcua.adapters.vehicle.suspicion import CROSSED_US, Contradictions, Suspicion
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Command, Event, Failed, Hindered, Obeyed, Succeeded, TakenOver
+from rtshcua.onboard.ports import PAUSED, Command, Event, Failed, Hindered, Obeyed, Succeeded, TakenOver
 
 RETRY_US = 1_000_000
 RETRIES = 5
@@ -360,12 +360,16 @@ class Aids:
         self.contradictions = Contradictions()
         self.sent_us: int | None = None
         """When a frame that moves the vehicle last left, in link time."""
+        self.granted_us: int | None = None
+        """When somebody else was last told that the vehicle does what makes it fly otherwise, in link time."""
         self._clock = clock
         self._signed = signed
 
     def is_near_ours(self, up_us: int) -> bool:
-        """Whether a frame of ours may have undone by now what a report shows."""
-        within_us = CROSSED_US * self.commander.slack + self.trip_us
+        """Whether a frame of ours may have undone by now what a report shows. A round trip counts no longer than
+        reports would ever do: on a link without a key anybody may make it seem long.
+        """
+        within_us = CROSSED_US * self.commander.slack + min(self.trip_us, self.flavour.mode_within_us)
         return self.sent_us is not None and up_us - self.sent_us <= within_us
 
     @property
@@ -423,7 +427,7 @@ class Manoeuvre:
         if seen.mode is not None:
             before = before - {seen.mode} if self._suspected is not None else before | {seen.mode}
         self._before = before
-        self._began_in = seen.mode
+        self._began_in, self._began_us = seen.mode, seen.up_us
         self._modes: frozenset[int] = frozenset()
         self._was_landing = seen.landing and doubted != "landing"
         self._taken = False
@@ -491,7 +495,7 @@ class Manoeuvre:
         reason = self._failure(seen) if self._left else self._left_its_place(seen)
         if reason in _GETS_NOWHERE and self._is_kept(seen, now_us):
             self.over = self._taken = True
-            return [], [TakenOver(now_us, "paused")]
+            return [], [TakenOver(now_us, PAUSED)]
         if reason in _AS_IF_OTHERS_FLEW and self._aids.contradictions.stand(now_us):
             self.over = self._taken = True
             return [], [TakenOver(now_us, self._aids.suspicion.how or "two speak")]
@@ -710,23 +714,32 @@ class Manoeuvre:
             return None
         if not self._names_target(seen):  # in a climb it names none
             paused = self.command.kind == MotionKind.CLIMB and self._is_paused(seen, now_us)
-            return "paused" if paused else None
+            return PAUSED if paused else None
         if self._aids.named.is_gone(seen, now_us, self._aids.query.asked):
             return "no target"
-        return "paused" if self._is_paused(seen, now_us) else None
+        return PAUSED if self._is_paused(seen, now_us) else None
 
     def _is_paused(self, seen: ObservedVehicle, now_us: int) -> bool:
-        return self._pause is not None and self._pause.is_paused(seen, self._way_left(seen), now_us)
+        pause = self._pause
+        return pause is not None and pause.is_paused(seen, self._way_left(seen), now_us, granted=self._was_granted)
+
+    @property
+    def _was_granted(self) -> bool:
+        """Whether somebody else was told since this began that the vehicle obeys him."""
+        granted_us = self._aids.granted_us
+        return granted_us is not None and granted_us >= self._began_us
 
     def _is_kept(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether somebody keeps it where it is for longer than any reason of its own would: it never set off, though
-        it says that it flies there, or it rises no further, however little is missing. What never rose at all may be
-        without propellers, and is to be told to land.
+        it says that it flies there, or it rises no further, however little is missing, and it shows that somebody is
+        why. Its weight, weak motors or a fence keep it down as well, and then it would be left in the air with nobody
+        who flies it. What never rose at all may be without propellers, and is to be told to land.
         """
         if self.command.kind == MotionKind.CLIMB:
             rose = self._progress is not None and self._progress.shown
             kept = stands_idly(seen, self._way_left(seen), now_us, far=0, climb=True)
-            return rose and kept and self._flavour.names_targets
+            shows = self._was_granted or (self._pause is not None and self._pause.flies_aside(seen))
+            return rose and kept and shows and self._flavour.names_targets
         return self._names_target(seen) and stands_idly(seen, self._way_left(seen), now_us)
 
     def _way_left(self, seen: ObservedVehicle) -> tuple[int, ...] | None:

@@ -300,6 +300,8 @@ class NamedTargetWatch:
 STANDS_US: Final = 1_500_000
 #: mm/s: it moved, if it was as fast as this,
 MOVED: Final = 1_500
+#: us of link time that it must fly to the side in its climb, where it rises no further;
+ASIDE_US: Final = 2_500_000
 #: mm: and it is far from its target, where it would not slow down by itself;
 FAR: Final = 10_000
 #: mm: or from the height of its climb;
@@ -316,28 +318,48 @@ class PauseWatch:
 
     ArduCopter's DO_PAUSE_CONTINUE takes 3 s from 5.6 m/s (recorded). Wind makes it lean, an obstacle is seen ahead, at
     the end of a leg it is near its target, and without a position nothing is known. `climb`: it is to get higher, and
-    names no target, so somebody else's velocity is seen to be flown in the same way: it rises no further.
+    names no target, so somebody else's velocity is seen by that it flies to the side and rises no further. That it
+    rises no further shows nothing alone: its weight, weak motors or a fence above keep it down as well.
     """
 
     def __init__(self, *, climb: bool = False) -> None:
         self._far, self._climb = FAR_BELOW if climb else FAR, climb
         self._moved = False
         self._since_us: int | None = None
+        self._aside_us: int | None = None  # since when it moved to the side in a climb, and rose no further
 
     @property
     def due_us(self) -> int:
         """When it will have stood for long enough, in link time, unless something is seen before."""
         return NEVER if self._since_us is None else self._since_us + STANDS_US
 
-    def is_paused(self, seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int) -> bool:
-        """Whether it stands so since it moved; `left` is how far its target is."""
+    def is_paused(
+        self, seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int, *, granted: bool = False
+    ) -> bool:
+        """Whether it stands so since it moved; `left` is how far its target is. `granted`: somebody else was told that
+        it obeys.
+        """
         self._moved = self._moved or (seen.speed is not None and seen.speed >= MOVED)
-        if not self._moved or not stands_idly(seen, left, now_us, self._far, climb=self._climb):
+        idle = stands_idly(seen, left, now_us, self._far, climb=self._climb)
+        if self._climb:
+            level = stands_idly(seen, left, now_us, 0, climb=True)
+            if not level or still(seen):
+                self._aside_us = None
+            elif self._aside_us is None:
+                self._aside_us = seen.speed_us
+            if idle and self.flies_aside(seen):
+                return True
+            idle = idle and granted
+        if not self._moved or not idle:
             self._since_us = None
             return False
         if self._since_us is None:
             self._since_us = seen.speed_us
         return seen.speed_us - self._since_us >= STANDS_US
+
+    def flies_aside(self, seen: ObservedVehicle) -> bool:
+        """Whether it moved to the side all the while in its climb, and rose no further: no climb of its own does."""
+        return self._aside_us is not None and seen.speed_us - self._aside_us >= ASIDE_US
 
 
 def stands_idly(

@@ -17,14 +17,23 @@ _WHY: Mapping[Ending, str] = {
 }
 _ENDS: Final = "this run is over, and nothing watches it any more"
 OWN_FAILSAFE: Final = "its own failsafe flies it, so this run sends nothing more and stops watching"
+#: for nothing else shows who it was
+PAUSED: Final = (
+    "it stands far from its target as if somebody had paused it, so this run sends nothing more and stops watching; if "
+    "nobody did, nobody flies it: take it over"
+)
 RESTS: Final = "it says that it rests on the ground, and it obeyed a command and was not seen to land"
 
 
-def may_fly(ending: Ending, last_seen: str, *, failsafe: bool = False, rests: bool = False) -> str:
+def may_fly(
+    ending: Ending, last_seen: str, *, failsafe: bool = False, paused: bool = False, rests: bool = False
+) -> str:
     """That the vehicle may be flying, where it was last seen, and why nothing watches it. `failsafe`: its own flies it.
-    `rests`: it says that it lies on the ground, disarmed.
+    `paused`: that it stands is all that shows who flies it. `rests`: it says that it lies on the ground, disarmed.
     """
     if rests:
         return f"{RESTS}: approach it as one that may start"
-    why = OWN_FAILSAFE if failsafe and ending is Ending.STOOD_DOWN else _WHY.get(ending, _ENDS)
+    why = _WHY.get(ending, _ENDS)
+    if ending is Ending.STOOD_DOWN and (failsafe or paused):
+        why = OWN_FAILSAFE if failsafe else PAUSED
     return f"{last_seen}; the vehicle may be flying: {why}"

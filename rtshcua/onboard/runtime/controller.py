@@ -458,12 +458,12 @@ class MissionController:
             self._fallback.land()
             self.stage = _FALLING
 
-    def stand_down(self, now: Now, ending: Ending, *, failsafe: bool = False) -> None:
-        """Send nothing more, whatever flies, and end. `failsafe`: the autopilot's own flies it."""
+    def stand_down(self, now: Now, ending: Ending, *, failsafe: bool = False, paused: bool = False) -> None:
+        """Send nothing more, whatever flies, and end. `failsafe`: the autopilot's own flies it. `paused`: it stands."""
         flies = self.aloft or self.dispatcher.done
         self.dispatcher.release(now)
         if flies and ending is not Ending.CRASHED:
-            self.may_fly = may_fly(ending, self.vehicle.last_seen, failsafe=failsafe)
+            self.may_fly = may_fly(ending, self.vehicle.last_seen, failsafe=failsafe, paused=paused)
         self._journal.effect(now, "stood-down", detail=self.may_fly or self.vehicle.last_seen)
         self._end(now, ending)
 

@@ -227,7 +227,8 @@ class EventHandler:
         failsafe = isinstance(event, TakenOver) and event.failsafe
         how = f"by its own failsafe: {event.how}" if failsafe else event.how
         self._journal.effect(now, "crashed" if crashed else "taken-over", detail=how)
-        self._controller.stand_down(now, Ending.CRASHED if crashed else Ending.STOOD_DOWN, failsafe=failsafe)
+        ending, paused = Ending.CRASHED if crashed else Ending.STOOD_DOWN, event.how == ports.PAUSED
+        self._controller.stand_down(now, ending, failsafe=failsafe, paused=paused)
 
     def _evidence_failed(self, now: Now, reason: str) -> None:
         """Recorded once a gap: the record may fail like the others, and be taken up when the sink can write again."""

@@ -265,6 +265,9 @@ def test_what_another_system_is_granted_after_a_frame_of_ours_is_told_with_it() 
     assert "255/190 was granted a mode" in told
 
 
+#: what ArduCopter answers a ground station that pauses it
+PAUSED = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0, 0, 0, 255, 190)
+
 CLIMBING = {
     **TAKEOVERS,
     "go-to beside": lambda at_us: PilotGoto(at_us, 0, 12_000, 20_000),
@@ -276,12 +279,13 @@ CLIMBING = {
 @pytest.mark.parametrize("height", [3_000, 17_800])
 def test_a_takeover_in_a_climb_is_seen_and_not_fought(flavour: str, name: str, height: int) -> None:
     """ArduCopter has no target to report in a takeoff (recorded), PX4 the same one from its first to its last moment.
-    ArduCopter's pause shows in nothing but its motion.
+    ArduCopter's pause shows in its motion, and that it is a pause by the answer to who gave it.
     """
     one = copied(climbing(flavour, height))
     sent = Sent(one)
     one.vehicle.simulation.inject(CLIMBING[name](0))
     if (name, flavour) == ("pause", "ardupilot"):
+        one.vehicle._take([Codec(1, 1).pack(PAUSED)], one.events)
         end = one.until((TakenOver, Failed, Succeeded), 30)
         assert isinstance(end, Succeeded if height > 17_000 else TakenOver)
         return
@@ -301,14 +305,29 @@ SLOWLY_UP: dict[str, tuple[Fault, ...]] = {
 @pytest.mark.parametrize("name", SLOWLY_UP)
 @pytest.mark.parametrize(("height", "within_s"), [(500, 13), (5_000, 5), (15_000, 13)])
 def test_a_climb_that_somebody_keeps_down_is_left_to_him(name: str, height: int, within_s: float) -> None:
-    """ArduCopter names no target in a takeoff, so only its motion tells. 10 s later it was flown home against him."""
+    """ArduCopter names no target in a takeoff, so that it flies to the side tells, or that somebody was told that it
+    obeys.
+    """
     one = copied(climbing("ardupilot", height))
     sent = Sent(one)
     now_us = one.vehicle.simulation.now_us
     for fault in SLOWLY_UP[name]:
         one.vehicle.simulation.inject(replace(fault, at_us=now_us + fault.at_us))
+    if "pause" in name:
+        one.vehicle._take([Codec(1, 1).pack(PAUSED)], one.events)
     assert isinstance(one.until((TakenOver, Failed, Succeeded), within_s), TakenOver)
     assert sent.at_us == []
+
+
+@pytest.mark.parametrize("ceiling_mm", [7_000, 17_000])
+def test_a_climb_that_nobody_keeps_down_is_not_left_to_nobody(ceiling_mm: int) -> None:
+    """Its weight, weak motors or a fence end it: that was called a pause, and it was left in the air."""
+    one = Flyer("ardupilot", ceiling_mm=ceiling_mm)
+    one.until(Ready)
+    one.begin(MotionKind.CLIMB, altitude=20_000)
+    end = one.until((TakenOver, Failed, Succeeded), 40)
+    assert isinstance(end, Failed), end
+    assert end.reason == "stopped-short"
 
 
 @pytest.mark.parametrize("delay_us", [0, 150 * MS])

@@ -223,6 +223,17 @@ def test_one_forged_frame_ends_no_leg(aloft: Make, name: str, after_s: float) ->
     assert isinstance(end, Succeeded), end
 
 
+def test_answers_that_are_held_back_make_no_forged_frame_count_for_longer(aloft: Make) -> None:
+    """Whoever delays answers to TIMESYNC widened the time in which one frame counts as a takeover."""
+    one = aloft()
+    one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
+    one.wait(2)
+    one.vehicle.driver.source.clock._trips.extend([3 * S] * 8)
+    says(one, FORGED["another mode"](one))
+    end = one.until((Succeeded, Failed, TakenOver, Crashed), 60)
+    assert isinstance(end, Succeeded), end
+
+
 @pytest.mark.parametrize("name", ["motors off", "on the ground"])
 def test_one_forged_frame_ends_no_takeoff(flavour: str, name: str) -> None:
     one = Flyer(flavour)

@@ -13,6 +13,7 @@ from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP, ListeningBo
 from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.files.boundary import BoundaryStore
 from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.files.last_log import SIMULATED
 from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.runs import BUNDLE, LOG, RunFolder
 from rtshcua.adapters.files.signing import LinkKeyError
@@ -174,13 +175,13 @@ def _launch(order: Launch) -> ExitCode:
     witnesses = Witnessing(order.witnesses, trust.root.witnesses(loaded.vehicle, clock.now().utc_us))
     past = None
     if not order.dry_run:
-        past = Past(order.state, loaded.vehicle, log_key.key() if order.boundary_socket is None else None)
+        past = Past(_left_in(order), loaded.vehicle, log_key.key() if order.boundary_socket is None else None)
     with ExitStack() as view:  # it may still be shown when everything else is over
         view.enter_context(breakable())
         with ExitStack() as stack:
             interrupts, tape = stack.enter_context(Interrupts()), Tape()
             sets = None if order.dry_run else bool(order.settings)
-            debts = OwedParameters(order.state, loaded.vehicle, sets=sets)
+            debts = OwedParameters(_left_in(order), loaded.vehicle, sets=sets)
             stack.callback(debts.close)
             slack = max(1, round(order.speed / _UNHURRIED))
             stack.enter_context(_with_the_one_before(past, loaded))
@@ -261,7 +262,7 @@ def _launch(order: Launch) -> ExitCode:
             alone = "" if absent is None else f"{_why(absent)}; it is brought down without a boundary of its own"
             alone += _UNVERIFIABLE if alone and order.boundary_socket is not None else ""
             hangs = "" if resumed else _hanging(past, loaded)
-            told_before = filter(None, [alone, hangs, told, moved, past.note, unsigned, inside.note])
+            told_before = filter(None, dict.fromkeys([alone, hangs, told, moved, past.note, unsigned, inside.note]))
             for note in (*signing.notes, *told_before, *unsure):
                 feed.post(Note(note))
             _keep_what_is_loaded(hurried=resumed)
@@ -304,10 +305,17 @@ class _Begun(NamedTuple):
     agents: Agents | None = None
 
 
+def _left_in(order: Launch) -> Path:
+    """Where it is kept what the flight before left of this vehicle, or of the simulated one that a run starts."""
+    return order.state / SIMULATED if order.link is None else order.state
+
+
 def _hanging(past: Past | None, loaded: Loaded) -> str:
     """What brings down what the flight before may have left in the air; nothing where it ended."""
     if past is None or past.broken_off is None:
         return ""
+    if past.gone:
+        return past.note
     way = f"`rtshcua run {past.broken_off / BUNDLE}` brings down what hangs in the air"
     return f"the flight of `{loaded.vehicle}` before broke off: {way}"
 

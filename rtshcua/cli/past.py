@@ -41,9 +41,14 @@ class Past:
 
     @property
     def broken_off(self) -> Path | None:
-        """The run folder of the flight before, if that did not end its log."""
+        """The run folder of the flight before, if that is not known to have ended its log."""
         log = self._earlier.broken_off
         return None if log is None else log.parent
+
+    @property
+    def gone(self) -> bool:
+        """Whether the log before is not there any more: nobody knows how its flight ended."""
+        return self._earlier.gone
 
     def left(self, bundle: bytes, loaded: Loaded) -> Left | None:
         """What a run of this bundle left the vehicle doing, if the log before is of one; None: nobody knows."""

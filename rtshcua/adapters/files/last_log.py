@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Final, NamedTuple
 from urllib.parse import quote
 
 import msgspec
@@ -19,6 +19,10 @@ from rtshcua.adapters.files.recovery import InUse, Recovered
 from rtshcua.adapters.store.reading import read_if_there
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace
 from rtshcua.evidence.recovery import RECOVERABLE, State
+
+#: the folder, in the state folder, of what simulated vehicles that a run starts itself leave behind: nothing of them
+#: hangs in the air, or has parameters to be put back, when the real one of that identity is connected
+SIMULATED: Final = "simulated"
 
 _LARGEST = 1 << 16  # octets of the file
 
@@ -35,18 +39,21 @@ class _Kept(msgspec.Struct):
 
 class Earlier(NamedTuple):
     """The log before the next one: the hash of its last line, None where there is none or it is not known; what there
-    is to tell of it, empty where all is as it should be; where it lies, if its flight had not ended it; and where it
-    lies, if it may be believed.
+    is to tell of it, empty where all is as it should be; where it lies, if its flight is not known to have ended it;
+    where it lies, if it may be believed; and whether it is gone, so that nobody knows.
     """
 
     last: str | None
     note: str = ""
     broken_off: Path | None = None
     log: Path | None = None
+    gone: bool = False
 
 
 class LastLog:
-    """Remembers the last log of the vehicle called `vehicle` (its identity). One process at a time writes."""
+    """Remembers the last log of the vehicle called `vehicle` (its identity). One process at a time writes. What a
+    simulation of our own leaves lies in a state folder of its own (`SIMULATED` below the other).
+    """
 
     def __init__(self, state: Path, vehicle: str) -> None:
         self.path = state / "logs" / f"vehicle-{quote(vehicle, safe='')}"
@@ -64,6 +71,9 @@ class LastLog:
             return Earlier(known.last, log=log)
         try:
             return _told(log, known.before, recover(log))._replace(broken_off=log)
+        except FileNotFoundError:
+            text = f"the log before, `{log}`, is no longer there: whether its flight ended is not known"
+            return Earlier(None, text, log, gone=True)
         except (OSError, InUse) as error:
             living = isinstance(error, InUse)  # its run flies on, and broke off nowhere
             text = f"the log before, `{log}`, was not closed, nor can it be: {_words(error)}"
@@ -86,7 +96,7 @@ class LastLog:
 def known_end(state: Path, log: Path) -> str | None:
     """The hash of the last line of a log that a vehicle here wrote last, if it was closed; None where nobody knows."""
     where = str(log.resolve())
-    for path in sorted((state / "logs").glob("vehicle-*")):
+    for path in sorted(each for of in (state, state / SIMULATED) for each in (of / "logs").glob("vehicle-*")):
         with suppress(OSError, ValueError):
             known = _remembered(path)
             if known is not None and known.log == where and known.last is not None:

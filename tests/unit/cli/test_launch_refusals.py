@@ -14,14 +14,18 @@ from reference.flat_case import MISSION, POLICY
 from reference.world import START, VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.files import replay
+from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.replay import FileReplayStore
 from rtshcua.adapters.files.signing import LinkStore, write_link_key
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.cli import launch, opening
+from rtshcua.cli.configured import settings_of
+from rtshcua.cli.past import Past
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.signal import SignalSource
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
+from rtshcua.onboard.enforcement.preparation import Owed
 
 LATER = 1 << 52  # us
 
@@ -185,6 +189,39 @@ def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Pat
     opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
     assert opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True)), START) is None
     assert opening.flown_before(tmp_path, loaded()) is not None
+
+
+def test_a_flight_whose_log_is_gone_is_not_said_to_have_broken_off(tmp_path: Path) -> None:
+    """Whoever clears `runs/` away is not told to bring a vehicle down by a file that is not there."""
+    log = tmp_path / "runs" / "1" / "log.jsonl"
+    log.parent.mkdir(parents=True)
+    log.touch()
+    first = Past(tmp_path, VEHICLE, None)
+    first.begin(log)
+    first._held.close()
+    before = Past(tmp_path, VEHICLE, None)
+    assert "before broke off" in launch._hanging(before, loaded())
+    shutil.rmtree(log.parent)
+    told = launch._hanging(Past(tmp_path, VEHICLE, None), loaded())
+    assert "is no longer there: whether its flight ended is not known" in told
+    assert "broke off" not in told
+
+
+def test_what_a_simulated_flight_leaves_is_not_the_connected_vehicles(tmp_path: Path) -> None:
+    """Its log, and the parameters that it set: neither is brought down or put back on the real one."""
+    simulated, real = (launch._left_in(cast("Any", SimpleNamespace(state=tmp_path, link=link))) for link in (None, 1))
+    log = tmp_path / "log.jsonl"
+    log.touch()
+    Past(simulated, VEHICLE, None).begin(log)
+    owed = OwedParameters(simulated, VEHICLE, sets=True)
+    owed.keep(
+        {"FENCE_RADIUS": Owed(*settings_of(["FENCE_RADIUS=50"]).values(), *settings_of(["FENCE_RADIUS=300"]).values())}
+    )
+    owed.close()
+    assert OwedParameters(simulated, VEHICLE).left
+    assert not OwedParameters(real, VEHICLE).left
+    assert Past(simulated, VEHICLE, None).broken_off == tmp_path
+    assert (Past(real, VEHICLE, None).note, Past(real, VEHICLE, None).broken_off) == ("", None)
 
 
 def late(us: int) -> Now:

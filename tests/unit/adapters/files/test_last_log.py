@@ -69,7 +69,8 @@ def test_a_log_that_is_not_there_any_more_is_told(last: LastLog, tmp_path: Path)
     earlier = last.settle(mend)
     assert earlier.last is None
     assert earlier.broken_off == tmp_path / "gone"
-    assert earlier.note.endswith("nor can it be: no such file or directory")
+    assert earlier.gone
+    assert earlier.note.endswith("is no longer there: whether its flight ended is not known")
 
 
 def test_a_log_that_is_still_written_is_told(last: LastLog, tmp_path: Path) -> None:

@@ -10,12 +10,13 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store.writing import replace_inside
 from rtshcua.cli.bounds import bounds_dict, bounds_told
+from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
 from rtshcua.cli.replacing import Replacing, replace_with
 from rtshcua.cli.sources import compile_sources, meant, no_source
 from rtshcua.cli.stdout import out
-from rtshcua.cli.unlock import another_key, check_trusted, unlock, unlock_for
+from rtshcua.cli.unlock import another_key, check_trusted, strangers, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.compiler.pins import Pins, undeclared
 from rtshcua.ground.compiler.sign import sign
@@ -121,8 +122,13 @@ def compile(
         )
         data = sign(compiled.policy, compiled.mission, policy_key=signers[0], mission_key=signers[1])
         check_trusted(store, signers[1], compiled.policy, compiled.mission)
+        warnings = strangers(store, signers, compiled.policy.vehicle.identity, issued_at)
     except Untrusted as error:
         return findings.end(another_key(error, compiled.policy, compiled.mission))
+    if warnings and deny_warnings:
+        return findings.refuse(ExitCode.UNTRUSTED, "unknown-key", warnings[0], "sign with keys that the root names")
+    for each in warnings:
+        say(f"warning: {each}")
     replace_inside(target, data)
     if not as_json:
         out(_told(compiled.policy, compiled.mission, target))
@@ -131,6 +137,7 @@ def compile(
     return findings.finish(
         ExitCode.OK,
         bundle=_described(compiled.policy, compiled.mission, target, data, signers),
+        warnings=warnings,
         bounds=None if compiled.bounds is None else bounds_dict(compiled.bounds),
     )
 

@@ -1,6 +1,7 @@
 """Signing keys for commands: from the key store or a file, with a passphrase asked for only where one is needed."""
 
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from getpass import getpass
 from pathlib import Path
@@ -16,7 +17,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.bundle import BundleError, check_proposer
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty, SigningKey
-from rtshcua.wire.trust import open_root
+from rtshcua.wire.trust import key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 #: octets of a passphrase, in a file
@@ -112,6 +113,32 @@ def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mis
     named = root.keys_for(Duty.MISSION).get(key.kid)
     if named is not None:
         check_proposer(named, policy, mission.invocations, now_us=0)
+
+
+def strangers(store: KeyStore, keys: Iterable[SigningKey], vehicle: str, now_us: int) -> list[str]:
+    """Which keys the store's trust root, if there is one, does not let speak for the vehicle, in words: with this root
+    no run takes what they sign. The vehicle may have another one.
+    """
+    if not store.exists():
+        return []
+    root = open_root(store.root(), pinned=store.pin(), now_us=0)
+    told = []
+    for key in keys:
+        named = root.keys_for(key.duty).get(key.kid)
+        refusal = None if named is None else key_refusal(named, vehicle=vehicle, now_us=now_us)
+        if key.kid in root.revocations:
+            why = "revokes it"
+        elif named is None:
+            why = f"names no {key.duty} key of this name"
+        elif refusal is not None:
+            why = f"does not let it speak for `{vehicle}` now ({refusal})"
+        else:
+            continue
+        told.append(
+            f"the trust root of this key store {why}: {key.kid.hex()}; `run` with this root refuses the bundle, and "
+            "takes it with one that names the key (`--root`)"
+        )
+    return told
 
 
 def another_key(error: Untrusted, policy: Policy, mission: Mission) -> Refusal:

@@ -12,6 +12,8 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.trust import open_root
 
 AT = ["--at", "2026-01-31T08:00:00Z"]
 
@@ -279,3 +281,26 @@ def test_a_source_that_cannot_be_read_comes_before_a_policy_that_is_not_there(he
     text = proposal(checkout).replace("lib:policies/bridge_inspection.rts", "lib:policies/none.rts")
     (here / "spec.json").write_text(text, encoding="utf-8")
     assert main(["compile", "spec.json", "--policy", "bridge_inspection"]) == ExitCode.DIAGNOSTICS
+
+
+def test_a_key_of_another_root_is_warned_of(
+    checkout: Path, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It signs, for the vehicle may have that root; whoever mistook the key learns it before `run` refuses."""
+    own = data_folder()
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(here / "other"))
+    assert main(["keys", "init"]) == ExitCode.OK
+    other = KeyStore(data_folder())
+    (theirs,) = {other.signing_key(Duty.MISSION, whose="operator").kid}
+    path = other.paths(open_root(other.root(), pinned=other.pin(), now_us=0))[theirs]
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(own))
+    capsys.readouterr()
+    source = [str(checkout / "missions" / "short.rts"), "-o", "a", *AT]
+    assert main(["compile", *source]) == ExitCode.OK
+    assert capsys.readouterr().err == ""
+    assert main(["compile", *source, "--mission-key", str(path), "--json"]) == ExitCode.OK
+    said = capsys.readouterr()
+    (warning,) = json.loads(said.out)["warnings"]
+    assert f"names no mission key of this name: {theirs.hex()}" in warning
+    assert said.err.startswith("warning: the trust root of this key store")
+    assert main(["compile", *source, "--mission-key", str(path), "--deny-warnings"]) == ExitCode.UNTRUSTED

@@ -225,6 +225,8 @@ class Autopilot:
         #: of each by id: how often it is reported at the most, and when it was last
         self.battery_every_us = [0, *(other.every_us for other in config.other_batteries)]
         self.battery_told_us: dict[int, int] = {}
+        self.gauge_rise = config.gauge_rise
+        """Percent more that are told in one report of five."""
         self._fast = config.boot is Boot.FAST
         pace = flavour.boot.all_s / FAST_S if self._fast else 1.0
         self.sensors = Sensors(

@@ -99,6 +99,8 @@ class SimulationConfig:
     battery: int = 10_000
     other_batteries: tuple[OtherBattery, ...] = ()
     """Those with the ids from 1 on; each is reported in turn with the first."""
+    gauge_rise: int = 0
+    """So many percent more than it has are told of the charge in one report of five, as an estimate by voltage does."""
     hover_us: int = 18 * 60 * 1_000_000
     """How long a full battery hovers."""
     cruise_mm_s: int = 5_000

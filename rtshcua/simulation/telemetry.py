@@ -184,6 +184,7 @@ def battery_status(a: Autopilot) -> Message:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_LOW
     else:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_OK
+    rises = a.gauge_rise if a.battery_reports % 5 == 0 else 0
     voltages = [_millivolts(a, battery)] + [_NO_VOLTAGE] * 9
     return _BATTERY_STATUS(
         number,
@@ -194,7 +195,7 @@ def battery_status(a: Autopilot) -> Message:
         battery.centiamperes,
         round(battery.used_mah),
         -1,
-        battery.percent,
+        min(battery.percent + rises, 100),
         0,
         charge,
     )

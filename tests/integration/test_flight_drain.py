@@ -79,6 +79,13 @@ def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp
 
 
 @pytest.mark.soak
+def test_so_is_one_whose_gauge_rises_now_and_then(tmp_path: Path) -> None:
+    """Its drain was never known, and it landed with half of its reserve."""
+    found = flown(tmp_path, "ardupilot", "", FAST_US, gauge_rise=2)
+    assert found.vehicle.simulation.truth().battery >= RESERVE
+
+
+@pytest.mark.soak
 def test_without_the_measurement_it_is_not(tmp_path: Path) -> None:
     """The same flight by what is declared alone: the vehicle without the signal, as a policy may say."""
     assert flown(tmp_path, "ardupilot", ", battery.drain", FAST_US).vehicle.simulation.truth().battery < RESERVE

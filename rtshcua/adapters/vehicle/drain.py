@@ -24,9 +24,12 @@ LEAST_CHANGES: Final = 3
 #: A charge that stands for so many times as long as it took between the last changes is drained no more.
 _STANDS: Final = 2
 #: More than this at once, 1/10000, and so much in a second besides, is a finding about the battery and no drain: what
-#: was measured before counts no more. Some autopilots report their charge in steps of 5 %.
+#: was measured before counts no more. Some autopilots report their charge in steps of 5 or 10 %.
 JUMP: Final = 500
 JUMP_RATE: Final = 200
+STEP: Final = 1_000
+#: A charge that rises by more, 1/10000, is another one.
+RISE: Final = 300
 
 #: A place is looked at so often, us, and tells nothing after more.
 _LOOK_US: Final = SECOND
@@ -43,48 +46,61 @@ KM: Final = 1_000_000  # mm
 
 
 class DrainMeter:
-    """Measures one charge, 1/10000, by the times at which it was measured itself. All integers."""
+    """Measures one charge, 1/10000, by the times at which it was measured itself. All integers.
+
+    It goes by the least charge that was reported: one that rises a little now and then, as an estimate by voltage does
+    where the load falls, is drained all the same. What was measured last is told until a new drain is known or the
+    charge stands: after a jump, and after reports without a charge.
+    """
 
     def __init__(self) -> None:
         self._changes: deque[tuple[int, int]] = deque()  # when it came to be so much
-        self._last: tuple[int, int] | None = None
-
-    @property
-    def since_us(self) -> int:
-        """From when on what was taken tells of the drain, once it is known."""
-        return self._changes[0][0]
+        self._least: tuple[int, int] | None = None  # since when, and how much
+        self._at_us = self._between_us = 0
+        self._measured: int | None = None
+        #: from when on what was taken tells of the drain, once it is known
+        self.since_us = 0
 
     def take(self, charge: int | None, at_us: int) -> int | None:
         """One report of the charge, None where it is not known; what is taken in a minute, if that is known yet."""
-        changes = self._changes
         if charge is None:
-            changes.clear()
-            self._last = None
             return None
-        last = self._last
-        if last is not None and at_us < last[0]:
-            at_us = last[0]  # came late
-        self._last = at_us, charge
-        if last is not None and charge != last[1]:
-            gap_us, fell = at_us - last[0], last[1] - charge
-            if fell < 0 or fell > JUMP + JUMP_RATE * gap_us // SECOND:
+        least, before_us = self._least, self._at_us
+        self._at_us = at_us = max(at_us, before_us) if least is not None else at_us  # it may come late
+        changes = self._changes
+        if least is None:
+            self._least = at_us, charge
+        elif charge < least[1] or charge > least[1] + RISE:
+            if charge > least[1] or self._is_jump(least, charge, before_us):
                 changes.clear()
             else:
                 changes.append((at_us, charge))
+            self._least = at_us, charge
         while len(changes) > LEAST_CHANGES and at_us - changes[0][0] > WINDOW_US:
             changes.popleft()
-        if self._stands(at_us):
-            changes.clear()
-        return self._rate(at_us) if len(changes) >= LEAST_CHANGES else None
+        self._look_whether_it_stands(at_us)
+        if len(changes) >= LEAST_CHANGES:
+            self._measured, self.since_us = self._rate(at_us), changes[0][0]
+        return self._measured
 
-    def _stands(self, now_us: int) -> bool:
-        """Whether the charge was drained before, and is no more."""
+    def _is_jump(self, least: tuple[int, int], charge: int, before_us: int) -> bool:
+        """Whether it fell by more than any drain takes since the last report, and by more than one step since the last
+        change.
+        """
+        fell = least[1] - charge
+        in_steps = min(STEP, JUMP_RATE * (self._at_us - least[0]) // SECOND)
+        return fell > max(JUMP + JUMP_RATE * (self._at_us - before_us) // SECOND, in_steps)
+
+    def _look_whether_it_stands(self, now_us: int) -> None:
+        """Nothing is told of a drain that was, and is no more."""
         changes = self._changes
-        if len(changes) < 2:
-            return False
-        last_us = changes[-1][0]
-        between_us = (last_us - changes[0][0]) // (len(changes) - 1)
-        return now_us - last_us > max(WINDOW_US, _STANDS * between_us)
+        if len(changes) > 1:
+            self._between_us = (changes[-1][0] - changes[0][0]) // (len(changes) - 1)
+        if self._least is None or now_us - self._least[0] <= max(WINDOW_US, _STANDS * self._between_us):
+            return
+        if len(changes) > 1:
+            changes.clear()
+        self._measured = None
 
     def _rate(self, now_us: int) -> int:
         """From the first change to the last, or to now with one more: whichever is less. Rounded up."""

@@ -36,7 +36,7 @@ MOST_OF_A_PEER: Final = 4
 #: how many are welcomed in one turn of the flight: each costs some 50 us. How many are taken from the queue for that,
 #: most of them to be hung up on, at 15 us; and how many may wait in the queue
 MOST_WELCOMED: Final = 2
-MOST_TAKEN: Final = 8
+MOST_TAKEN: Final = 5
 MOST_QUEUED: Final = 32
 #: one process is welcomed once in so long, in us, and may be so often ahead of that: who comes oftener is hung up on
 WELCOME_US: Final = 20_000

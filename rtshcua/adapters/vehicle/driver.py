@@ -362,7 +362,8 @@ class Driver:
         send = self.stream_requests.due_once(self.system, now_us)
         query.asked += len(send)  # their answers are counted, too
         if self._awaits_target(now_us):
-            self._aimless = named.is_gone(self.seen, now_us, query.asked)
+            gone = named.is_gone(self.seen, now_us, query.asked)
+            self._aimless = gone and self.flavour is ARDUPILOT  # PX4 has one always, and may only be slow to tell it
             if named.asks:
                 named.asks, query.wants_target = False, True
                 send += self._ask(now_us)

@@ -13,6 +13,7 @@ from rtshcua.cli.faults import exit_code_of, say, tell, words_of
 from rtshcua.cli.findings import Findings
 from rtshcua.cli.formatting.each import Laid, of_file, of_text
 from rtshcua.cli.formatting.shown import difference
+from rtshcua.cli.recognising import kind_of
 from rtshcua.cli.stdout import out, out_rendered
 from rtshcua.diagnostics.codes import UNSAFE_FORMAT
 from rtshcua.diagnostics.exits import ExitCode
@@ -68,7 +69,8 @@ def fmt(
         return findings.end(files)
     if not as_json:
         for path in skipped:
-            say(f"skipped {path}: a mission specification is JSON, for which others have formatters")
+            kind = kind_of(path)
+            say(f"skipped {path}: it is {'JSON' if kind is None else kind.name}, for which others have formatters")
     wide = _widths(files, Projects(config, isolated=isolated))
     if isinstance(wide, Refusal):
         return findings.end(wide)

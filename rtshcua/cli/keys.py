@@ -102,7 +102,8 @@ def init(
     if store.exists():
         if if_missing:
             return _listed(store, as_json=as_json)
-        return fail(ExitCode.REFUSED, f"there are keys already in `{store.folder}`", "`rtshcua keys list` shows them")
+        text = f"there are keys already in `{store.folder}`"
+        return fail(ExitCode.INPUT, text, "`rtshcua keys list` shows them", slug="exists")
     if witness_threshold > max(1, witnesses):
         return fail(
             ExitCode.USAGE, f"`--witness-threshold {witness_threshold}` is more than the {witnesses} of `--witnesses`"

@@ -640,6 +640,8 @@ def test_a_line_that_is_no_message_is_answered_and_ends_nothing(ground: Any, bas
     server.write(b"\n" + b"[" + b"[]," * 700_000 + b"[]]\n")
     server.say(_called(3, mission=[[]] * 100_000))
     assert "larger than" in server.until(3)["error"]["message"]
+    server.say({"id": 5, "method": "tools/destroy"})
+    assert server.until(5)["error"]["code"] == -32601
     server.say(_called(4, mission='{"\\ud800":NaN}'))  # which no stream of the SDK can say
     assert server.until(4)["result"]["structuredContent"]["accepted"] is False
     server.say(_called(1, "describe_vehicle"))

@@ -11,6 +11,7 @@ from contextlib import AsyncExitStack
 from typing import Any, Final
 
 from rtshcua.adapters.mcp_server.messages import MOST_OCTETS, NO_REQUEST, Wrong, read_message
+from rtshcua.adapters.mcp_server.methods import unknown_method
 
 #: how long a body may take to come, and to wait for another large one, in seconds
 PATIENCE_S: Final = 10.0
@@ -46,6 +47,10 @@ class Bodies:
 
     async def _read(self, body: bytes, scope: Scope, receive: Receive, send: Send) -> None:
         read = read_message(body)
+        unknown = None if isinstance(read, Wrong) else unknown_method(read)
+        if unknown is not None:
+            await _say(send, 200, unknown.answer())
+            return
         asked = None if isinstance(read, Wrong) else self._asked(read, scope)
         if asked in self._open:
             read = Wrong(NO_REQUEST, "`id` is that of another request, which was not answered yet")

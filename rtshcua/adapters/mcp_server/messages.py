@@ -26,6 +26,7 @@ MOST_DIGITS: Final = 1_000
 #: error codes of JSON-RPC 2.0, section 5.1
 NO_JSON: Final = -32700
 NO_REQUEST: Final = -32600
+NO_METHOD: Final = -32601
 #: where a message has to begin with its id so that it is known of one that is too large
 BEGINNING: Final = 1_024
 

@@ -15,6 +15,7 @@ from mcp import types
 from mcp.shared.message import SessionMessage
 
 from rtshcua.adapters.mcp_server.messages import MOST_OCTETS, NO_REQUEST, Wrong, line_of, read_message
+from rtshcua.adapters.mcp_server.methods import unknown_method
 
 #: octets that are read at once, and written: a pipe that can be written to has room for these (pipe(7), PIPE_BUF)
 _READ: Final = 1 << 16
@@ -103,7 +104,7 @@ class _Host:
         if not isinstance(read, Wrong) and "method" not in read:
             return  # nothing was asked of it
         if not isinstance(read, Wrong) and "id" in read:
-            read = self._opened(read)
+            read = unknown_method(read) or self._opened(read)
         if isinstance(read, Wrong):
             await self._put(read.answer())
             return

@@ -60,7 +60,7 @@ def test_secrets_are_never_printed(capsys: pytest.CaptureFixture[str]) -> None:
 def test_init_twice_changes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["keys", "init"]) == ExitCode.OK
     before = KeyStore(data_folder()).root()
-    assert app.main(["keys", "init"]) == ExitCode.REFUSED
+    assert app.main(["keys", "init"]) == ExitCode.INPUT
     assert "keys already" in capsys.readouterr().err
     assert app.main(["keys", "init", "--if-missing"]) == ExitCode.OK
     assert KeyStore(data_folder()).root() == before

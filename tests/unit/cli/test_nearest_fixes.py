@@ -20,6 +20,7 @@ def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     Path("standard.rts").write_text("")
     Path("empty.bundle").touch()
     Path("empty").mkdir()
+    Path("area.json").write_text('{"type": "FeatureCollection", "features": []}')
 
     def run(*words: str) -> tuple[int, str]:
         code = main(list(words))
@@ -41,6 +42,7 @@ def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         ("campaign standard.rts --flights x", ExitCode.USAGE, "'--flights': it should be a whole number"),
         ("show empty.bundle", ExitCode.INPUT, "`empty.bundle` is an empty file"),
         ("run empty.bundle", ExitCode.INPUT, "`empty.bundle` is an empty file"),
+        ("fmt area.json", ExitCode.OK, "skipped area.json: it is GeoJSON, for which others have formatters"),
         ("check standard.rts", ExitCode.OK, "note: `standard.rts` is empty"),
     ],
 )

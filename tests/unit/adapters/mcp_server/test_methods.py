@@ -1,6 +1,9 @@
 """A method that the protocol does not have is answered as JSON-RPC says."""
 
+from typing import get_args
+
 import pytest
+from mcp import types
 
 from rtshcua.adapters.mcp_server.messages import NO_METHOD
 from rtshcua.adapters.mcp_server.methods import METHODS, unknown_method
@@ -25,3 +28,8 @@ def test_what_the_protocol_has_is_left_to_the_sdk(method: str) -> None:
 def test_a_notification_is_never_answered() -> None:
     assert unknown_method({"method": "notifications/none-such"}) is None
     assert unknown_method({"id": 1}) is None
+
+
+def test_the_methods_are_those_of_the_sdk() -> None:
+    requests = get_args(types.ClientRequest.model_fields["root"].annotation)
+    assert {name for each in requests for name in get_args(each.model_fields["method"].annotation)} == METHODS

@@ -8,9 +8,9 @@ WIDTH: Final = 80
 _ROOM: Final = 32
 #: what stands before the text of a line: marks, and names in columns, parted by two spaces or more
 _BEFORE: Final = re.compile(r" *(?:[-+=·] +|\d+\. )?(?:(?:error|warning|note|help)(?:\[[\w/-]+\])?: )?")
-_COLUMN: Final = re.compile(r"(?:[^ ]| (?! ))*? {2,}(?=[^ ])")
-#: a word, or words in backticks, which are one: a command or a name is not taken apart where it fits
-_WORD: Final = re.compile(r"( *)([^ `]*(?:`[^`]*`[^ `]*)+|[^ ]+)")
+_COLUMN: Final = re.compile(r" {2,}+(?=[^ ])")
+#: a part of a word; words in backticks are one: a command or a name is not taken apart where it fits
+_PART: Final = re.compile(r"( *+)([^ `]++|`[^`]*+`|`)")
 #: what sets a colour, and takes no room
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
 
@@ -40,8 +40,13 @@ def _columns(text: str) -> int:
 def _words(line: str, room: int) -> list[tuple[str, str]]:
     """What is kept together, each with the spaces before it."""
     found: list[tuple[str, str]] = []
-    for match in _WORD.finditer(line):
-        space, word = match.groups()
+    whole: list[tuple[str, str]] = []
+    for space, part in _PART.findall(line):
+        if whole and not space:
+            whole[-1] = whole[-1][0], whole[-1][1] + part
+        else:
+            whole.append((space, part))
+    for space, word in whole:
         if " " in word and _columns(word) > room:
             head, *more = re.findall(r"( *)([^ ]+)", word)
             found += [(space, head[1]), *more]
@@ -54,6 +59,6 @@ def _beneath(line: str, width: int) -> int:
     """The column at which what does not fit goes on."""
     before = _BEFORE.match(line)
     at = before.end() if before is not None else 0
-    while (column := _COLUMN.match(line, at)) is not None and column.end() <= width - _ROOM:
+    while (column := _COLUMN.search(line, at)) is not None and column.end() <= width - _ROOM:
         at = column.end()
     return at or 2

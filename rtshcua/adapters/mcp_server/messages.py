@@ -27,7 +27,7 @@ MOST_DIGITS: Final = 1_000
 NO_JSON: Final = -32700
 NO_REQUEST: Final = -32600
 NO_METHOD: Final = -32601
-#: where a message has to begin with its id so that it is known of one that is too large
+#: among so many octets at its beginning or end an id is known of a message that is too large
 BEGINNING: Final = 1_024
 
 _TOO_LARGE: Final = f"the message is larger than {MOST_OCTETS >> 20} MiB or {MOST_VALUES} values"
@@ -35,6 +35,11 @@ _TOO_LARGE: Final = f"the message is larger than {MOST_OCTETS >> 20} MiB or {MOS
 _ID: Final = re.compile(
     rb'[ \t\r]*\{(?:[ \t\r]*"(?:jsonrpc|method)"[ \t\r]*:[ \t\r]*"[^"\\]*"[ \t\r]*,)*'
     rb'[ \t\r]*"id"[ \t\r]*:[ \t\r]*(-?[1-9][0-9]{0,17}|0|"[^"\\\x00-\x1f]*")[ \t\r]*[,}]'
+)
+#: the same at the end, as clients write it whose parameters come first: nothing but the outermost object ends there
+_ID_LAST: Final = re.compile(
+    rb',[ \t\r]*"id"[ \t\r]*:[ \t\r]*(-?[1-9][0-9]{0,17}|0|"[^"\\\x00-\x1f]*")[ \t\r]*'
+    rb'(?:,[ \t\r]*"jsonrpc"[ \t\r]*:[ \t\r]*"2\.0"[ \t\r]*)?\}[ \t\r\n]*\Z'
 )
 _BRACKETS: Final = re.compile(rb"[\[\]{}]")
 _SURROGATE: Final = re.compile("[\ud800-\udfff]")
@@ -88,10 +93,10 @@ def read_message(line: bytes, *, whole: bool = True) -> dict[str, Any] | Wrong:
     """A request, notification or response of a host; `Wrong` where it is none. `whole`: False where it is cut off."""
     bare = bare_of(line, MOST_VALUES) if whole and len(line) <= MOST_OCTETS else None
     if bare is None or values_of(bare) > MOST_VALUES:
-        return Wrong(NO_REQUEST, _TOO_LARGE, _id_at_the_beginning(line[:BEGINNING]))
+        return Wrong(NO_REQUEST, _TOO_LARGE, _id_of_large(line, whole=whole))
     if _depth(bare) > MOST_DEPTH:
         deep = f"the message is nested more than {MOST_DEPTH} deep"
-        return Wrong(NO_JSON, deep, _id_at_the_beginning(line[:BEGINNING]))
+        return Wrong(NO_JSON, deep, _id_of_large(line, whole=whole))
     reading = _Reading()
     try:
         text = line.decode()
@@ -162,9 +167,11 @@ def _wrong_id(known: Any) -> str:
     return f"`id` is a number of more than {MOST_ID_BITS} bits" if known.bit_length() > MOST_ID_BITS else ""
 
 
-def _id_at_the_beginning(line: bytes) -> int | str | None:
-    """The id of a message that is not read; None where it is not among the first octets, or not certainly its own."""
-    found = _ID.match(line)
+def _id_of_large(line: bytes, *, whole: bool) -> int | str | None:
+    """The id of a message that is not read; None where it is not among its first octets, nor, where it is whole, its
+    last ones, or is not certainly its own.
+    """
+    found = _ID.match(line[:BEGINNING]) or (_ID_LAST.search(line[-BEGINNING:]) if whole else None)
     if found is None:
         return None
     try:

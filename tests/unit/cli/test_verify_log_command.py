@@ -362,7 +362,7 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
     slugs = set()
     for folder in ("evidence", "ground/auditor", "cli"):
         for file in (Path(verdict.__file__).parents[1] / folder).glob("*.py"):
-            slugs |= set(re.findall(r'(?:Flaw|Finding)\(\s*f?"([a-z]+)/', file.read_text()))
+            slugs |= set(re.findall(r'\b(?:Flaw|Finding)\(\s*f?"([a-z]+)/', file.read_text()))
     of_others = {"note", "proof"}  # a note's are told as those of a `seal`, a proof's by who reads proofs
     assert slugs - of_others <= set(verdict.MEANINGS)
     assert "chain" in slugs

@@ -63,7 +63,9 @@ REFUSED = {
     # too large: the id is known where it is the outermost object's, among its first members
     asked(b'"a":' + MANY): (NO_REQUEST, 1),
     b' { "method" : "m" , "id" : "a" ,"params":' + MANY: (NO_REQUEST, "a"),
-    b'{"jsonrpc":"2.0","method":"m","params":{"id":7,"a":' + MANY + b'},"id":8}': (NO_REQUEST, None),
+    b'{"jsonrpc":"2.0","method":"m","params":{"id":7,"a":' + MANY + b'},"id":8}': (NO_REQUEST, 8),
+    b'{"method":"m","params":{"a":' + MANY + b'},"jsonrpc":"2.0","id":9}\n': (NO_REQUEST, 9),
+    b'{"method":"m","params":[' + MANY + b',{"jsonrpc":"2.0","id":9}]}': (NO_REQUEST, None),
     b'{"jsonrpc":"2.0","method":"\\"id\\":7","params":' + MANY: (NO_REQUEST, None),
     b'[{"jsonrpc":"2.0","id":1,"method":' + MANY: (NO_REQUEST, None),
     b'{"id":1.5,"params":' + MANY: (NO_REQUEST, None),

@@ -16,8 +16,8 @@ import sys
 import threading
 import time
 from base64 import b64encode
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from multiprocessing.synchronize import Event as Switch
 from pathlib import Path
 from select import select
@@ -213,7 +213,10 @@ def stood_ms(of: Loaded, steps: int, folder: Path) -> float:
 
 def accepted() -> None:
     """Print how long an accepted replacement takes of the thread that flies, at best of some."""
-    flown = {"software": lambda _: nullcontext(low()), "process": in_process}
+    flown: dict[str, Callable[[Path], AbstractContextManager[Run]]] = {
+        "software": lambda _: nullcontext(low()),
+        "process": in_process,
+    }
     for mode in flown:
         told = []
         for steps in STEPS:

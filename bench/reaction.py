@@ -117,6 +117,9 @@ class Going:
     def heard(self, boot_us: int) -> None:
         """Nothing."""
 
+    def tell(self, whom: Callable[[int], object]) -> None:
+        """Nothing."""
+
     def real_seconds(self, us: int) -> float:
         """Seconds."""
         return us / 1e6

@@ -213,7 +213,7 @@ def stood_ms(of: Loaded, steps: int, folder: Path) -> float:
 
 def accepted() -> None:
     """Print how long an accepted replacement takes of the thread that flies, at best of some."""
-    flown: dict[str, Callable[[Path], AbstractContextManager[Run]]] = {
+    flown: dict[str, Callable[[Path], AbstractContextManager[Loaded]]] = {
         "software": lambda _: nullcontext(low()),
         "process": in_process,
     }

@@ -12,9 +12,9 @@ from typing import Final
 
 from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock
 from rtshcua.adapters.vehicle.source_time import SourceTime
-from rtshcua.model.flat.situation import UTC_UNKNOWN_US
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.isolated import OwnTime
-from rtshcua.wire.clock import AUTOPILOT_US, STAMP_US, Source
+from rtshcua.wire.clock import AUTOPILOT_US, DRIFT_US, STAMP_US, Source
 
 #: the effect that says in the log where the bound came from
 CLOCK: Final = "clock"
@@ -91,6 +91,17 @@ class TimeOfDay:
     vehicle: bool = True
     stated_us: int | None = None
     listens: bool = False
+
+
+def certain_from_us(moment_us: int, now: Now) -> int:
+    """From which monotonic time on it is certain that `moment_us` (UTC) has come, in us; now, where it is certain, has
+    certainly not come, or nobody knows the time of day: no waiting changes that.
+    """
+    wait_us = moment_us + now.utc_error_us - now.utc_us
+    may_have_come = now.utc_error_us < UTC_UNKNOWN_US and moment_us <= now.utc_us + now.utc_error_us
+    if wait_us <= 0 or not may_have_come:
+        return now.monotonic_us
+    return now.monotonic_us + wait_us * 1_000_000 // (1_000_000 - DRIFT_US) + 1  # the error grows meanwhile
 
 
 class UtcWatch:

@@ -7,6 +7,7 @@ import msgspec
 from msgspec import structs
 
 from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.utc import certain_from_us
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.configured import untold
 from rtshcua.cli.faults import say
@@ -44,7 +45,7 @@ def dry_run(
 
     `notes` are what a run would tell first, `refusal` why it would not begin at all. `unheard` are the slots that
     nothing can fill on this link, `sets` the parameters that a flight would set, which the vehicle must tell. It is
-    judged by the UTC time at which it was asked for: the wait is not the flight's.
+    judged by the UTC time at which it was asked for, or would begin: the wait here is not the flight's.
     """
     monitor = StateMonitor(loaded.policy)
     asked_us, interrupted = clock.now().utc_us, False
@@ -75,6 +76,7 @@ def dry_run(
             break
         events = vehicle.poll(now.monotonic_us, clock.us_in(_POLL_S))
     now = structs.replace(clock.now(), utc_us=asked_us)
+    now = structs.replace(now, utc_us=asked_us + certain_from_us(loaded.issued_us, now) - now.monotonic_us)
     found = rehearse(loaded, monitor.state(now.monotonic_us), now, unheard)
     unready = None if ready else (vehicle.driver.unready or "it did not say that it is")
     flavour = vehicle.driver.flavour if sets and not interrupted else None

@@ -14,7 +14,7 @@ from rtshcua.adapters.files.runs import LOG, RunFolder
 from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop, append_all
 from rtshcua.adapters.preparation import Preparations
-from rtshcua.adapters.utc import CLOCK, UtcWatch
+from rtshcua.adapters.utc import CLOCK, UtcWatch, certain_from_us
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.drain import drained
 from rtshcua.cli.agents import Agents
@@ -342,6 +342,7 @@ class Flight:
             return []
         self._vehicle.driver.asks_utc = False
         now = self._clock.now()
+        self._vehicle.driver.issued_from_us = certain_from_us(self._loaded.issued_us, now)
         self._catch_up(now)
         self._sink.append(self._recorder.effect(now, CLOCK, detail=self._utc.bound.told()), WRITTEN)
         lapsed = self._lapsed()

@@ -36,7 +36,7 @@ def test_over_a_link_with_a_key_it_is_the_vehicles(ground: Any, port: int, flavo
     key.write_text("5a" * 32 + "\n")
     key.chmod(0o600)
     linked = ("--signing-key", str(key))
-    bundle = ground.bundle(age_s=30)  # PX4's time is true to 6 s: one that is younger may be of the time to come
+    bundle = ground.bundle()
     ground.vehicle(port, 1, "--flavour", flavour, *linked)
     where = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--unsigned-radio", "--mode", "process")
     run = ground.run(bundle, *where, *linked, speed=1)

@@ -66,6 +66,7 @@ UNFIT_US = 5_000_000
 KEYLESS = "it signs what it sends, and answers nothing that is not signed: give the link's key with `--signing-key`"
 
 _UNDATED = "nobody has told the time of day yet, without which no step is decided: its SYSTEM_TIME is awaited"
+_YOUNG = "the time of day is not certain enough yet to say that the mission was issued before now"
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 #: how many kinds of others that speak under its ids are told of: whoever makes them up has 65,536
 _MOST_STRANGERS = 8
@@ -141,6 +142,8 @@ class Driver:
         self.asks_utc = False
         #: and so long it is waited for before anything begins, once nothing else is missing
         self.utc_patience_us = 0
+        #: before then it is not certain that the mission was issued already: until then nothing begins
+        self.issued_from_us = 0
         #: and the number that a boundary wants it to send back before, 0 for none
         self.asks_back: Callable[[], int] = int
         #: what else it is asked on the ground, and told of each of its messages
@@ -244,8 +247,12 @@ class Driver:
 
     @property
     def _undated(self) -> str | None:
-        """That the time of day is still to come, in words: meanwhile the deadline of the first step would pass."""
+        """That the time of day is still to come, or to be certain enough, in words: meanwhile the deadline of the first
+        step would pass.
+        """
         since_us, now_us = self._lacks_utc_us, self.seen.now_us
+        if now_us < self.issued_from_us:
+            return _YOUNG
         waits = self.asks_utc and (since_us is None or now_us - since_us < self.utc_patience_us)
         return _UNDATED if waits and self.utc_patience_us else None
 

@@ -71,6 +71,11 @@ class Loaded(msgspec.Struct, frozen=True):
         return self.in_force.invocations
 
     @property
+    def issued_us(self) -> int:
+        """The UTC time in us before which not every step of this bundle was issued."""
+        return max(prepared.invocation.issued_at_us for prepared in self.invocations)
+
+    @property
     def expires_us(self) -> int:
         """The UTC time in us after which no step of this bundle can be fresh: until then its replay must be refused."""
         return max(

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference import flat_case as flat
 from rtshcua.adapters.clock import PacedClock, SystemClock
-from rtshcua.adapters.utc import UtcWatch, kernel_error_us, synchronised_us
+from rtshcua.adapters.utc import UtcWatch, certain_from_us, kernel_error_us, synchronised_us
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.codec.frames import Received
 from rtshcua.decision.decide import decide
@@ -139,6 +139,26 @@ def test_where_utc_is_unknown_so_is_whatever_asks_for_it() -> None:
     unknown = Now(flat.NOW.monotonic_us, flat.NOW.utc_us, UTC_UNKNOWN_US)
     decision = decide(step, flat.state({}), policy, context, unknown)
     assert (decision.outcome, decision.reason) == (Outcome.DEFER, Reason.CLOCK_UNCERTAIN)
+
+
+@pytest.mark.parametrize(
+    ("issued_us", "error_us", "wait_us"),
+    [
+        (NOW_US - 10_000_000, 6_000_000, 0),
+        (NOW_US - 6_000_000, 6_000_000, 0),
+        (NOW_US - 2_000_000, 6_000_000, 4_000_000 + 2_001 + 1),
+        (NOW_US + 5_000_000, 6_000_000, 11_000_000 + 5_502 + 1),  # its clock may be ahead of ours
+        (NOW_US + 6_000_001, 6_000_000, 0),  # certainly of the time to come: that is refused, and not waited for
+        (NOW_US, UTC_UNKNOWN_US, 0),
+    ],
+)
+def test_a_bundle_is_waited_for_that_may_be_of_the_time_to_come(issued_us: int, error_us: int, wait_us: int) -> None:
+    now = Now(77, NOW_US, error_us)
+    from_us = certain_from_us(issued_us, now)
+    assert from_us - now.monotonic_us == wait_us
+    if wait_us:
+        then_error_us = error_us + wait_us * 500 // 1_000_000
+        assert NOW_US + wait_us - then_error_us >= issued_us
 
 
 # ---------------------------------------------------------------- a boundary with a clock of its own

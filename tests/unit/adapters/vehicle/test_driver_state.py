@@ -177,6 +177,12 @@ def test_it_is_not_ready_before_the_time_of_day_is_known_or_was_waited_for(autop
     one.driver.asks_utc = True
     assert not live(2)
 
+    one = Bench(autopilot)
+    one.well()
+    one.driver.issued_from_us = one.now_us + 2 * S
+    assert "was issued before now" in live(1)
+    assert not live(1.5)
+
 
 @BOTH
 def test_a_vehicle_that_signs_and_does_not_answer_asks_for_the_key(autopilot: int) -> None:

@@ -241,6 +241,8 @@ def test_what_a_hostile_agent_calls_is_answered_and_signs_nothing(ground: Any, b
                 assert set(each) == {
                     "code", "field", "message", "limit", "observed", "age_us", "nearest", "repair"
                 }  # fmt: skip
+        with pytest.raises(McpError, match="larger than 4 MiB"):
+            await call(session, "propose_mission", mission=changed("intent", "x" * 10_000_000), idempotency_key="m")
         assert (await call(session, "describe_policy"))["policy"] == "bridge_inspection@7"
 
     session_of(ground, base, place, work)

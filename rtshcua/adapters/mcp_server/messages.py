@@ -28,7 +28,7 @@ NO_JSON: Final = -32700
 NO_REQUEST: Final = -32600
 NO_METHOD: Final = -32601
 #: among so many octets at its beginning or end an id is known of a message that is too large
-BEGINNING: Final = 1_024
+ENDS: Final = 1_024
 
 _TOO_LARGE: Final = f"the message is larger than {MOST_OCTETS >> 20} MiB or {MOST_VALUES} values"
 #: the outermost id, where nothing stands before it but members that are texts without escapes
@@ -90,13 +90,15 @@ class _Reading:
 
 
 def read_message(line: bytes, *, whole: bool = True) -> dict[str, Any] | Wrong:
-    """A request, notification or response of a host; `Wrong` where it is none. `whole`: False where it is cut off."""
+    """A request, notification or response of a host; `Wrong` where it is none. `whole`: False where no more is left of
+    it than `ENDS` octets of its beginning and as many of its end.
+    """
     bare = bare_of(line, MOST_VALUES) if whole and len(line) <= MOST_OCTETS else None
     if bare is None or values_of(bare) > MOST_VALUES:
-        return Wrong(NO_REQUEST, _TOO_LARGE, _id_of_large(line, whole=whole))
+        return Wrong(NO_REQUEST, _TOO_LARGE, _id_of_large(line))
     if _depth(bare) > MOST_DEPTH:
         deep = f"the message is nested more than {MOST_DEPTH} deep"
-        return Wrong(NO_JSON, deep, _id_of_large(line, whole=whole))
+        return Wrong(NO_JSON, deep, _id_of_large(line))
     reading = _Reading()
     try:
         text = line.decode()
@@ -167,11 +169,11 @@ def _wrong_id(known: Any) -> str:
     return f"`id` is a number of more than {MOST_ID_BITS} bits" if known.bit_length() > MOST_ID_BITS else ""
 
 
-def _id_of_large(line: bytes, *, whole: bool) -> int | str | None:
-    """The id of a message that is not read; None where it is not among its first octets, nor, where it is whole, its
-    last ones, or is not certainly its own.
+def _id_of_large(line: bytes) -> int | str | None:
+    """The id of a message that is not read; None where it is not among its first octets or its last ones, or is not
+    certainly its own.
     """
-    found = _ID.match(line[:BEGINNING]) or (_ID_LAST.search(line[-BEGINNING:]) if whole else None)
+    found = _ID.match(line[:ENDS]) or _ID_LAST.search(line[-ENDS:])
     if found is None:
         return None
     try:

@@ -14,14 +14,12 @@ from anyio.abc import ObjectReceiveStream, ObjectSendStream
 from mcp import types
 from mcp.shared.message import SessionMessage
 
-from rtshcua.adapters.mcp_server.messages import MOST_OCTETS, NO_REQUEST, Wrong, line_of, read_message
+from rtshcua.adapters.mcp_server.messages import ENDS, MOST_OCTETS, NO_REQUEST, Wrong, line_of, read_message
 from rtshcua.adapters.mcp_server.methods import unknown_method
 
 #: octets that are read at once, and written: a pipe that can be written to has room for these (pipe(7), PIPE_BUF)
 _READ: Final = 1 << 16
 _WRITTEN: Final = 4_096
-#: of a line that is too long: what may hold its id
-_KEPT: Final = 1_024
 #: requests that wait for their answers at a time
 MOST_OPEN: Final = 256
 #: how long a host that has closed its end may still take what was answered, in seconds
@@ -29,7 +27,7 @@ _LAST_S: Final = 1.0
 
 
 class Lines:
-    """Lines out of octets as they come. Of one that is too long the beginning is kept, and no more."""
+    """Lines out of octets as they come. Of one that is too long beginning and end are kept, and no more."""
 
     def __init__(self) -> None:
         self._line = bytearray()
@@ -51,10 +49,10 @@ class Lines:
             yield line, whole
 
     def _add(self, data: bytes) -> None:
-        if self._whole:
-            self._line += data
-            if len(self._line) > MOST_OCTETS:
-                self._line, self._whole = self._line[:_KEPT], False
+        self._line += data
+        self._whole = self._whole and len(self._line) <= MOST_OCTETS
+        if not self._whole:
+            del self._line[ENDS:-ENDS]
 
 
 class _Gone(Exception):

@@ -86,10 +86,13 @@ def test_what_is_no_message_is_refused_with_the_id_that_it_certainly_has() -> No
     assert not wrong
 
 
-def test_a_line_that_was_cut_off_is_refused_with_the_id_at_its_beginning() -> None:
+def test_a_line_of_which_only_the_ends_are_left_is_refused_with_the_id_at_either() -> None:
     assert read_message(asked(), whole=False) == Wrong(
         NO_REQUEST, "the message is larger than 4 MiB or 65536 values", 1
     )
+    last = read_message(b'{"method":"m","params":{"a":["xxx' + b'xxx"]},"jsonrpc":"2.0","id":9}', whole=False)
+    assert isinstance(last, Wrong)
+    assert last.id == 9
 
 
 @pytest.mark.parametrize(

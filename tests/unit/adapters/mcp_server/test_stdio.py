@@ -14,7 +14,7 @@ import anyio
 from mcp import types
 from mcp.shared.message import SessionMessage
 
-from rtshcua.adapters.mcp_server.messages import MOST_OCTETS
+from rtshcua.adapters.mcp_server.messages import ENDS, MOST_OCTETS
 from rtshcua.adapters.mcp_server.stdio import MOST_OPEN, Lines, streams
 
 
@@ -28,17 +28,18 @@ def test_lines_are_found_however_they_come_and_blank_ones_are_none() -> None:
 
 
 @pytest.mark.parametrize("times", [1, 5])
-def test_of_a_line_that_is_too_long_the_beginning_is_kept(times: int) -> None:
+def test_of_a_line_that_is_too_long_beginning_and_end_are_kept(times: int) -> None:
     lines, part = Lines(), b"[" * (MOST_OCTETS // 4)
     tracemalloc.start()
     try:
         found = [line for _ in range(4 * times) for line in lines.take(part)]
-        found += lines.take(b"[\n{}\n")
+        found += lines.take(b"[end\n{}\n")
         _, most = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
     assert [(line[:2], whole) for line, whole in found] == [(b"[[", False), (b"{}", True)]
-    assert len(found[0][0]) < 2_000
+    assert found[0][0].endswith(b"[end")
+    assert len(found[0][0]) == 2 * ENDS
     assert most < 3 * MOST_OCTETS
 
 

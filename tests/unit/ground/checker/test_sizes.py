@@ -92,7 +92,7 @@ def test_the_library_has_the_limits_that_it_had() -> None:
         "goto": (120, 7, 40),
         "inspect_area": (120, 13, 40),
         "hover": (35, 4, 40),
-        "return_home": (240, 16, 60),
+        "return_home": (240, 17, 60),
         "emergency_land": (120, 8, 60),
     }  # fmt: skip
 

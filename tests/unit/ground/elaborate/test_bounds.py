@@ -65,7 +65,7 @@ def test_a_return_takes_no_less_than_the_way_home(compile_text: Compile, site: s
     assert compiled.mission is not None
     taken = [_taken(replace(step.contract, energy=300), 309) for step in compiled.mission.invocations]
     assert taken == [300, 300, 309]
-    assert _taken(compiled.mission.invocations[-1].contract, 309) == 1600
+    assert _taken(compiled.mission.invocations[-1].contract, 309) == 1700
 
 
 def test_a_step_of_its_own_counts_with_what_it_says(compile_text: Compile, site: str) -> None:
@@ -109,8 +109,8 @@ def test_the_largest_steps_are_shown_a_repeated_one_once(check_text: Check, site
     text = site + mission("energy at most 1 %", steps="repeat 4 { hover(5 s) }")
     found = check_text(text).diagnostics[0]
     assert [(text[label.span.start : label.span.end], label.text) for label in found.labels] == [
+        ("return_home()", "up to 17 %"),
         ("hover(5 s)", "up to 16 %, 4 times 4 %"),
-        ("return_home()", "up to 16 %"),
         ("takeoff(altitude = 10 m)", "up to 4 %"),
     ]
 

@@ -201,6 +201,6 @@ def _wants_colour() -> bool:
 
 
 if __name__ == "__main__":
-    from rtshcua.cli.door import main as opened
+    from rtshcua.cli.entry_point import main as run
 
-    sys.exit(opened())
+    sys.exit(run())

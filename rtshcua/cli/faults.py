@@ -249,7 +249,7 @@ def unreadable(error: OSError) -> ExitCode:
     """Fails for what the operating system would not do."""
     text, help = _words_of(error), None
     if isinstance(error, FileNotFoundError) and isinstance(error.filename, str):
-        from rtshcua.cli.nearby import missing
+        from rtshcua.cli.missing_file import missing
 
         text, help = missing(Path(error.filename)) or (text, None)
     return fail(exit_code_of(error), text, help)

@@ -19,7 +19,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 @contextmanager
 def breakable() -> Iterator[None]:
     """Within this, in the main thread, Ctrl-C raises KeyboardInterrupt, as Python has it: what is under way is put in
-    order. Elsewhere it ends a command by the signal itself (`door`).
+    order. Elsewhere it ends a command by the signal itself (`entry_point`).
     """
     if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.SIG_DFL:
         yield

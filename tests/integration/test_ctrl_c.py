@@ -12,7 +12,7 @@ import pytest
 
 from rtshcua import library
 from rtshcua.cli import interrupts
-from rtshcua.cli.door import main
+from rtshcua.cli.entry_point import main
 from rtshcua.cli.table import COMMANDS
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -44,7 +44,7 @@ def until(found: Callable[[], bool], process: subprocess.Popen[str]) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the moment is read from /proc")
 def test_a_command_that_starts_or_works_is_ended_by_the_signal_and_says_nothing() -> None:
-    words = [sys.executable, "-m", "rtshcua.cli.door", "check", str(library.root() / "missions/short.rts")]
+    words = [sys.executable, "-m", "rtshcua.cli.entry_point", "check", str(library.root() / "missions/short.rts")]
     found: dict[float, tuple[int, str, str]] = {}
     for moment_s in MOMENTS_S:
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -90,8 +90,8 @@ def test_what_puts_something_in_order_is_told_of_ctrl_c() -> None:
 
 def test_the_door_imports_nothing_of_ours_before_it_is_open() -> None:
     code = (
-        "import sys, signal; from rtshcua.cli.door import main\n"
+        "import sys, signal; from rtshcua.cli.entry_point import main\n"
         "print([name for name in sys.modules if name.startswith('rtshcua.')])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "['rtshcua.cli', 'rtshcua.cli.door']"
+    assert done.stdout.strip() == "['rtshcua.cli', 'rtshcua.cli.entry_point']"

@@ -25,8 +25,8 @@ from pydantic import AnyUrl
 from rtshcua import __version__
 from rtshcua.adapters.mcp_server.access import refusal
 from rtshcua.adapters.mcp_server.arguments import Unfit, fitted
-from rtshcua.adapters.mcp_server.bodies import Bodies
 from rtshcua.adapters.mcp_server.connections import CONNECTION, MOST, Connection
+from rtshcua.adapters.mcp_server.http_bodies import Bodies
 from rtshcua.adapters.mcp_server.messages import writable
 from rtshcua.adapters.mcp_server.stdio import streams
 

@@ -14,9 +14,9 @@ def main() -> int:
     """Runs the command of the process's own command line, and gives its exit code back, for `sys.exit`."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else whoever started us has it ignored
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from rtshcua.cli.app import main as opened
+    from rtshcua.cli.app import main as run
 
-    return opened()
+    return run()
 
 
 if __name__ == "__main__":

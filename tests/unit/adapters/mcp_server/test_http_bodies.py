@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.mcp_server import bodies
-from rtshcua.adapters.mcp_server.bodies import LARGE, Bodies
+from rtshcua.adapters.mcp_server import http_bodies
+from rtshcua.adapters.mcp_server.http_bodies import LARGE, Bodies
 from rtshcua.adapters.mcp_server.messages import MOST_OCTETS
 
 PING = b'{"jsonrpc":"2.0","id":%s,"method":"ping"}'
@@ -100,7 +100,7 @@ def test_there_is_one_large_body_at_a_time_and_small_ones_go_past_it(monkeypatch
         small = asyncio.create_task(host.ask(PING % b"1"))
         while len(host.served) < 2:
             await asyncio.sleep(0)
-        monkeypatch.setattr(bodies, "PATIENCE_S", 0)
+        monkeypatch.setattr(http_bodies, "PATIENCE_S", 0)
         assert (await host.ask(BIG))[0] == 503
         monkeypatch.undo()
         second = asyncio.create_task(host.ask(BIG))
@@ -125,7 +125,7 @@ def test_a_body_that_does_not_come_is_waited_for_a_while(monkeypatch: pytest.Mon
         assert said[0]["status"] == 408
         assert (b"connection", b"close") in said[0]["headers"]
 
-    monkeypatch.setattr(bodies, "PATIENCE_S", 0)
+    monkeypatch.setattr(http_bodies, "PATIENCE_S", 0)
     played(play)
 
 

@@ -167,9 +167,12 @@ class UtcWatch:
     @property
     def vehicle_may_tell(self) -> bool:
         """Whether the vehicle is to be asked for its time: a boundary of its own takes it in answer to a number alone,
-        which it draws where the link has a key.
+        which it draws where the link has a key. One that has just taken it asks no more, and we have yet to follow it.
         """
-        return self.waits and self.vehicle_counts and (self._own is None or self.question() != 0)
+        if not (self.waits and self.vehicle_counts):
+            return False
+        said = None if self._own is None else self._own(False)
+        return self._own is None or (said is not None and (said.number != 0 or said.source is not Source.UNKNOWN))
 
     def look(self, told: SourceTime, flavour: str, now_us: int) -> bool:
         """Take the vehicle's own time, if it is needed and told. Whether it was taken."""

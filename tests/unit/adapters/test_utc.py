@@ -175,8 +175,9 @@ class Own:
     def __call__(self, settle: bool) -> OwnTime | None:
         if settle and self.source is Source.UNKNOWN and self.stated is not None:
             self.source = self.stated
-        error_us = UTC_UNKNOWN_US if self.source is Source.UNKNOWN else 700
-        return None if self.gone else OwnTime(self.source, Now(1_000, 1_800_000_000_000_000, error_us), self.number)
+        known = self.source is not Source.UNKNOWN
+        now = Now(1_000, 1_800_000_000_000_000, 700 if known else UTC_UNKNOWN_US)
+        return None if self.gone else OwnTime(self.source, now, 0 if known else self.number)
 
 
 def test_the_boundarys_clock_counts_and_no_other() -> None:
@@ -208,6 +209,17 @@ def test_what_the_operator_stated_holds_once_no_more_is_waited_for() -> None:
     unstated.settle()
     assert unstated.waits
     assert not unstated.vehicle_may_tell, "the boundary draws no number, for the link has no key"
+
+
+def test_a_boundary_that_took_the_vehicles_time_since_we_looked_is_still_followed() -> None:
+    """Else the vehicle counts as ready before anybody here knows the time of day, and its first step is deferred."""
+    own = Own(number=77)
+    watch = UtcWatch(SystemClock(), None, kernel_us=lambda: None)
+    watch.follow(own)
+    own.source = Source.VEHICLE  # its answer came between two looks
+    assert (watch.waits, watch.question(), watch.vehicle_may_tell) == (True, 0, True)
+    assert watch.look(SourceTime(), "px4", 0)
+    assert not watch.vehicle_may_tell
 
 
 def test_a_boundary_without_a_clock_or_that_is_gone_changes_nothing() -> None:

@@ -21,7 +21,7 @@ from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, make_folder
-from rtshcua.adapters.utc import UtcWatch, certain_from_us, vehicle_counts
+from rtshcua.adapters.utc import UtcWatch, vehicle_counts
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
@@ -213,8 +213,9 @@ def _launch(order: Launch) -> ExitCode:
             events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
             stated = order.utc_error_us is not None
             listens = order.boundary_socket is not None
-            events += await_utc(utc, vehicle, clock, patient=order.dry_run or stated, listens=listens, hurried=hurried)
-            vehicle.driver.issued_from_us = certain_from_us(loaded.issued_us, clock.now())
+            events += await_utc(
+                utc, vehicle, clock, loaded.issued_us, patient=order.dry_run or stated, listens=listens, hurried=hurried
+            )
             lapsed = _lapsed(bundle, signed_root, log_key.kid, loaded, clock)
             _expect_current(lapsed, resumed=not order.dry_run and order.sortie is None)
             if order.sortie is not None:

@@ -5,7 +5,7 @@ from errno import ENOENT
 from typing import Final
 
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.utc import UtcWatch
+from rtshcua.adapters.utc import UtcWatch, certain_from_us
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.cli.interrupts import Interrupts
@@ -45,6 +45,8 @@ def unopened(link: Address, error: OSError) -> Refusal:
 UTC_S = 3.0
 #: and so long before a flight, once nothing else keeps the vehicle from being ready
 READY_UTC_S: Final = 10.0
+#: when a mission may begin, in us, while that is not known: never
+_UNDATED_US: Final = 2**62
 UTC_NOTE: Final = (
     "nothing tells how far this machine's time of day is off: until the vehicle does, steps are deferred "
     "(`--utc-error 500ms` states it)"
@@ -86,10 +88,12 @@ def meet(
     signing: Signing, *, hurried: bool,
 ) -> list[Event]:  # fmt: skip
     """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
-    nothing begins; what happened meanwhile. `link` None: our own simulated vehicle. `hurried`: a flight may have broken
-    off in the air; then a second vehicle is not waited for, so that the first is told to come down. Raises `Refused`.
+    nothing begins; what happened meanwhile. The vehicle is ready only afterwards. `link` None: our own simulated
+    vehicle. `hurried`: a flight may have broken off in the air; then a second vehicle is not waited for, so that the
+    first is told to come down. Raises `Refused`.
     """
     events: list[Event] = []
+    vehicle.driver.issued_from_us = _UNDATED_US
     until_s = time.monotonic() + HEARTBEAT_S
     while vehicle.driver.flavour is None:
         if interrupts.wish() is not None:
@@ -103,19 +107,22 @@ def meet(
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     if vehicle.driver.link.crowd is not None:
         raise Refused(ExitCode.REFUSED, "two-vehicles", vehicle.driver.link.crowd, "one vehicle to a port is safest")
+    vehicle.driver.issued_from_us = 0
     return events
 
 
 def await_utc(
-    utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, *, patient: bool, listens: bool = False,
-    hurried: bool = False,
+    utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, issued_us: int, *, patient: bool,
+    listens: bool = False, hurried: bool = False,
 ) -> list[Event]:  # fmt: skip
-    """Take the vehicle's time of day where the kernel vouches for none; what happened meanwhile. `patient`: it is
-    waited for, and then what the operator stated holds; else the vehicle is not ready before it told it. `listens`: the
+    """Take the vehicle's time of day where the kernel vouches for none; what happened meanwhile. The vehicle is ready
+    only afterwards, and once it is certain that the mission was issued, at `issued_us` (UTC). `patient`: it is waited
+    for, and then what the operator stated holds; else the vehicle is not ready before it told it. `listens`: the
     boundary listens, and an operator may have stated it there, so it is waited for as long, and where nobody did the
     vehicle is not ready either. `hurried`: a flight may have broken off, and what is armed then is brought down first.
     """
     events: list[Event] = []
+    vehicle.driver.issued_from_us = _UNDATED_US
     until_s = time.monotonic() + (UTC_S if patient or listens else 0)
     while utc.waits and utc.vehicle_counts:
         flavour = vehicle.driver.flavour
@@ -126,4 +133,5 @@ def await_utc(
     utc.settle()
     vehicle.driver.asks_utc = utc.vehicle_may_tell
     vehicle.driver.utc_patience_us = 0 if patient or (listens and not utc.waits) else clock.us_in(READY_UTC_S)
+    vehicle.driver.issued_from_us = certain_from_us(issued_us, clock.now())
     return events

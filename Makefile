@@ -8,11 +8,11 @@ unexport PYTHONHOME PYTHONPATH PYTHONDONTWRITEBYTECODE
 MAKEFLAGS += --no-print-directory
 
 # most tests of flights wait: four processes fly while two compute
-test: JOBS ?= 6
+test slow: JOBS ?= 6
 soak mutate wrong: JOBS ?= 4
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test clients lint soak fuzz mutate wrong bench size dist clean
+.PHONY: help setup demo test slow clients lint soak fuzz mutate wrong bench size dist clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -26,6 +26,9 @@ demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, veri
 
 test: setup ## run the tests; decision, wire and evidence covered in full
 	$(BIN)/pytest -n $(JOBS) --cov --cov-report term
+
+slow: setup ## run the tests that take half a second and more each: flights, processes, searches, samples of benchmarks
+	$(BIN)/pytest -n $(JOBS) -m "slow and not soak and not clients"
 
 clients: setup ## run the tests with programs that others made, and of the wheel; as root, install what is missing
 	@.make/clients

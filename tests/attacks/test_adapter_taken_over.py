@@ -25,6 +25,7 @@ def by_force(message: Any) -> None:
     message.command, message.param1, message.param2 = messages.ARM_DISARM, 0, 21_196
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("change", "reason"), [(higher, "not-covered"), (by_force, "forced-arming")])
 def test_what_it_changed_does_not_leave_and_it_comes_home(change: Change, reason: str) -> None:
     def changed(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:

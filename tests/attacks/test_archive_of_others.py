@@ -116,6 +116,7 @@ def test_a_pipe_is_not_waited_for(filled: Path, where: str, capsys: pytest.Captu
     assert f"`{where}` in the archive" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("column", "value"), [("part", "../../../victim/x"), ("part", "*"), ("log", "/etc/passwd"), ("log", "x" * 64)]
 )

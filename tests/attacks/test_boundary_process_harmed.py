@@ -289,6 +289,7 @@ sys.stdin.read()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", ["begun", "half a bundle", "in force", "sent"])
 def test_when_the_runtime_is_killed_it_ends_and_gives_up_the_vehicle(point: str, tmp_path: Path) -> None:
     code = RUNTIME.format(path=sys.path, state=str(tmp_path), point=point)

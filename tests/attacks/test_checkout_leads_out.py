@@ -213,6 +213,7 @@ def test_which_folder_is_a_checkout(here: Path, tmp_path: Path) -> None:
     assert checkout_of("/") is None
 
 
+@pytest.mark.slow
 def test_folders_in_folders_are_gone_into_however_deep(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:

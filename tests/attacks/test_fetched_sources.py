@@ -79,6 +79,7 @@ def fetched(tmp_path_factory: pytest.TempPathFactory, files: Any) -> Fetched:
     return made
 
 
+@pytest.mark.slow
 def test_no_set_up_of_what_is_fetched_runs(fetched: Fetched, tmp_path: Path) -> None:
     place, links, pins, mark = fetched
     assert not mark.exists()
@@ -93,6 +94,7 @@ def test_no_set_up_of_what_is_fetched_runs(fetched: Fetched, tmp_path: Path) -> 
     assert not mark.exists()
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_fetched_again(fetched: Fetched, tmp_path: Path) -> None:
     place = tmp_path / "another"
     shutil.copytree(fetched.place, place)

@@ -154,6 +154,7 @@ def test_what_is_asked_a_moment_ahead_or_after_is_refused_as_anything_is(thief: 
         assert thief.of._answer(damaged)[0] == 1
 
 
+@pytest.mark.slow
 def test_a_frame_that_is_held_back_is_void_half_a_minute_later(thief: Thief) -> None:
     """Kept from the first leg, for another: while normal frames went on the vehicle does not take it any more."""
     thief.until(1)
@@ -236,6 +237,7 @@ def test_after_a_landing_nothing_is_signed(apart: Make) -> None:
 # ---------------------------------------------------------------- once it is lost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", [KEY, None], ids=("signed", "keyless"))
 @pytest.mark.parametrize(("flavour", "modes"), [("px4", Px4Mode), ("ardupilot", CopterMode)])
 def test_nothing_leaves_that_was_not_signed_ahead(flavour: str, modes: Any, key: bytes | None, apart: Make) -> None:
@@ -287,6 +289,7 @@ def test_what_was_recorded_is_not_believed_nor_another_stream(apart: Make) -> No
     assert of.gate.accept(told(of, beat, timestamp=last + 1), now_us)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_who_forges_the_vehicle_s_words_chooses_among_the_links(flavour: str, apart: Make) -> None:
     """That it landed, that somebody took over, that it is elsewhere: what leaves is a link, or nothing."""

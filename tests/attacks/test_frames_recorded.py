@@ -119,6 +119,7 @@ FENCE_ON = ours(mavlink.MAVLink_param_set_message(1, 1, b"FENCE_ENABLE", 1, 9))
 BEFORE = [name for name in COMMANDS if "in flight" not in name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["px4", "ardupilot"])
 def test_what_was_sent_is_what_was_recorded(kind: str) -> None:
     lines, entries = flown(kind)

@@ -39,6 +39,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 PROGRAM = "../checkout/bin/program"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [

@@ -107,6 +107,7 @@ ENTRIES: dict[str, tuple[Callable[[Any], object], Callable[[str], object]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("entry", "kind"), each_once(ENTRIES, KINDS))
 def test_what_a_stranger_wrote_is_refused_before_it_is_decoded(
     entry: str, kind: str, monkeypatch: pytest.MonkeyPatch
@@ -155,6 +156,7 @@ JSON = {"lists": b"[]", "objects": b"{}", "numbers": b"1", "texts": b'""', "feat
 _PART = 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", JSON)
 def test_geojson_of_tiny_values_is_refused_before_any_is_built(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(geojson, "MAX_VALUES", geojson.MAX_VALUES // _PART)
@@ -172,6 +174,7 @@ def test_geojson_of_tiny_values_is_refused_before_any_is_built(kind: str, monkey
     assert took < BOUND_S
 
 
+@pytest.mark.slow
 def test_borders_that_fill_a_file_are_read() -> None:
     begins = b'{"type":"Polygon","coordinates":[[[8,47],[9,47],[9,48],[8,47]]]}'
     first = b'{"type":"FeatureCollection","features":[{"type":"Feature","id":"a","geometry":' + begins + b"},"

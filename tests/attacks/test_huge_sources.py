@@ -174,6 +174,7 @@ def test_comments_on_one_line_are_put_together_once() -> None:
     assert [(each.first, each.last) for each in gap.comments] == [(True, True)] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     ["{word}{comment}" * 6_000, "{word}" * 6_000 + "{comment}" * 6_000, "{comment}" * 6_000 + "{word}" * 6_000],

@@ -42,6 +42,7 @@ def fly(flavour: str, *, hostile: bool, theirs: bytes = KEY, most_s: int = 600) 
     return Flight(case.seal(case.mission(case.short_steps())), config, vehicle=vehicle).fly(most_s=most_s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.soak)])
 def test_a_flight_among_hostile_frames_is_the_same_flight(flavour: str) -> None:
     quiet, hostile = fly(flavour, hostile=False), fly(flavour, hostile=True)

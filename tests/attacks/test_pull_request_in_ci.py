@@ -38,6 +38,7 @@ def hostile(tmp_path: Path) -> Path:
     return place
 
 
+@pytest.mark.slow
 def test_the_action_imports_nothing_from_the_checkout(hostile: Path, tmp_path: Path) -> None:
     (hostile / "tests/flights.rts").unlink()  # tests/integration/test_action.py flies it
     ended = runner(tmp_path)(hostile)
@@ -45,6 +46,7 @@ def test_the_action_imports_nothing_from_the_checkout(hostile: Path, tmp_path: P
     assert {*ended.outcomes.values()} == {"success"}, ended.printed
 
 
+@pytest.mark.slow
 def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_path: Path, commands: Forked) -> None:
     (hostile / "tests/::warning::nobody said this.rts").write_text("test  x\n", encoding="utf-8")
     (hostile / "tests/flights.rts").unlink()

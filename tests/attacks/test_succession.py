@@ -226,6 +226,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
     signing.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["mission-agent", "policy", "log", "damaged", "set-back"])
 def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, what: str) -> None:
     """A run is killed in the air, a key of its bundle is revoked, and it is started again with the old command line."""
@@ -306,6 +307,7 @@ def expiring(fleet: KeyStore, duty: Duty) -> None:
     fleet.root_path.write_bytes(newer.sign(fleet.signing_key(Duty.ROOT)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accepted", [False, True])
 @pytest.mark.parametrize("duty", [Duty.ROOT, Duty.POLICY, Duty.MISSION, Duty.LOG])
 def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, duty: Duty, accepted: bool) -> None:

@@ -108,6 +108,7 @@ def asked(native: Native, seed: int, situations: int) -> int:
     return count
 
 
+@pytest.mark.slow
 def test_random_worlds_are_decided_alike(native: Native) -> None:
     assert sum(asked(native, seed, 10) for seed in range(120)) > 3_000
 
@@ -170,6 +171,7 @@ def mutated(native: Native, plain: PreparedPolicy, of: Random) -> tuple[bool, bo
     return accepted, slug is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [150, pytest.param(100_000, marks=pytest.mark.soak)])
 def test_what_was_altered_is_refused_alike(native: Native, count: int) -> None:
     of, plain = Random(count), prepare(flat.POLICY)
@@ -347,6 +349,7 @@ def test_words_are_the_same_whatever_parts_them(native: Native) -> None:
         assert native.same_words(one, " ".join(one.split()))
 
 
+@pytest.mark.slow
 def test_an_outline_of_as_many_corners_as_fit(native: Native) -> None:
     """Its edges run through nearly all heights: the worst for the sweep, and for a place in it."""
     ring = outlines.zig_zag(MAX_TOTAL_VERTICES // 2)

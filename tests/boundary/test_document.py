@@ -376,6 +376,7 @@ def test_as_many_replacements_as_a_flight_takes(flight: Flight) -> None:
         assert flight.take(document) == "accepted"
 
 
+@pytest.mark.slow
 def test_documents_are_refused_alike(boundary: ctypes.CDLL) -> None:
     found = compare(boundary, 9, 600)
     assert {"accepted", "malformed", "other-steps", "not-asked", "other-flight", "other-mission", "wrong-duty",

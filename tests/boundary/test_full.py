@@ -84,6 +84,7 @@ def test_as_many_answers_as_one_flight_keeps(shadow: Shadow) -> None:
     assert presented(of, approval(of, 1, PEOPLE[0])).slug == "already-answered"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("granted", [1, 0])
 def test_more_rules_than_answers_are_kept_ask_about_one_step(granted: int, shadow: Shadow) -> None:
     """An answer is one to each of them, and the second person's counts as the first one's does."""

@@ -249,6 +249,7 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
     return believed
 
 
+@pytest.mark.slow
 def test_both_refuse_a_flood_of_frames_to_sign_ahead_at_the_same_frame(boundary: ctypes.CDLL) -> None:
     here = SignedLink(bytes(32), State(0, {}), EPOCH_US, 0)
     boundary.rt_test_link_begin(

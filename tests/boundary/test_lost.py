@@ -99,6 +99,7 @@ def test_ten_minutes_after_takeoff(flavour: str, key: str, apart: Make) -> None:
     assert (of.gate.counts.unverified > 100) == (key == "signed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("vehicle", "second"), each_once(product(FLAVOURS, KEYS), (12, 30, 20)))
 def test_whenever_it_is_lost_the_vehicle_comes_down(vehicle: tuple[str, str], second: int, apart: Make) -> None:
     flavour, key = vehicle
@@ -131,6 +132,7 @@ def test_a_takeoff_that_has_not_left_the_ground_is_told_to_land(flavour: str, ap
     assert not flown.vehicle.simulation.truth().in_air
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_frames_that_are_lost_on_the_way_are_sent_again_from_the_copies(flavour: str, apart: Make) -> None:
     of, lost = apart(flavour), []
@@ -149,6 +151,7 @@ def test_frames_that_are_lost_on_the_way_are_sent_again_from_the_copies(flavour:
     assert len({frame for frame in lost if frame}) == sum(map(bool, lost)), "each copy leaves once"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_where_a_link_fails_the_next_one_flies(flavour: str, apart: Make) -> None:
     """No frame of the first link arrives, however often it is sent."""
@@ -172,6 +175,7 @@ def test_where_a_link_fails_the_next_one_flies(flavour: str, apart: Make) -> Non
     assert failed, "what did not arrive had no effect"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_what_brings_it_home_goes_on(flavour: str, apart: Make) -> None:
     of = apart(flavour)
@@ -180,6 +184,7 @@ def test_what_brings_it_home_goes_on(flavour: str, apart: Make) -> None:
     came_down(flown)
 
 
+@pytest.mark.slow
 def test_it_is_signed_anew_all_the_way_and_told_of_nothing(apart: Make) -> None:
     """A long flight in which it is not lost: no note says that something could not be signed."""
     flown = apart("px4", legs=8).fly(lambda _: False)
@@ -191,6 +196,7 @@ def test_it_is_signed_anew_all_the_way_and_told_of_nothing(apart: Make) -> None:
     assert not [text for text in noted if "ahead" in text]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("call", [DISPATCH, STATEMENT], ids=["at a dispatch", "at a seal"])
 def test_a_decision_before_the_loss_is_recorded_before_it_though_a_seal_is_late(
     call: int, apart: Make, monkeypatch: pytest.MonkeyPatch

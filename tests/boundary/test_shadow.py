@@ -60,6 +60,7 @@ def fly(name: str, flavour: str, *faults: str) -> Flown:
     return Flight(shipped(name), config, attested=True).fly()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_flight_is_the_same_under_both(flavour: str, shadow: Shadow) -> None:
     assert fly("short", flavour).ending is Ending.COMPLETED
@@ -86,6 +87,7 @@ def meddled(seed: int) -> None:
             hand(run, paper or b"")
 
 
+@pytest.mark.slow
 def test_documents_do_the_same_under_both(shadow: Shadow) -> None:
     for seed in range(12):
         meddled(seed)

@@ -21,6 +21,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 def test_the_file_is_what_the_script_makes() -> None:
     assert FILE.read_bytes() == made()
     found = {flag for *_, each in CASES for flag in each["flags"]}

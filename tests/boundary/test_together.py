@@ -41,6 +41,7 @@ def test_both_stop_signing_ahead_at_the_same_frame(tmp_path: Path, monkeypatch: 
     assert {"floods", "ahead frame/too-many-ahead"} <= ask_both(0, 600, tmp_path).keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("where", "changed"),
     [

@@ -23,6 +23,7 @@ def test_a_target_that_arducopter_is_given_while_it_takes_off_is_a_takeover() ->
     assert (was.ending, slugs(was)) == ("stood-down", set())
 
 
+@pytest.mark.slow
 def test_a_frame_that_the_gate_held_back_as_late_is_not_taken_for_the_next_one() -> None:
     """The judge took the stop that followed for the late frame itself. The step of it is tried again."""
     was = flown(of("px4", at(26.5, faults.MessageSilence(0, "HEARTBEAT", 3 * S))))
@@ -30,6 +31,7 @@ def test_a_frame_that_the_gate_held_back_as_late_is_not_taken_for_the_next_one()
     assert (was.ending, slugs(was)) == ("completed", set())
 
 
+@pytest.mark.slow
 def test_what_stays_unknown_after_a_silence_is_waited_for_and_supervision_ends_as_much_later() -> None:
     """The judge let a grace run on as soon as all but what was frozen at the source was fresh."""
     for_good = flown(of("px4", at(9.5, faults.Freeze(0)), at(13.2, faults.Stall(0, 5_300_000, 638))))
@@ -56,6 +58,7 @@ def test_motors_that_stop_low_in_a_takeoff_are_no_landing_before_it_lies_there()
         assert slugs(flown(of("ardupilot", at(kills_s, faults.Kill(0))))) == set()
 
 
+@pytest.mark.slow
 def test_a_failsafe_of_px4_in_the_mode_that_we_fly_in_is_a_takeover() -> None:
     """Its fence holds it where it breaks it: in Hold, which our stop had chosen. That was noted, and flown over."""
     for lost, jump_s in (
@@ -66,6 +69,7 @@ def test_a_failsafe_of_px4_in_the_mode_that_we_fly_in_is_a_takeover() -> None:
         assert (was.ending, slugs(was)) == ("stood-down", set())
 
 
+@pytest.mark.slow
 def test_who_stands_down_on_a_stuck_mode_is_excused() -> None:
     """Nothing tells it from somebody who chose the mode of before again."""
     was = flown(of("ardupilot", at(41.2, faults.MessageStuck(0, "HEARTBEAT", 4 * S))))
@@ -95,6 +99,7 @@ _OFTEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "kind", "does"),
     [
@@ -118,6 +123,7 @@ def test_who_takes_it_over_while_the_runtime_is_dead_is_not_flown_over(flavour: 
     assert (was.ending, slugs(was), judge(was).exceptions) == ("stood-down", set(), ())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("killed_s", "taken_s", "dead_s"), [(9, 11, 6), (43, 44, 10)], ids=["climb", "hold"])
 def test_a_takeoff_that_a_pilot_chose_in_the_air_shows_once_it_is_over(
     killed_s: int, taken_s: int, dead_s: int
@@ -128,6 +134,7 @@ def test_a_takeoff_that_a_pilot_chose_in_the_air_shows_once_it_is_over(
     assert (was.ending, slugs(was), was.samples[-1].taken_over_by) == ("stood-down", set(), "pilot")
 
 
+@pytest.mark.slow
 def test_a_return_that_is_paused_as_it_begins_is_not_taken_for_the_hold_before_it() -> None:
     """Nothing says yet that it was obeyed; the place is the hold's, but for centimetres."""
     was = flown(of("px4", at(44.58, faults.RuntimeKilled(0, 200_000)), at(44.8, PAUSE)))
@@ -135,6 +142,7 @@ def test_a_return_that_is_paused_as_it_begins_is_not_taken_for_the_hold_before_i
     assert (was.ending, slugs(was)) == ("stood-down", set())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "kind"),
     [
@@ -147,6 +155,7 @@ def test_a_run_that_is_begun_again_brings_down_what_nobody_else_flies(flavour: s
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
 
 
+@pytest.mark.slow
 def test_what_gets_there_only_after_the_restart_is_not_a_takeover() -> None:
     """The hold of the recall was still on its way when the process died: its mode showed later, as if somebody chose
     it, and it was left there.
@@ -156,6 +165,7 @@ def test_what_gets_there_only_after_the_restart_is_not_a_takeover() -> None:
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at_s"), [("px4", 38.283), ("ardupilot", 35.447)])
 def test_a_leg_that_gets_there_after_the_stop_left_is_not_a_takeover(flavour: str, at_s: float) -> None:
     """A slow link, as radios are: the run stood down in the air, and nobody else was there."""
@@ -180,6 +190,7 @@ def test_a_pause_that_stops_it_near_the_target_of_its_leg_is_seen(at_s: float) -
     assert (was.ending, slugs(was), judge(was).exceptions) == ("stood-down", set(), ())
 
 
+@pytest.mark.slow
 def test_a_pause_at_the_target_of_its_leg_is_seen_until_it_crosses_ours_for_the_next() -> None:
     """Centimetres from it: two reports before the next leg tell. After those it crosses our frame, and is excused."""
     seen = flown(of("px4", at(26.9, PAUSE)))

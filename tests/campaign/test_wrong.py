@@ -84,6 +84,7 @@ def logs(was: ScenarioFlown) -> list[bytes]:
 SOME = ("recall-ignored", "dispatch-unwritten", "first-link-skipped", "hover-by-mode")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(each, marks=[] if each in SOME else [pytest.mark.soak]) for each in BY_NAME]
 )
@@ -106,6 +107,7 @@ def test_a_campaign_that_is_aimed_at_it_finds_it(name: str, number: int) -> None
     assert right(flight).result.failures == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "flavour"),
     [

@@ -23,6 +23,7 @@ def one(seed: int) -> bool:
     return check(mutated(of.choice(corpus.sources()), of).decode(), of.choice(WIDTHS)) is not None
 
 
+@pytest.mark.slow
 @given(CHANCES)
 @DEAR
 def test_sprinkled_sources(seed: int) -> None:

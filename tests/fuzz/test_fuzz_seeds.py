@@ -29,6 +29,7 @@ def test_a_finding_does_not_come_back(target: str, seed: Path) -> None:
     assert time.process_time() - begun < LIMIT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 def test_a_target_takes_what_fuzzing_begins_with(name: str) -> None:
     target = target_of(name)

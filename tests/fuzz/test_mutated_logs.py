@@ -61,6 +61,7 @@ def campaign(seed: int, count: int, every: int) -> dict[str, int]:
     return found
 
 
+@pytest.mark.slow
 def test_some_mutated_logs() -> None:
     found = campaign(1, SAMPLE, 1)
     assert sum(found.values()) > SAMPLE * 0.95

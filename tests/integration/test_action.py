@@ -26,6 +26,7 @@ def workspace(tmp_path: Path) -> Path:
     return tmp_path / "repository"
 
 
+@pytest.mark.slow
 def test_a_sound_project_passes_and_leaves_its_reports(run: Run, workspace: Path, tmp_path: Path) -> None:
     ended = run(workspace, working_directory="drones")
     assert {*ended.outcomes.values()} == {"success"}, ended.printed
@@ -39,6 +40,7 @@ def test_a_sound_project_passes_and_leaves_its_reports(run: Run, workspace: Path
     assert int(ElementTree.parse(ended.outputs["junit"]).getroot().get("tests", "0")) > 0
 
 
+@pytest.mark.slow
 def test_what_is_wrong_is_annotated_and_each_part_runs_all_the_same(run: Run, workspace: Path) -> None:
     rules = workspace / "drones/policies/rules.rts"
     text = rules.read_text(encoding="utf-8").replace("altitude <= 25 m", "altitude<=15 m")
@@ -50,6 +52,7 @@ def test_what_is_wrong_is_annotated_and_each_part_runs_all_the_same(run: Run, wo
     assert ended.outputs == {"sarif": "", "junit": str(workspace / "out.xml")}
 
 
+@pytest.mark.slow
 def test_what_an_input_holds_stays_text(run: Run, workspace: Path) -> None:
     hostile = "$(touch owned) `touch owned` ; touch owned #"
     ended = run(workspace, paths=hostile, fail_on=hostile, sarif=f"{hostile}.sarif", tests="false")

@@ -121,6 +121,7 @@ def test_every_benchmark_has_a_sample() -> None:
     assert {path.stem for path in (CHECKOUT / "bench").glob("*.py")} == set(SAMPLES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLES)
 def test_a_sample_of_each_benchmark_runs(name: str, tmp_path: Path) -> None:
     with TemporaryFile() as out, TemporaryFile() as err:

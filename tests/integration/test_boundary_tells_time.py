@@ -29,6 +29,7 @@ def audited(ground: Any, folder: Path) -> dict[str, Any]:
     return dict(said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_over_a_link_with_a_key_it_is_the_vehicles(ground: Any, port: int, flavour: str) -> None:
     """The boundary verifies the vehicle's SYSTEM_TIME itself, in answer to a number that it drew."""
@@ -50,6 +51,7 @@ def test_over_a_link_with_a_key_it_is_the_vehicles(ground: Any, port: int, flavo
     assert "by the vehicle" in clock["text"]
 
 
+@pytest.mark.slow
 def test_over_a_link_without_one_nothing_flies_until_somebody_states_a_bound(ground: Any, port: int) -> None:
     bundle = ground.bundle()
     ground.vehicle(port, 1)

@@ -42,6 +42,7 @@ def until(found: Callable[[], bool], process: subprocess.Popen[str]) -> None:
         time.sleep(0.002)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the moment is read from /proc")
 def test_a_command_that_starts_or_works_is_ended_by_the_signal_and_says_nothing() -> None:
     words = [sys.executable, "-m", "rtshcua.cli.entry_point", "check", str(library.root() / "missions/short.rts")]

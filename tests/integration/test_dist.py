@@ -104,6 +104,7 @@ def packages(bill: Any) -> list[Any]:
     return [each for each in bill["components"] if each["name"] not in COMPILED]
 
 
+@pytest.mark.slow
 def test_the_bill_of_materials_has_what_the_program_is_compiled_from(bill: Any) -> None:
     inside = {each["name"]: each for each in bill["components"] if each["name"] in COMPILED}
     assert inside.keys() == COMPILED

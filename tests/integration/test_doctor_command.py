@@ -29,6 +29,7 @@ def doctor(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*COMMAND, *words], capture_output=True, text=True, timeout=120, check=False)
 
 
+@pytest.mark.slow
 def test_a_vehicle_over_real_udp() -> None:
     port = free_port()
     with Simulator(["--port", str(port), "--flavour", "ardupilot"]):

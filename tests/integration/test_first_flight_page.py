@@ -41,6 +41,7 @@ def test_the_tethers_policy_and_mission_compile(tmp_path: Path, monkeypatch: pyt
     assert compiled.mission is not None
 
 
+@pytest.mark.slow
 def test_what_it_types_is_for_the_project_that_it_makes(commands: Forked, own_world: None, tmp_path: Path) -> None:
     def typed_here(line: str, where: Path) -> str:
         done = commands.run(shlex.split(line)[1:], where, 60)

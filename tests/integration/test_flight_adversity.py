@@ -22,6 +22,7 @@ def closed(run: Any, ending: str) -> None:
     assert run.summary["whole"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.soak), signal.SIGTERM])
 def test_a_stop_falls_back_first(ground: Any, number: signal.Signals) -> None:
     run = ground.run(ground.bundle())
@@ -42,6 +43,7 @@ def test_a_stop_on_the_ground_sends_nothing(ground: Any) -> None:
     assert run.dispatched() == []
 
 
+@pytest.mark.slow
 def test_three_stops_leave_the_vehicle_and_keep_the_log(ground: Any) -> None:
     run = ground.run(ground.bundle(), speed=2)
     run.until("dispatched", step=1)
@@ -56,6 +58,7 @@ def test_three_stops_leave_the_vehicle_and_keep_the_log(ground: Any) -> None:
     assert run.dispatched()[-1] in ("return_home", "emergency_land"), "it is told to come down before it is left"
 
 
+@pytest.mark.slow
 def test_a_pilot_takes_over(ground: Any) -> None:
     run = ground.run(ground.bundle(), "--fault", "pilot,at=15s,mode=position").end()
     assert run.code == 7
@@ -72,6 +75,7 @@ def test_a_low_battery_turns_it_home(ground: Any) -> None:
     assert "violated" in run.effects()
 
 
+@pytest.mark.slow
 def test_a_low_battery_on_the_ground_is_refused_and_the_bundle_is_not_used_up(ground: Any) -> None:
     bundle = ground.bundle()
     run = ground.run(bundle, "--battery", "20").end()
@@ -97,6 +101,7 @@ def test_a_vehicle_that_goes_silent(ground: Any) -> None:
     assert [event for event in run.effects() if event != "boundary"][-1] == "stood-down"
 
 
+@pytest.mark.slow
 def test_a_simulated_vehicle_that_dies(ground: Any) -> None:
     run = ground.run(ground.bundle())
     run.until("dispatched", step=1)
@@ -107,6 +112,7 @@ def test_a_simulated_vehicle_that_dies(ground: Any) -> None:
     closed(run, "link-lost")
 
 
+@pytest.mark.slow
 def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
     run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
@@ -115,6 +121,7 @@ def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
     assert run.log()[-1]["ending"] == "completed"
 
 
+@pytest.mark.slow
 def test_a_view_that_is_stopped_stops_nothing(ground: Any) -> None:
     run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
@@ -169,6 +176,7 @@ class Relay(threading.Thread):
             self.outer.sendto(data, self.to)
 
 
+@pytest.mark.slow
 def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
     relay = Relay(port)
     relay.start()

@@ -9,6 +9,7 @@ from virtual.flight import Flight
 from virtual.shipped import shipped, simulated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "earliest_s", "latest_s"), [("px4", 5, 8), ("ardupilot", 41.6, 45)])
 def test_ready_when_the_estimator_is_and_not_before(flavour: str, earliest_s: float, latest_s: float) -> None:
     flown = Flight(shipped("short"), simulated(flavour, boot=Boot.RECORDED)).fly()

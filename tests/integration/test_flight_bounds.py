@@ -93,6 +93,7 @@ def wrong(first: int, count: int, *autopilots: Sequence[str]) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 def test_no_bound_is_exceeded_in_flight() -> None:
     assert wrong(0, 4, ["px4"], ["ardupilot"]) == []
 

@@ -34,6 +34,7 @@ mission short under training_field@2 on quad {{
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("deadline", "flavour"), each_once(DEADLINES, ("px4", "ardupilot")))
 def test_a_mission_of_each_published_deadline_compiles_and_flies(tmp_path: Path, deadline: int, flavour: str) -> None:
     source = tmp_path / "short.rts"

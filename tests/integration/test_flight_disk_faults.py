@@ -100,6 +100,7 @@ def faults(tried: str) -> list[Any]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", faults("full within a line"))
 def test_a_disk_that_refuses_ends_the_mission_where_the_policy_lands(fault: Fault, tmp_path: Path) -> None:
     run = Watched(tmp_path, LAND)
@@ -112,6 +113,7 @@ def test_a_disk_that_refuses_ends_the_mission_where_the_policy_lands(fault: Faul
     verified(flown)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", faults("defect"))
 def test_what_runs_may_finish_where_the_policy_refuses_and_then_the_contingency_flies(
     fault: Fault, tmp_path: Path
@@ -127,6 +129,7 @@ def test_what_runs_may_finish_where_the_policy_refuses_and_then_the_contingency_
     verified(flown)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", faults("read-only"))
 def test_a_mission_goes_on_once_everything_is_recorded_again(fault: Fault, tmp_path: Path) -> None:
     run = Watched(tmp_path, REFUSE)
@@ -160,6 +163,7 @@ def test_a_climb_waits_for_the_disk_and_a_sync_that_fails_withholds_it(
     assert not flown.effects("gap-over"), "what a disk says after that is not believed"
 
 
+@pytest.mark.slow
 def test_a_sync_that_fails_in_the_air_is_a_failure_for_good(tmp_path: Path) -> None:
     run = Watched(tmp_path, REFUSE)
     flown = run.fly(fails_to_sync, 18, 21)
@@ -168,6 +172,7 @@ def test_a_sync_that_fails_in_the_air_is_a_failure_for_good(tmp_path: Path) -> N
     assert not flown.effects("gap-over")
 
 
+@pytest.mark.slow
 def test_a_disk_that_takes_a_few_bytes_at_a_time_changes_nothing(tmp_path: Path) -> None:
     def takes_seven(sink: DiskSink) -> None:
         sink.disk.step = 7
@@ -179,6 +184,7 @@ def test_a_disk_that_takes_a_few_bytes_at_a_time_changes_nothing(tmp_path: Path)
     verified(flown)
 
 
+@pytest.mark.slow
 def test_a_disk_that_hangs_for_a_while_is_noted_and_a_longer_one_is_a_failure(tmp_path: Path) -> None:
     flown = Watched(tmp_path, LAND).fly(hangs, 18, 23)
     assert flown.ending is Ending.COMPLETED
@@ -193,6 +199,7 @@ def test_a_disk_that_hangs_for_a_while_is_noted_and_a_longer_one_is_a_failure(tm
     verified(flown)
 
 
+@pytest.mark.slow
 def test_a_step_is_not_sent_while_its_record_hangs(tmp_path: Path) -> None:
     run = Watched(tmp_path, LAND)
     flown = run.fly(hangs, 15, 60)
@@ -212,6 +219,7 @@ class Machine:
         return self.now_us, 1_750_000_000_000_000 + self.now_us + self.set_us
 
 
+@pytest.mark.slow
 def test_a_time_of_day_that_is_set_is_recorded_and_moves_no_record(tmp_path: Path) -> None:
     run, machine = Watched(tmp_path, LAND), Machine()
     steps = StepWatch(machine)

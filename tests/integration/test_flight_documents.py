@@ -86,6 +86,7 @@ def approval(flight: Flight, granted: int = 1) -> bytes:
     return sign_approval(said, case.KEYS[Duty.APPROVAL])
 
 
+@pytest.mark.slow
 def test_it_waits_in_the_air_for_an_approval(low: bytes) -> None:
     flown = fly(low, "px4", "approval/awaited", approval)
     assert flown.ending is Ending.COMPLETED
@@ -93,6 +94,7 @@ def test_it_waits_in_the_air_for_an_approval(low: bytes) -> None:
     assert [(step, outcome) for step, outcome, _ in flown.decisions() if step == ASKED] == [(2, "defer"), (2, "allow")]
 
 
+@pytest.mark.slow
 def test_a_refusal_brings_it_home(low: bytes) -> None:
     flown = fly(low, "ardupilot", "approval/awaited", lambda flight: approval(flight, 0))
     assert flown.ending is Ending.ABORTED
@@ -100,6 +102,7 @@ def test_a_refusal_brings_it_home(low: bytes) -> None:
     assert flown.decisions()[-1] == (2, "deny", "approval/refused")
 
 
+@pytest.mark.slow
 def test_an_agent_replans_under_way(low: bytes, shorter: Mission) -> None:
     expected: list[Sequence[Invocation]] = []
 
@@ -127,6 +130,7 @@ def test_what_a_new_step_waits_for_comes_within_its_deadline(low: bytes, shorter
     assert before["GPS_RAW_INT"] > after["GPS_RAW_INT"] == 100_000
 
 
+@pytest.mark.slow
 def test_a_recall_brings_it_home_by_the_contingency(low: bytes) -> None:
     def document(flight: Flight) -> bytes:
         utc_us = flight.clock.now().utc_us

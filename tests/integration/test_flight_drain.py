@@ -69,6 +69,7 @@ def flown(folder: Path, flavour: str, without: str, hover_us: int, *, battery: i
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
 def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp_path: Path, flavour: str) -> None:
     found = flown(tmp_path, flavour, "", FAST_US)
@@ -91,6 +92,7 @@ def test_without_the_measurement_it_is_not(tmp_path: Path) -> None:
     assert flown(tmp_path, "ardupilot", ", battery.drain", FAST_US).vehicle.simulation.truth().battery < RESERVE
 
 
+@pytest.mark.slow
 def test_a_battery_that_is_as_declared_finishes_its_mission(tmp_path: Path) -> None:
     found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S)
     assert found.ending.name == "COMPLETED"
@@ -102,6 +104,7 @@ def refused(of: Flown) -> Any:
     return next(each for each in of.records if each["type"] == "decision" and each["outcome"] not in ("allow", "defer"))
 
 
+@pytest.mark.slow
 def test_more_wind_than_declared_is_measured_by_distance_and_brings_it_home(tmp_path: Path) -> None:
     """In 15 m/s it gets on at a third of its speed: a minute takes half as much again, a metre three times as much."""
     found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S, battery=6_000, wind=Wind(15_000, 0, 0))
@@ -120,6 +123,7 @@ def test_nothing_begins_on_a_second_battery_that_is_nearly_empty_and_seldom_repo
     assert any("0 with 99 %, 1 with 4 %" in str(each) for each in found.records)
 
 
+@pytest.mark.slow
 def test_a_second_battery_that_runs_low_brings_it_home_while_the_first_is_full(tmp_path: Path) -> None:
     """Of two that feed the motors the one with less counts; it is not the one with the lower number."""
     second = OtherBattery(Purpose.FLIGHT, 4_200)

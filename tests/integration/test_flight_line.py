@@ -43,6 +43,7 @@ def flies_over_serial(bundle: bytes, folder: Path, flavour: str, baud: int) -> L
     return vehicle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("baud", BAUDS)
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_a_mission_flies_over_a_serial_line(tmp_path: Path, flavour: str, baud: int) -> None:
@@ -57,6 +58,7 @@ def test_every_shipped_mission_flies_over_a_serial_line(tmp_path: Path, name: st
     flies_over_serial(shipped(name), tmp_path, flavour, baud)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "baud"), [("px4", 57_600), ("ardupilot", 57_600), ("px4", 921_600)])
 def test_deadlines_of_a_tenth_of_a_second_fly_over_a_serial_line(tmp_path: Path, flavour: str, baud: int) -> None:
     source = tmp_path / "short.rts"
@@ -66,6 +68,7 @@ def test_deadlines_of_a_tenth_of_a_second_fly_over_a_serial_line(tmp_path: Path,
     assert asked["GPS_RAW_INT"] <= 100_000, "a report within each deadline"
 
 
+@pytest.mark.slow
 def test_a_mission_flies_over_tcp() -> None:
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))

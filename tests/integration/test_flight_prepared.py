@@ -75,6 +75,7 @@ def test_without_it_the_same_mission_is_refused(flavour: str) -> None:
     assert has(flight, tuple(had)) == had
 
 
+@pytest.mark.slow
 @FLAVOURS
 @pytest.mark.parametrize("fault", [
     MessageSilence(at_us=S, message="PARAM_VALUE", for_us=6 * S), LinkLoss(at_us=0, loss=2_000, for_us=20 * S),

@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import pytest
 from msgspec.structs import replace
 
 from rtshcua.adapters.files.roots import opened
@@ -24,6 +25,7 @@ def records(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in lines(folder)]
 
 
+@pytest.mark.slow
 def test_a_run_that_was_killed_in_the_air_comes_down_and_its_log_is_ended_by_the_next(ground: Any, port: int) -> None:
     def runs() -> set[Path]:
         return set((ground.folder / "runs").iterdir())
@@ -66,6 +68,7 @@ def test_a_run_that_was_killed_in_the_air_comes_down_and_its_log_is_ended_by_the
     assert "log-before" not in [record["event"] for record in records(last) if record["type"] == "effect"]
 
 
+@pytest.mark.slow
 def test_a_run_whose_root_expired_while_it_was_in_the_air_comes_down_too(ground: Any, port: int) -> None:
     """Nothing else of an expired root flies, and nobody is asked to trust the log of it."""
     ground.vehicle(port, SPEED)

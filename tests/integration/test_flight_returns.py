@@ -95,6 +95,7 @@ def away(of: ScenarioFlown) -> Callable[[Sample], float]:
 WHY: dict[str, Fault] = {"degraded": faults.BatteryLevel(0, 3_800), "by the pilot": faults.PilotMode(0, Mode.RETURN)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("why", "flavour"), each_once(WHY, ["px4", "ardupilot"]))
 def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str, why: str) -> None:
     found = flown(scenario(when(AfterStep(2, 29 * case.S, 29 * case.S), WHY[why])), flavour, bundle=bundle)

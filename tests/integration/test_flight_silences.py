@@ -112,6 +112,7 @@ def lands_at_home(flavour: str, stage: str, seconds: float, way: Way) -> None:
         assert flown.ending is Ending.COMPLETED, told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "stage", "seconds", "way"),
     [
@@ -151,6 +152,7 @@ def resumed(flavour: str, seconds: float) -> Flown:
     return second.fly()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "seconds"),
     [
@@ -170,6 +172,7 @@ def test_begun_again_in_the_air_it_comes_home_and_lands_nothing_on_the_spot(flav
     assert abs(truth.north_mm) + abs(truth.east_mm) < 5_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "stage"),
     [
@@ -207,6 +210,7 @@ def hovers() -> bytes:
         return sealed(source)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "silences", "way"),
     [

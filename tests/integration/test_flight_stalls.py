@@ -30,6 +30,7 @@ def bundle() -> bytes:
     return case.seal(case.mission(case.short_steps()))
 
 
+@pytest.mark.slow
 @given(
     stalls=STALLS,
     mode=some.sampled_from((Mode.SOFTWARE, Mode.PROCESS)),
@@ -59,6 +60,7 @@ def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
     assert all("vouched for by the key that signed record" in text for text in shown)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("for_s", "height", "flavour"), each_once((28, 44, 60), (16 * case.M, 4 * case.M), ("px4", "ardupilot"))
 )
@@ -100,6 +102,7 @@ def test_a_gap_is_recorded_before_anything_else_and_sealed_at_once() -> None:
     assert f"vouched for by the key that signed record {number + 2} and by the boundary" in claim.text
 
 
+@pytest.mark.slow
 def test_a_flight_that_never_stands_still_tells_of_no_gap() -> None:
     flown = StallingFlight(bundle(), "px4", {}).fly()
     assert not flown.effects("stalled")

@@ -54,6 +54,7 @@ def flown(name: str, flavour: str) -> tuple[Flown, set[str]]:
     return flew, {kind.name for kind in kinds if kind is not None}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "flavour"), SOME)
 def test_what_ships_flies_on_a_stock_copter(name: str, flavour: str) -> None:
     flight, said = flown(name, flavour)

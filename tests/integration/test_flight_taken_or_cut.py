@@ -23,6 +23,7 @@ def others_in_soak(tried: tuple[str, str], *others: str) -> list[Any]:
     return [pytest.param(*each, marks=() if each == tried else pytest.mark.soak) for each in every]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "way"), others_in_soak(("px4", "both"), "down", "up"))
 def test_a_silence_of_some_seconds_ends_no_flight(ground: Any, flavour: str, way: str) -> None:
     """What is only not heard of us is noted, and what is flown goes on; what is not heard is waited for."""
@@ -40,6 +41,7 @@ def test_a_silence_of_some_seconds_ends_no_flight(ground: Any, flavour: str, way
 GOTO = "pilot-goto,at=14s,north=-30m,east=-30m,up=20m"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "fault"), others_in_soak(("ardupilot", GOTO), "pilot,at=14s,mode=position", "pilot-pause,at=14s")
 )

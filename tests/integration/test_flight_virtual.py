@@ -119,6 +119,7 @@ def test_ground_stations_hear_each_decision_and_the_log_what_the_vehicle_said(fl
     assert ("6: Arming motors" in said) == (flavour == "ardupilot"), "PX4 says nothing to an onboard controller"
 
 
+@pytest.mark.slow
 def test_equal_flights_leave_equal_logs_and_so_does_one_that_goes_on_from_a_copy() -> None:
     fault = parse_fault("battery,at=12s,level=24%")
     flight = Flight(shipped("short"), simulated("px4"))
@@ -140,6 +141,7 @@ FALLBACKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "flavour"), each_once(FALLBACKS, FLAVOURS))
 def test_a_breach_in_flight_flies_the_chain_down(fault: str, flavour: str) -> None:
     flown = fly_on(flavour, fault)
@@ -148,6 +150,7 @@ def test_a_breach_in_flight_flies_the_chain_down(fault: str, flavour: str) -> No
     assert flown.dispatched() == ["takeoff", "goto", "inspect_area", *FALLBACKS[fault]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
 def test_a_dropout_lands_nothing_and_ends_nothing(flavour: str) -> None:
     """With charge and position good after it, a silence of 5 s landed the vehicle where it was (recorded, 3 of 3)."""
@@ -161,6 +164,7 @@ def test_a_dropout_lands_nothing_and_ends_nothing(flavour: str) -> None:
 PILLAR = "pillar,at=0s,north=118.5m,east=140m,radius=2m,height=28m"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ARDUPILOT_OR_SOAK)
 def test_a_survey_stops_before_what_stands_in_its_way(flavour: str) -> None:
     flown = fly_on(flavour, PILLAR)
@@ -176,6 +180,7 @@ FAR_JUMP = "gps-jump,at=50s,north=1000m,east=0m"
 JUMPED = ["takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_land"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
 def test_a_jump_out_of_the_airspace_flies_the_chain_down(flavour: str) -> None:
     flown = fly_on(flavour, FAR_JUMP, fence=False)
@@ -219,6 +224,7 @@ def test_whoever_takes_over_wins(fault: str, flavour: str) -> None:
     assert last == ["taken-over", "released", "stood-down"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
 def test_vehicle_that_stays_silent_is_lost_once_it_can_fly_no_more(flavour: str) -> None:
     """This one flies for 3 minutes; what ships says 18, of which all but the beginning is silence."""
@@ -245,6 +251,7 @@ def test_vehicle_of_the_shipped_mission_that_stays_silent_is_lost(flavour: str) 
 POOR_LINKS = ("link-loss,at=5s,loss=20%", "link-delay,at=0s,delay=400ms", "gps-loss,at=20s,for=700ms")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "flavour"), each_once(POOR_LINKS, FLAVOURS))
 def test_a_poor_and_slow_link_is_survived(fault: str, flavour: str) -> None:
     """Up, one leg, home: each kind of command is lost, late, or lacks its fix."""
@@ -259,6 +266,7 @@ def test_the_standard_mission_survives_a_poor_and_slow_link(fault: str, flavour:
     assert fly("standard", flavour, fault).ending is Ending.COMPLETED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ARDUPILOT_OR_SOAK)
 def test_a_lost_fix_stops_it_and_one_that_is_back_brings_it_home(flavour: str) -> None:
     """While the autopilot still vouches for the position nothing lands it on the spot."""
@@ -268,6 +276,7 @@ def test_a_lost_fix_stops_it_and_one_that_is_back_brings_it_home(flavour: str) -
     assert flown.dispatched()[-2:] == ["hover", "return_home"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["20%", "6%"])
 def test_a_low_battery_on_the_ground_flies_nothing(level: str) -> None:
     flown = fly("short", "px4", f"battery,at=0s,level={level}")
@@ -275,6 +284,7 @@ def test_a_low_battery_on_the_ground_flies_nothing(level: str) -> None:
     assert flown.dispatched() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at_s", [0, 1, 3, 10, 60, pytest.param(200, marks=pytest.mark.soak)])
 def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
     pressed = []
@@ -290,6 +300,7 @@ def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
     assert flown.ending is Ending.INTERRUPTED
 
 
+@pytest.mark.slow
 def test_a_full_disk_brings_it_down_and_loses_no_record() -> None:
     def fill(flight: Flight) -> list[Event]:
         flight.sink.full = 50 * case.S < flight.clock.elapsed_us < 80 * case.S

@@ -196,6 +196,7 @@ REFUSED: tuple[tuple[str, Callable[[Hostile], bytes], str], ...] = (
 )
 
 
+@pytest.mark.slow
 def test_whatever_is_refused_changes_nothing(missions: dict[str, tuple[Mission, Policy]]) -> None:
     of = Hostile(missions, HOVERS)
 
@@ -212,6 +213,7 @@ def test_whatever_is_refused_changes_nothing(missions: dict[str, tuple[Mission, 
     assert len(flown.effects("document-refused")) <= 3, "whoever floods does not fill the disk"
 
 
+@pytest.mark.slow
 def test_a_flood_changes_nothing_and_fills_no_disk(missions: dict[str, tuple[Mission, Policy]]) -> None:
     of = Hostile(missions, HOVERS)
     turns: list[int] = []
@@ -241,6 +243,7 @@ def test_an_agent_that_stops_answering_leaves_a_flight_that_ends_by_itself(
     assert kinds(flown)[-1] != 0, "a link brought it home"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late_us", [0, 3 * S])
 def test_an_agent_that_answers_3_s_late_changes_what_was_not_released_and_no_more(
     missions: dict[str, tuple[Mission, Policy]], late_us: int
@@ -263,6 +266,7 @@ def test_an_agent_that_answers_3_s_late_changes_what_was_not_released_and_no_mor
     assert flown.dispatched()[-2:] == [work, "return_home"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["approval", "replan"])
 def test_a_replan_that_races_an_approval_never_flies_what_was_approved_for_other_steps(
     missions: dict[str, tuple[Mission, Policy]], first: str
@@ -317,6 +321,7 @@ def test_nothing_that_is_played_again_after_a_cancellation_revives_the_mission(
     assert set(kinds(flown)[2:]) == {2}
 
 
+@pytest.mark.slow
 def test_a_replan_that_is_played_again_is_refused(missions: dict[str, tuple[Mission, Policy]]) -> None:
     """Also its forerunner: there is no way back to a mission that was replaced."""
     of = Hostile(missions, HOVERS)
@@ -334,6 +339,7 @@ def test_a_replan_that_is_played_again_is_refused(missions: dict[str, tuple[Miss
     assert flown.dispatched() == ["takeoff", "goto", "hover", "return_home"]
 
 
+@pytest.mark.slow
 def test_a_cancellation_on_the_way_home_disturbs_nothing(missions: dict[str, tuple[Mission, Policy]]) -> None:
     of = Hostile(missions, HOVERS)
 

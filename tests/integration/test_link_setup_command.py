@@ -16,6 +16,7 @@ from rtshcua.diagnostics.refusal import Refusal
 AT = "udpin:127.0.0.1:{}"
 
 
+@pytest.mark.slow
 def test_over_real_udp(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     port, path = free_port(), tmp_path / "link.key"
     with Simulator(["--port", str(port), "--flavour", "ardupilot"]):

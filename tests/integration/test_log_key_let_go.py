@@ -18,6 +18,7 @@ def held(public: bytes) -> list[SigningKey]:
     return [each for each in gc.get_objects() if isinstance(each, SigningKey) and each.public == public]
 
 
+@pytest.mark.slow
 def test_the_log_key_is_let_go_before_the_flight(ground: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     bundle = ground.bundle()
     public = ground.store.signing_key(Duty.LOG).public

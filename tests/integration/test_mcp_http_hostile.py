@@ -394,6 +394,7 @@ def test_several_messages_at_once_are_none(served: Served) -> None:
     assert served.status([GREETING, LISTED]) == 400
 
 
+@pytest.mark.slow
 def test_who_connects_and_says_nothing_does_not_keep_others_out(served: Served) -> None:
     """Twice as many as there is room for; some say a part of a request, some are refused and then go on, bit by bit."""
     session = served.greeted()

@@ -226,6 +226,7 @@ REFUSED: tuple[dict[str, Any], ...] = (
 )
 
 
+@pytest.mark.slow
 def test_what_a_hostile_agent_calls_is_answered_and_signs_nothing(ground: Any, base: str, place: Path) -> None:
     assert len(HOSTILE) + len(REFUSED) >= 60
 
@@ -248,6 +249,7 @@ def test_what_a_hostile_agent_calls_is_answered_and_signs_nothing(ground: Any, b
     session_of(ground, base, place, work)
 
 
+@pytest.mark.slow
 def test_who_subscribed_is_told_when_the_flight_changes_and_not_after(ground: Any, base: str, place: Path) -> None:
     """A vehicle that is played by a socket: it waits, then flies, then ends."""
     updated: list[str] = []
@@ -291,6 +293,7 @@ def test_who_subscribed_is_told_when_the_flight_changes_and_not_after(ground: An
     session_of(ground, base, place, work, heard=updated.append)
 
 
+@pytest.mark.slow
 def test_what_the_first_call_needs_is_loaded_before_the_host_is_greeted(ground: Any, base: str, place: Path) -> None:
     """A call that comes with the greeting finds the compiler there, and waits for the policy alone."""
     words = ["mcp", base, "--to", str(place), "--with", str(POLICY)]
@@ -619,6 +622,7 @@ def _called(number: int, name: str = "check_mission", **arguments: Any) -> dict[
     return {"id": number, "method": "tools/call", "params": {"name": name, "arguments": arguments}}
 
 
+@pytest.mark.slow
 def test_a_host_that_cancels_a_burst_of_calls_is_served_on(ground: Any, base: str, place: Path) -> None:
     server = _Bare(ground, base, place)
     server.say(_called(1, mission=PROPOSAL))

@@ -29,6 +29,7 @@ def made(folder: Path) -> dict[str, int]:
     return {name: stat.S_IMODE(each.st_mode) for name, each in found.items() if not stat.S_ISLNK(each.st_mode)}
 
 
+@pytest.mark.slow
 def test_what_all_commands_make_is_written_by_its_owner_alone(
     umask: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -27,6 +27,7 @@ def right(flavour: str) -> tuple[Qualifying, dict[str, QualificationCheck]]:
     return flown, {each.slug: each for each in flown.fly()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_right_vehicle_holds_every_check(flavour: str) -> None:
     _, checks = right(flavour)
@@ -96,6 +97,7 @@ AGAIN = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("habit", "flavour", "sortie", "slug"),
     [*WRONG, *(pytest.param(*each, marks=pytest.mark.soak) for each in AGAIN)],
@@ -141,6 +143,7 @@ def test_the_pilot_of_a_real_vehicle_is_asked_and_waited_for(flavour: str) -> No
     assert flown.observed.sorties[0].down
 
 
+@pytest.mark.slow
 def test_a_pilot_who_does_not_take_over_is_told_so_and_it_comes_home() -> None:
     flown = Qualifying("px4", pilot=lambda vehicle, text: None)
     checks = {each.slug: each for each in flown.fly([BY_PILOT])}
@@ -160,6 +163,7 @@ def test_a_takeover_that_nobody_asked_for_ends_it() -> None:
     assert [(each.name, each.ending) for each in flown.observed.sorties] == [("climb", "stood-down")]
 
 
+@pytest.mark.slow
 def test_what_is_commanded_in_a_silence_ends_it() -> None:
     """A silence is a test; a fallback is not to wait for it."""
     begun: list[int] = []

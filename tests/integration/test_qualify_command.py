@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from rtshcua import library
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -33,6 +35,7 @@ def doctor(ground: Any, link: list[str]) -> dict[str, Any]:
     return next(each for each in found["findings"] if each["slug"] == "autopilot/qualified")
 
 
+@pytest.mark.slow
 def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_path: Path) -> None:
     link = ["--connect", f"udpin:127.0.0.1:{port}"]
     as_quad = [*link, "--vehicle", "quad-07", "--speed", str(SPEED), "--json"]

@@ -61,6 +61,7 @@ def made() -> Iterator[Listening]:
         yield found
 
 
+@pytest.mark.slow
 def test_a_flight_of_which_the_run_has_no_key(ground: Any, made: Listening, port: int) -> None:
     aboard = Aboard(ground, made, port, signed=True)
     run = aboard.run()
@@ -79,6 +80,7 @@ def test_a_flight_of_which_the_run_has_no_key(ground: Any, made: Listening, port
     assert again.code == 5, "a bundle flies once"
 
 
+@pytest.mark.slow
 def test_a_runtime_that_is_killed(ground: Any, made: Listening, port: int) -> None:
     """The boundary is gone at once, and the next run brings the vehicle down. The log that broke off stays open: its
     key is not here.
@@ -107,6 +109,7 @@ def test_a_runtime_that_is_killed(ground: Any, made: Listening, port: int) -> No
     assert aboard.verified(killed)[0] == 0, "it is ended where the log's key is"
 
 
+@pytest.mark.slow
 def test_what_is_in_the_air_comes_down_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
     """Nobody can verify that log, for the log's key is drawn; nothing new flies."""
     aboard = Aboard(ground, made, port, signed=False)
@@ -126,6 +129,7 @@ def test_what_is_in_the_air_comes_down_without_the_boundary(ground: Any, made: L
     assert aboard.verified(log)[0] == 4
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_enforces_signing_is_not_waited_for_without_the_boundary(
     ground: Any, made: Listening, port: int
 ) -> None:
@@ -145,6 +149,7 @@ def test_a_vehicle_that_enforces_signing_is_not_waited_for_without_the_boundary(
     assert aboard.run().end().code == 6
 
 
+@pytest.mark.slow
 def test_a_boundary_that_is_killed_in_flight(ground: Any, made: Listening, port: int) -> None:
     """What it signed ahead brings the vehicle down, which enforces signing."""
     aboard = Aboard(ground, made, port, signed=True)
@@ -171,6 +176,7 @@ def away(folder: Path) -> Iterator[None]:
         elsewhere.rename(folder)
 
 
+@pytest.mark.slow
 def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
     """As the unit has it, with no key store at all: what is handed in flies; one that is killed is begun again, and
     brings the vehicle down.
@@ -196,6 +202,7 @@ def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
     assert aboard.verified(other)[0] == 0
 
 
+@pytest.mark.slow
 def test_what_an_earlier_run_owes_is_left_to_one_that_may_put_it_back(ground: Any, made: Listening, port: int) -> None:
     """This one may set nothing, and its log says so."""
     aboard = Aboard(ground, made, port, signed=False)
@@ -230,6 +237,7 @@ def test_keys_that_the_trust_root_does_not_name(ground: Any, made: Listening, po
         made.give()
 
 
+@pytest.mark.slow
 def test_the_doctor_looks_at_it_and_uses_nothing_up(ground: Any, made: Listening, port: int) -> None:
     aboard = Aboard(ground, made, port, signed=False)
     words = ("doctor", "--connect", f"udpin:127.0.0.1:{port}", "--seconds", "3", "--json", "--boundary-socket")

@@ -9,6 +9,8 @@ from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from rtshcua.adapters.boundary_process import program
 
 #: so slow that a busy machine's hold-ups stay below what a permit lasts
@@ -31,6 +33,7 @@ def owed(ground: Any) -> dict[str, list[str]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_what_the_next_puts_back(ground: Any, port: int) -> None:
     def runs() -> set[Path]:
         return set((ground.folder / "runs").iterdir())
@@ -58,6 +61,7 @@ def test_a_killed_run_leaves_what_the_next_puts_back(ground: Any, port: int) -> 
     assert verified.code == 0, verified.events
 
 
+@pytest.mark.slow
 def test_what_a_run_that_died_on_the_ground_left_is_put_back_though_the_next_is_refused(ground: Any, port: int) -> None:
     ground.vehicle(port, SPEED, *OWNERS)
     ground.command = ground.afresh  # its view is as slow to start as it is: else it tells too late to be killed in time
@@ -75,6 +79,7 @@ def test_what_a_run_that_died_on_the_ground_left_is_put_back_though_the_next_is_
     assert owed(ground) == {}
 
 
+@pytest.mark.slow
 def test_ctrl_c_on_the_ground_puts_back_what_was_set(ground: Any, port: int) -> None:
     ground.vehicle(port, SPEED, *OWNERS)
     ground.command = ground.afresh  # as above: else it flies already
@@ -88,6 +93,7 @@ def test_ctrl_c_on_the_ground_puts_back_what_was_set(ground: Any, port: int) -> 
     assert owed(ground) == {}
 
 
+@pytest.mark.slow
 def test_an_agent_is_heard_and_told_while_parameters_are_set(ground: Any, port: int) -> None:
     ground.vehicle(port, SPEED, *OWNERS)
     with tempfile.TemporaryDirectory(dir="/tmp") as folder, socket.socket(socket.AF_UNIX) as link:

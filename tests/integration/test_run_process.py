@@ -40,6 +40,7 @@ def let_go(kept: Path) -> None:
             time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_flight_by_a_boundary_of_its_own(ground: Any) -> None:
     """It has the link's key: a vehicle that enforces signing obeys, and the log is what the boundary signed for. What
     a run remembers is its own, and in reach of who takes it over; the boundary remembers that the bundle flew, too.
@@ -62,6 +63,7 @@ def test_a_flight_by_a_boundary_of_its_own(ground: Any) -> None:
     assert "undecided" in [event["event"] for event in again.events], "by the boundary"
 
 
+@pytest.mark.slow
 def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground: Any, port: int) -> None:
     """What it kept was damaged while nobody flew: nothing new flies, and what does comes down without it."""
     ground.vehicle(port, SPEED)
@@ -125,6 +127,7 @@ def test_a_boundary_that_hangs_ends_with_its_runtime(ground: Any, port: int) -> 
     assert modes(ground) == ["process", "process"]
 
 
+@pytest.mark.slow
 def test_what_is_in_the_air_comes_down_where_another_holds_the_boundarys_file(ground: Any, port: int) -> None:
     """Whoever holds it is no run: the one before broke off, and nobody holds its log."""
     ground.vehicle(port, SPEED)
@@ -166,6 +169,7 @@ def heights(folder: Path, after_us: int) -> tuple[list[int], list[int]]:
     return height, landed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "signed"), each_once(("px4", "ardupilot"), (False, True)))
 def test_a_boundary_that_is_killed_in_flight(flavour: str, signed: bool, ground: Any) -> None:
     """What it had signed ahead brings the vehicle down, which obeys nothing else; the log says so, and proves no more
@@ -204,6 +208,7 @@ def test_a_boundary_that_is_killed_in_flight(flavour: str, signed: bool, ground:
 RESTARTS = [pytest.param(False, SPEED, id="keyless"), pytest.param(True, 1, id="signed", marks=pytest.mark.soak)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("signed", "speed"), RESTARTS)
 def test_a_run_whose_boundary_died_with_it_comes_down_by_the_contingency(
     signed: bool, speed: int, ground: Any, port: int

@@ -93,6 +93,7 @@ def test_an_address_that_is_none(ground: Any, capfd: Any, text: str) -> None:
     assert refused(capfd, ground.bundle(), "--connect", text, *IDENTITY)[0] == 2
 
 
+@pytest.mark.slow
 def test_a_bundle_with_any_changed_byte_is_refused(ground: Any, capfd: Any) -> None:
     bundle = ground.bundle()
     good = Path(bundle).read_bytes()

@@ -13,6 +13,7 @@ SPEED = 10
 STOPPED_S = 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "mode"), each_once(("px4", "ardupilot"), ("software", "process")))
 def test_a_run_that_was_stopped_tells_of_a_gap_and_its_log_verifies(ground: Any, flavour: str, mode: str) -> None:
     """The case: stopped in flight; the seal comes late, and nobody is accused. What `run` calls whole verifies."""
@@ -39,6 +40,7 @@ def test_a_run_that_was_stopped_tells_of_a_gap_and_its_log_verifies(ground: Any,
         assert any(claim["slug"] == "gap" for claim in said["unproven"])
 
 
+@pytest.mark.slow
 def test_a_log_that_does_not_verify_is_not_called_whole(ground: Any) -> None:
     """Something altered the log while it flew: a defect card does. The run reads it back before it vouches for it."""
     run = ground.run(ground.bundle(), speed=SPEED)

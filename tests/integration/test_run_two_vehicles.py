@@ -21,6 +21,7 @@ def both(port: int) -> Iterator[list[str]]:
         yield ["--connect", f"udpin:127.0.0.1:{port}"]
 
 
+@pytest.mark.slow
 def test_neither_is_flown(ground: Any, both: list[str]) -> None:
     run = ground.run(ground.bundle(), *both, "--vehicle", case.policy().vehicle.identity, speed=10).end()
     assert run.code == 5, run.stderr
@@ -32,6 +33,7 @@ def test_neither_is_flown(ground: Any, both: list[str]) -> None:
     assert verdicts["link/other-vehicle"] == "stop"
 
 
+@pytest.mark.slow
 def test_the_one_that_is_named_is_met(ground: Any, both: list[str]) -> None:
     words = [*both, "--vehicle", case.policy().vehicle.identity, "--system", "2", "--dry-run"]
     run = ground.run(ground.bundle(), *words, speed=10).end()

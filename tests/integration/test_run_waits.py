@@ -28,6 +28,7 @@ def place() -> Iterator[Path]:
         yield Path(name) / "s"
 
 
+@pytest.mark.slow
 def test_what_is_handed_in_flies_once(ground: Any, place: Path) -> None:
     words = ("--wait", "--agent-socket", str(place), *APART)
     key = ground.folder / "link.key"
@@ -69,6 +70,7 @@ def test_ctrl_c_ends_the_wait(ground: Any, place: Path) -> None:
     assert not place.exists()
 
 
+@pytest.mark.slow
 def test_a_flight_that_broke_off_is_brought_down_by_the_wait_that_is_begun_again(
     ground: Any, place: Path, port: int
 ) -> None:

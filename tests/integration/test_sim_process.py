@@ -80,6 +80,7 @@ def close_to(value: float, target: float, by: float) -> bool:
     return abs(value - target) <= by
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_it_flies_out_and_home(flavour: str) -> None:
     with Station("--flavour", flavour, "--speed", "40", "--wind", "4,270,1", "--cruise", "8") as s:

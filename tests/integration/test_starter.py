@@ -32,6 +32,7 @@ def commands_of(workflow: dict[str, Any]) -> list[list[str]]:
     return [words[1:] for words in (shlex.split(line, comments=True) for line in lines) if words[:1] == ["rtshcua"]]
 
 
+@pytest.mark.slow
 def test_its_own_workflow_passes(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     commands = commands_of(yaml.safe_load((place / ".github/workflows/policy.yml").read_text(encoding="utf-8")))
     assert [words[0] for words in commands] == ["fmt", "lint", "test", "keys", "compile"]
@@ -50,6 +51,7 @@ def test_its_own_hooks_pass(place: Path, capsys: pytest.CaptureFixture[str]) -> 
         assert all(re.search(hook["files"], source) for source in sources)
 
 
+@pytest.mark.slow
 def test_it_is_judged_by_its_settings(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settings = place / "rtshcua.toml"
     text, changed = re.subn(r"(?m)^fail-under = \d+", "fail-under = 100", settings.read_text(encoding="utf-8"))
@@ -59,6 +61,7 @@ def test_it_is_judged_by_its_settings(place: Path, capsys: pytest.CaptureFixture
     assert "less than 100 %" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_test_notices_a_rule_that_changed(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rules = place / "policies/rules.rts"
     rules.write_text(rules.read_text("utf-8").replace("altitude <= 25 m", "altitude <= 26 m"), encoding="utf-8")
@@ -66,6 +69,7 @@ def test_a_test_notices_a_rule_that_changed(place: Path, capsys: pytest.CaptureF
     assert "error[E1411]" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_page_works_as_it_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -78,6 +78,7 @@ def test_its_command_is_one_that_run_takes(tmp_path: Path, capsys: pytest.Captur
     assert "no such file" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_flight_with_no_memory_that_is_written_and_run(ground: Any) -> None:
     """MemoryDenyWriteExecute= of systemd, by the kernel's own means (PR_SET_MDWE), where it has them."""
     start = (

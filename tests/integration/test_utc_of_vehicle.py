@@ -37,6 +37,7 @@ def unsynchronised(ground: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(utc, "kernel_error_us", lambda: None)
 
 
+@pytest.mark.slow
 def test_the_vehicles_time_bounds_ours(ground: Any, capfd: Any, port: int) -> None:
     """ArduCopter tells it when it is asked."""
     ground.vehicle(port, 1, "--flavour", "ardupilot")
@@ -44,6 +45,7 @@ def test_the_vehicles_time_bounds_ours(ground: Any, capfd: Any, port: int) -> No
     assert step["outcome"] == "allow", step
 
 
+@pytest.mark.slow
 def test_without_it_freshness_is_unknown_until_somebody_states_a_bound(
     ground: Any, capfd: Any, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -54,6 +56,7 @@ def test_without_it_freshness_is_unknown_until_somebody_states_a_bound(
     assert rehearsed(ground, capfd, port, "--utc-error", "200ms")["outcome"] == "allow"
 
 
+@pytest.mark.slow
 def test_a_rehearsal_takes_no_time_that_the_boundary_of_the_flight_would_not_take(
     ground: Any, capfd: Any, port: int
 ) -> None:

@@ -36,6 +36,7 @@ def flight(name: str) -> ScenarioFlight:
     return next(each for each in found.found if each.scenario.name == name)
 
 
+@pytest.mark.slow
 def test_it_passes_check_and_its_tests_reach_nine_in_ten(farm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["check", "missions"]) == 0, capsys.readouterr().err
     assert app.main(["test", "--coverage", "--fail-under", "90", "tests/farm.rts"]) == 0, capsys.readouterr().out

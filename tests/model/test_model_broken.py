@@ -105,6 +105,7 @@ NEVER: dict[str, tuple[type, str, Callable[[Any], Any], str, str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NEVER)
 def test_what_must_never_be_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     owner, method, broken, words, event = NEVER[name]
@@ -152,6 +153,7 @@ AFTER: dict[str, tuple[type, str, Callable[[Any], Any], str, Small]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", AFTER)
 def test_what_must_follow_a_silence_a_takeover_and_a_failed_stop_is_seen(
     name: str, monkeypatch: pytest.MonkeyPatch
@@ -183,6 +185,7 @@ ENDLESS: dict[str, tuple[type, str, Callable[[Any], Any], str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENDLESS)
 def test_a_path_without_an_end_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     owner, method, broken, event = ENDLESS[name]

@@ -42,6 +42,7 @@ def _contracts(of: Small) -> list[object]:
     return [invocation.contract for invocation in of.mission.invocations]
 
 
+@pytest.mark.slow
 def test_every_state_of_a_tiny_run() -> None:
     found = check(TINY)
     assert found.states > 400, "the search must not be cut off by what it does not try"

@@ -81,6 +81,7 @@ def check(lag_us: int, last: MotionKind, name: str, begun_ms: int) -> str:
     return "told" if told else "seen before"
 
 
+@pytest.mark.slow
 def test_a_mode_that_a_pilot_chose_is_not_taken_back_by_a_leg() -> None:
     """3 of 25 aimed tries did, at the real one. What left meanwhile changed no mode, and is told."""
     ends = Counter(
@@ -95,6 +96,7 @@ def test_no_leg_takes_a_mode_back_in_any_order() -> None:
     print(Counter(check(*each) for each in orders()))
 
 
+@pytest.mark.slow
 def test_a_stop_takes_no_mode_back() -> None:
     """A fallback leaves on a mode report that may be 300 ms old: it asks for no mode where it is in Hold."""
     for begun_ms in range(2, 20, 3):
@@ -133,6 +135,7 @@ def check_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> 
     assert may_be_lost or kept == (True, True), (lag_us, phase_ms, after_ms, kind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ANY_KIND)
 def test_a_command_that_begins_before_a_takeover_is_confirmed_leaves_it_to_the_pilot(kind: MotionKind) -> None:
     """One report of it may have come by then: it is neither forgotten, nor taken for the mode of what flew before."""

@@ -34,6 +34,7 @@ def test_each_says_what_is_wrong() -> None:
     assert len(set(lines)) == len(lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("files", parts(FILES, 2))
 def test_the_one_mistake_is_found(files: Sequence[Path]) -> None:
     wrong = {}

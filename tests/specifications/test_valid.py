@@ -31,6 +31,7 @@ def test_each_says_first_what_it_alone_is_about() -> None:
     assert len(set(first_lines)) == len(SPECIFICATIONS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("specifications", parts(SPECIFICATIONS, 4))
 def test_nothing_is_found(specifications: Sequence[Path]) -> None:
     found = {path.stem: findings(path) for path in specifications}

@@ -270,6 +270,7 @@ def met_its_end(run: Run) -> list[str]:
     return [*wrong, "it was left in the air"] if run.vehicle.airborne else wrong
 
 
+@pytest.mark.slow
 @given(worlds.CHANCES)
 @settings(max_examples=20)
 def test_whatever_an_agent_does_or_does_not_do_the_flight_ends_as_the_policy_has_it(of: Random) -> None:

@@ -284,6 +284,7 @@ def test_without_enforcement_it_does_not_hold() -> None:
     assert breaks("a permit for what is inadmissible", UNENFORCED)
 
 
+@pytest.mark.slow
 @pytest.mark.altered
 @pytest.mark.parametrize("step", [name for _, name in NAMES])
 def test_a_decision_that_forgets_a_step_is_noticed(step: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,6 +123,7 @@ def run(folder: Path, *words: str, **files: str) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
     code, said = run(tmp_path, test_a=PASSES, test_b=FAILS, test_c=DIES, test_d=PASSES)
     assert code == 1, said
@@ -143,6 +144,7 @@ def test_two_of_three_processes_begin_with_the_last_files() -> None:
     assert given == [[0, 1], [6], [5], [2], [3, 4], []]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "files", "told"),
     [
@@ -157,6 +159,7 @@ def test_it_ends_early_or_at_the_end(tmp_path: Path, words: tuple[str, ...], fil
     assert told in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "told"),
     [

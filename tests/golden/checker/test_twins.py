@@ -80,6 +80,7 @@ def _in_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(CHECKOUT)
 
 
+@pytest.mark.slow
 def test_a_rejected_twin_has_its_one_code_and_reads_well() -> None:
     others, read, kept = {}, {}, {}
     for name in REJECTED:

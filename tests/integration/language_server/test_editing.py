@@ -10,6 +10,7 @@ from rtshcua.adapters.language_server.disk import uri_of
 from virtual.editor import HEAD, MISSION, Editor, at, document
 
 
+@pytest.mark.slow
 def test_findings_come_at_once_and_more_when_the_author_pauses(editor: Editor, folder: Path) -> None:
     uri = uri_of(str(folder / "pause.rts"))
     assert editor.open(uri, MISSION) == []

@@ -17,6 +17,7 @@ from virtual.editor import HEAD, PATIENCE, Editor, at, document
 T = TypeVar("T")
 
 
+@pytest.mark.slow
 def test_where_a_file_is_imported(editor: Editor, folder: Path) -> None:
     one, other = (uri_of(str(folder / name)) for name in ("near.rts", "far.rts"))
     editor.open(one, HEAD)
@@ -87,6 +88,7 @@ def test_formatting_is_as_wide_as_the_project_says(editor: Editor, folder: Path)
     assert made["narrow/as_it_is.rts"] == made["wide.rts"] == ""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_it_ends_when_the_editor_dies(tmp_path: Path) -> None:
     """Without a word, in the middle of a message; and so does the process that proves."""

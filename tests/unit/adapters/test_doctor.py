@@ -103,6 +103,7 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
     assert asked - own_checks == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flavour", "parameters", "slug", "needed", "advice"),
     [
@@ -243,6 +244,7 @@ def test_another_return_altitude_than_the_policy_says() -> None:
     assert "RTL_RETURN_ALT" in found["mission/unready"].found
 
 
+@pytest.mark.slow
 @rows(
     ("flavour", "parameter", "needed"),
     [

@@ -68,6 +68,7 @@ def test_the_order_in_which_flights_come_back_changes_nothing() -> None:
     assert all_of(Shuffled(1)) == all_of(Shuffled(2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [0, 1, FIRST - 1, FIRST, FIRST + 1, FIRST + ROUND + 50])
 def test_an_interrupted_campaign_goes_on_as_if_nothing_had_been(most: int) -> None:
     first = Shuffled(3, most)
@@ -156,6 +157,7 @@ def few() -> list[Flight]:
     return [Flight(number, drawn(ORDER, number, {}).scenario) for number in range(5)]
 
 
+@pytest.mark.slow
 def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
     processes = Processes(1)
     flown = list(processes.fly(DiesOnce(b"", str(tmp_path / "died").encode(), ()), few()))
@@ -163,6 +165,7 @@ def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
     assert sorted(flown, key=lambda each: each.number) == [result(flight) for flight in few()]
 
 
+@pytest.mark.slow
 def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown() -> None:
     processes = Processes(1)
     flown = sorted(processes.fly(DiesAlways(b"", b"", ()), few()), key=lambda each: each.number)

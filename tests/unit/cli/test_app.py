@@ -61,6 +61,7 @@ def test_the_door_opens_without_loading_what_is_behind_it(words: list[str]) -> N
     assert not heavy & set(run.stderr.split())
 
 
+@pytest.mark.slow
 def test_what_ships_is_checked_without_floating_point_geometry(checkout: Path) -> None:
     """What a check needs not takes long to import, and the floats of geometry differ between machines."""
     files = [str(path) for folder in ("skills", "policies", "missions") for path in (checkout / folder).glob("*.rts")]
@@ -87,6 +88,7 @@ def test_unknown_words(word: str, answer: str, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().err == f"error[usage]: {answer}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", table.COMMANDS, ids=lambda row: row.name)
 def test_every_row_leads_to_a_command_with_help(row: table.Row, capsys: pytest.CaptureFixture[str]) -> None:
     door = import_module(row.module).app

@@ -66,6 +66,7 @@ def as_json(capsys: pytest.CaptureFixture[str]) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_runs_are_added_and_the_unclosed_one_is_told(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("add", runs, *ROOT) == ExitCode.INCOMPLETE
     first, last = capsys.readouterr().out.splitlines()
@@ -109,6 +110,7 @@ def test_audit_derives(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "decision/" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("archived")
 def test_verified_again(capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("verify", *ROOT, "--jobs", 1) == ExitCode.INCOMPLETE
@@ -228,6 +230,7 @@ def test_what_makes_no_sense(
     assert text in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_cluster_that_is_none_is_told(runs: Path) -> None:
     """In a process of its own: a client of a cluster leaves a thread behind."""
     words = ["archive", "add", str(runs / "quad-07-0"), *ROOT, "--cluster", "nonsense"]
@@ -289,6 +292,7 @@ def test_text_of_the_world_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -
     assert capsys.readouterr().out == "detail\n<U+001B>[2Jgone<U+000A>\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("again", [(), ("--reindex",)])
 @pytest.mark.usefixtures("archived")
 def test_a_log_that_is_gone_fails_and_the_others_are_verified(
@@ -330,6 +334,7 @@ def test_what_is_no_log_keeps_no_log_of_its_folder_out(
     assert "`flown/b/log.jsonl` is not a log of this program" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_two_stories_of_one_boot_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("one", "other"):
         (tmp_path / name).mkdir()

@@ -66,6 +66,7 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
     return code, out, err
 
 
+@pytest.mark.slow
 def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The one that flies: a few real flights, from the source to the report."""
     code, out, err = run(capsys, "--flights", "2", "--json", "--fault", "link-silence", "--fault", "wind", "-o", "made")
@@ -227,6 +228,7 @@ def test_a_mission_that_fails_without_faults_is_refused(
     assert "on px4 the mission fails even if nothing goes wrong: flew into the ground" in err
 
 
+@pytest.mark.slow
 def test_who_is_asked_for_an_approval_gives_it_in_every_flight_where_that_is_asked_for(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:

@@ -17,6 +17,7 @@ def shell(line: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(["sh", "-c", line], cwd=folder, capture_output=True, text=True, check=False, timeout=60)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words", ["--version", "--help", "show a.bundle", "explain E1001", "why a.bundle --step 1", "show -h"]
 )
@@ -26,6 +27,7 @@ def test_closed_output_is_quiet_and_not_a_success(words: str, tmp_path: Path) ->
     assert (done.returncode, done.stderr) == (ExitCode.FULL, "")
 
 
+@pytest.mark.slow
 def test_closed_errors_do_not_go_to_the_output(tmp_path: Path) -> None:
     done = shell(f"{COMMAND} show nothing.bundle 2>&-", tmp_path)
     assert (done.returncode, done.stdout) == (ExitCode.INPUT, "")
@@ -50,6 +52,7 @@ def test_the_view_of_a_run_ends_as_if_its_reader_had_left(style: str, tmp_path: 
     assert (done.returncode, done.stderr) == (1, "")
 
 
+@pytest.mark.slow
 def test_a_help_page_whose_reader_left(tmp_path: Path) -> None:
     reader, writer = os.pipe()
     os.close(reader)

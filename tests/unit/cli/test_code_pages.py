@@ -90,6 +90,7 @@ def test_a_page_has_its_title_its_sentence_and_its_sections() -> None:
         assert max(map(len, page.text.splitlines())) <= 120, code.id
 
 
+@pytest.mark.slow
 def test_a_bad_example_has_its_finding_alone() -> None:
     wrong = {}
     for code in SHOWN:
@@ -101,6 +102,7 @@ def test_a_bad_example_has_its_finding_alone() -> None:
     assert wrong == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shown", parts(SHOWN, 3))
 def test_a_good_example_has_no_finding(shown: Sequence[Code]) -> None:
     wrong = {}

@@ -312,6 +312,7 @@ def test_what_is_no_recall_is_not_sent(
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_operator_follows_a_flight_and_calls_it_home(here: Path, listening: Path) -> None:
     words = [str(Path(sys.executable).with_name("rtshcua")), "operator", "low.bundle", "--to", str(listening), "--json"]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as console:

@@ -56,6 +56,7 @@ def test_a_command_names_what_permits_it(log: Path, capsys: pytest.CaptureFixtur
     assert "durability 1 (written): it outlives the process" in told
 
 
+@pytest.mark.slow
 def test_every_record_can_be_told(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for record in RECORDS:
         assert explain(log, record["seq"], "--json", "--no-derive") == ExitCode.OK

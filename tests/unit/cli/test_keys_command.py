@@ -297,6 +297,7 @@ def test_a_further_mission_key_is_for_what_it_names(capsys: pytest.CaptureFixtur
     assert app.main(["keys", "mission", "reflex", "--role", "r", "--policy", "p"]) == ExitCode.USAGE
 
 
+@pytest.mark.slow
 def test_keys_in_earnest_are_added_under_passphrases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first, own = tmp_path / "first", tmp_path / "own"
     write_new(first, PASSPHRASE.encode(), mode=0o600)
@@ -357,6 +358,7 @@ def test_a_key_is_revoked_by_id_by_its_first_digits_or_by_its_file(capsys: pytes
     assert len(store.chain()) == 2, "what lies before a gap leads nowhere"
 
 
+@pytest.mark.slow
 def test_a_key_is_replaced_by_one_with_its_bounds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "passphrase"
     write_new(file, PASSPHRASE.encode(), mode=0o600)

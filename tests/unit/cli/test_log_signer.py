@@ -16,6 +16,7 @@ def key() -> SigningKey:
     return SigningKey.from_seed(SEED, duty=Duty.LOG)
 
 
+@pytest.mark.slow
 def test_this_process_signs_until_the_key_is_handed_over() -> None:
     signer = LogSigner(key())
     assert signer.sign(TEXT) == key().sign(TEXT, duty=Duty.LOG)

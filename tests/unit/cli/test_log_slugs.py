@@ -66,6 +66,7 @@ def documented_slugs() -> set[str]:
     return found
 
 
+@pytest.mark.slow
 def test_every_finding_that_is_written_down_is_explained() -> None:
     assert len(literal_slugs()) > 80
     assert [slug for slug in sorted(literal_slugs()) if log_slugs.find(slug) is None] == []
@@ -81,6 +82,7 @@ def test_every_refusal_of_something_signed_is_explained() -> None:
     assert [slug for slug in sorted(refused) for kind in kinds if log_slugs.find(kind + slug) is None] == []
 
 
+@pytest.mark.slow
 def test_what_is_explained_can_be_found() -> None:
     """A slug that nothing prints any more would mislead."""
     written = literal_slugs() | {f"seal/{part}" for part in _PARTS.values()} | {"boundary/frames", "boundary/clock"}

@@ -97,6 +97,7 @@ def test_frames_that_were_changed_after_the_flight_prove_nothing(
     assert said["failure"]["slug"] == "telemetry/changed"
 
 
+@pytest.mark.slow
 def test_commands_that_were_sent_and_are_not_there_are_not_spoken_for(
     flown: tuple[list[bytes], Entries], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -64,6 +64,7 @@ def told(capsys: pytest.CaptureFixture[str], *words: str, code: int = ExitCode.O
     return said.out + said.err
 
 
+@pytest.mark.slow
 def test_every_command_gives_the_inspection_the_same_number(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert f"{ASKED} inspect_area" in told(capsys, "check", "low.rts")
     assert f"{ASKED} inspect_area(" in told(capsys, "show", "low.bundle")

@@ -261,6 +261,7 @@ def test_ctrl_c(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pyt
     assert (code, err) == (ExitCode.INTERRUPTED, "error: interrupted\n")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no pipes of this kind")
 def test_a_reader_that_left(here: Path) -> None:
     command = [sys.executable, "-m", "rtshcua.cli.app", "test"]

@@ -47,6 +47,7 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
     return code, out, err
 
 
+@pytest.mark.slow
 def test_scenarios_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "--coverage", "--junit", "report.xml", "-v")
     assert code == ExitCode.TESTS
@@ -63,6 +64,7 @@ def test_scenarios_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert all(float(case.get("time", "0")) > 0.01 for case in suite.iter("testcase")), "a flight takes its time"
 
 
+@pytest.mark.slow
 def test_the_example_of_the_reference_flies_as_it_expects(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = (Path(__file__).parents[3] / "docs" / "language.md").read_text(encoding="utf-8")
     example = page.split("## Scenarios\n\n```rts\n")[1].split("```")[0]

@@ -71,6 +71,7 @@ def test_late(capsys: pytest.CaptureFixture[str]) -> None:
     assert (found["outcome"], found["reason"]) == ("fallback", "timing/no-slack")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -134,6 +134,7 @@ def assert_orderly(run: Run) -> None:
     assert not any(isinstance(action, Command) for number in released for action in run.actions[number:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_every_sequence_ends_and_nothing_is_sent_that_should_not_be(situation: str) -> None:
     """Each event first and each second in every situation, every pair in one; the other pairs are for soak."""

@@ -414,6 +414,7 @@ def violations(run: Run) -> list[str]:
     return [record["detail"] for record in run.records if record.get("event") == "violated"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gaps", [(0,), (8,), (3, 3, 3), (2, 2, 2, 2, 2, 2, 2, 2)])
 def test_the_time_limit_of_a_step_runs_in_link_time_and_its_reason_names_the_silence(gaps: tuple[int, ...]) -> None:
     """What flies it waits in link time, too: a limit by the clock on the wall ended a hover of 20 s for a silence."""
@@ -583,6 +584,7 @@ def go_on(run: Run, us: int) -> None:
         run.tick()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("situation", AIR)
 def test_one_that_answers_nothing_is_waited_for_as_long_as_it_can_fly(situation: Situation) -> None:
     """Its chain is flown meanwhile, as far as it may arrive, and its end is not the end of the run."""

@@ -106,6 +106,7 @@ TRIED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stage", "along", "last"), TRIED)
 def test_it_wins_over_whatever_comes_with_it_in_any_order(stage: Callable[[], Run], along: str, last: Event) -> None:
     template = stage()

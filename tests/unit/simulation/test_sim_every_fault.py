@@ -79,6 +79,7 @@ def test_there_is_an_example_of_each() -> None:
     assert all(type(EXAMPLES[name](0)) is kind for name, kind in OF_VEHICLE.items())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(EXAMPLES))
 def test_it_changes_what_is_seen(
     name: str, pilot: Callable[..., Any], flavour: str, on_its_way: dict[str, Any]

@@ -82,6 +82,7 @@ def landed(heard: Heard) -> object:
     return heard.message.landed_state if heard.name == "EXTENDED_SYS_STATE" else None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(KEPT))
 def test_it_does_what_the_real_one_did(name: str) -> None:
     trace, config = Trace(name), CONFIGS[name]

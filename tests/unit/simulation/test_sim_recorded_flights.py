@@ -149,6 +149,7 @@ def prearm(heard: Heard) -> object:
     return bool(heard.message.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(KEPT))
 def test_it_flies_as_the_real_one_flew(name: str) -> None:
     real = Trace(name).of_vehicle

@@ -5,10 +5,13 @@ ArduCopter 4.7 count it: the parameters, the place and the height, and the heigh
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from rtshcua.model.faults import Mode
 from virtual.rows import rows
 
 
+@pytest.mark.slow
 @rows(
     ("flavour", "parameters", "away", "up", "height"),
     [

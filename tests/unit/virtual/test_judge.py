@@ -71,6 +71,7 @@ def causes(judgement: Judgement) -> list[tuple[str, str | None]]:
 # ---------------------------------------------------------------- nothing, and plain values
 
 
+@pytest.mark.slow
 def test_nothing_is_wrong_with_a_good_flight(good: ScenarioFlown) -> None:
     found = judge(good)
     assert (found.failures, found.exceptions) == ((), ())

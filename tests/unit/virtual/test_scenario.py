@@ -67,6 +67,7 @@ def test_the_same_arguments_give_the_same_flight() -> None:
     assert [each.at_us for each in first.happened] != [each.at_us for each in other.happened]
 
 
+@pytest.mark.slow
 def test_incidents_come_after_a_step_and_on_a_condition() -> None:
     high = flat.clause("height > 3 m", flat.apply(flat.Op.GT, flat.signal(flat.HEIGHT), flat.const(3 * M)))
     never = flat.clause("height > 3 km", flat.apply(flat.Op.GT, flat.signal(flat.HEIGHT), flat.const(3_000 * M)))
@@ -104,6 +105,7 @@ def test_a_mission_that_ships_is_flown(flavour: str) -> None:
 # ---------------------------------------------------------------- the host
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_runtime_that_is_killed_goes_on_in_another_process(flavour: str) -> None:
     """PX4 streams from the start: judged before anything of it had an age, it was once landed on the spot."""
@@ -136,6 +138,7 @@ def test_a_takeoff_that_was_sent_is_not_left_alone(after_ms: int, dead_ms: int, 
     nothing_wrong(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_flight_whose_boundary_is_killed_comes_down_by_what_that_signed_ahead(flavour: str) -> None:
     found = flown(scenario(incident(15, faults.BoundaryKilled(0))), flavour)
@@ -148,6 +151,7 @@ def test_a_flight_whose_boundary_is_killed_comes_down_by_what_that_signed_ahead(
     assert judge(found).failures == ()
 
 
+@pytest.mark.slow
 def test_the_process_after_that_has_a_boundary_of_its_own() -> None:
     found = flown(scenario(incident(15, faults.BoundaryKilled(0)), incident(16, faults.RuntimeKilled(0, 2 * S))))
     first, after = found.lives
@@ -174,6 +178,7 @@ def test_no_process_begins_where_the_vehicle_is_on_the_ground() -> None:
     nothing_wrong(found)
 
 
+@pytest.mark.slow
 def test_a_process_begins_when_the_disk_takes_records_again() -> None:
     found = flown(
         scenario(incident(14, faults.DiskFull(0, 6 * S)), incident(15, faults.RuntimeKilled(0, S))), "ardupilot"
@@ -197,6 +202,7 @@ def bothered() -> ScenarioFlown:
     )
 
 
+@pytest.mark.slow
 def test_a_host_that_stalls_reads_later_what_was_said(bothered: ScenarioFlown) -> None:
     assert [frame for frame in bothered.frames if 14 * S < frame.sent_us < 15 * S]
     assert not [frame for frame in bothered.frames if 15_050_000 < frame.sent_us < 17 * S]
@@ -209,6 +215,7 @@ def test_what_bothers_a_flight_ends_it_no_earlier(bothered: ScenarioFlown) -> No
     nothing_wrong(bothered)
 
 
+@pytest.mark.slow
 def test_a_full_disk() -> None:
     for_good = flown(scenario(incident(15, faults.DiskFull(0))))
     assert for_good.ending == "evidence-lost"
@@ -220,6 +227,7 @@ def test_a_full_disk() -> None:
     nothing_wrong(a_while)
 
 
+@pytest.mark.slow
 def test_a_step_waits_for_a_disk_that_takes_its_time() -> None:
     slow = flown(scenario(incident(17, faults.DiskStall(0, 2 * S))))
     (life,) = slow.lives
@@ -262,6 +270,7 @@ def low(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return case.seal(compiled.mission, compiled.policy)
 
 
+@pytest.mark.slow
 def test_an_approval_is_given(low: bytes) -> None:
     awaited = when(AfterStep(1, 2 * S, 2 * S), faults.Approval(0, "supervisor", 2))
     found = flown(scenario(awaited), bundle=low)
@@ -270,6 +279,7 @@ def test_an_approval_is_given(low: bytes) -> None:
     nothing_wrong(found)
 
 
+@pytest.mark.slow
 def test_an_approval_is_refused(low: bytes) -> None:
     found = flown(scenario(when(AfterStep(1, S, S), faults.Disapproval(0, "supervisor"))), "ardupilot", bundle=low)
     assert "inspect_area" not in dispatched(found)
@@ -282,6 +292,7 @@ def test_nobody_answers_what_is_not_asked(bothered: ScenarioFlown) -> None:
     assert notes[1] == "nothing of the mission asks for it"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_recall_that_comes_twice(flavour: str) -> None:
     found = flown(scenario(incident(15, faults.Recall(0, 2))), flavour)
@@ -290,6 +301,7 @@ def test_a_recall_that_comes_twice(flavour: str) -> None:
     nothing_wrong(found)
 
 
+@pytest.mark.slow
 def test_a_replacement_that_comes_twice() -> None:
     found = flown(scenario(incident(12, faults.Replacement(0, 2))))
     assert events(found).count("replacement") == 1
@@ -303,6 +315,7 @@ def test_babble_is_refused_and_changes_nothing(bothered: ScenarioFlown) -> None:
     assert refused
 
 
+@pytest.mark.slow
 def test_documents_for_a_dead_process_are_lost() -> None:
     found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S)), incident(16, faults.Recall(0))))
     assert [type(each.fault).__name__ for each in found.happened] == ["RuntimeKilled"]
@@ -328,6 +341,7 @@ def test_a_pause_in_the_last_metres_of_a_climb_of_px4_is_seen(at_s: float, seed:
     nothing_wrong(found)
 
 
+@pytest.mark.slow
 def test_a_pause_that_our_next_step_undoes_before_it_shows() -> None:
     """Both reach PX4 in the same moment, as the climb ends."""
     found = flown(scenario(incident(10.34, faults.PilotPause(0))), seed=1)
@@ -339,6 +353,7 @@ def test_a_pause_that_our_next_step_undoes_before_it_shows() -> None:
 # ---------------------------------------------------------------- what was expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("expected", "met"),
     [
@@ -368,6 +383,7 @@ def test_expectations(expected: Expected, met: bool) -> None:
     assert answer.found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("expected", "met"),
     [
@@ -422,12 +438,14 @@ def test_each_kind_of_host_and_agent_is_tried() -> None:
     assert set(SECOND_LONG) == {kind for kind in faults.KINDS.values() if issubclass(kind, HostFault | AgentFault)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "at_s", "flavour"), each_once(SECOND_LONG, (1, 7, 14, 25, 33), FLAVOURS))
 def test_nothing_goes_wrong_whenever_it_happens(kind: type[Fault], at_s: int, flavour: str) -> None:
     found = flown(scenario(incident(at_s, SECOND_LONG[kind])), flavour)
     assert judge(found).failures == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at_s"), [("ardupilot", 25.3), ("px4", 21.75), ("px4", 20.15)])
 def test_motors_that_stop_on_the_way_down_are_no_landing(flavour: str, at_s: float) -> None:
     """Disarmed in the air a vehicle says at once that it is on the ground, also while it lands."""

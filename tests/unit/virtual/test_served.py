@@ -15,6 +15,7 @@ from virtual.shipped import shipped, simulated
 FLAVOURS = ("px4", "ardupilot")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_flight_by_calls_is_the_one_without(flavour: str) -> None:
     one, other = (

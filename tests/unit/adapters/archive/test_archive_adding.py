@@ -94,6 +94,7 @@ def test_a_log_is_kept_octet_for_octet_under_its_digest(take: Add, fleet: Path, 
     assert not list(folder.scratch.iterdir())
 
 
+@pytest.mark.slow
 def test_every_record_has_its_row(filled: Folder, fleet: Path) -> None:
     wanted = {"decision": 0, "effect": 0, "signed": 0}
     for log in fleet.glob("*.jsonl"):
@@ -110,6 +111,7 @@ def test_refusals_are_those_of_the_lines(filled: Folder, fleet: Path) -> None:
     assert len(found) > 50
 
 
+@pytest.mark.slow
 def test_adding_again_changes_nothing(take: Add, fleet: Path, folder: Folder) -> None:
     logs = sorted(fleet.glob("*.jsonl"))
     before = take(logs)
@@ -120,6 +122,7 @@ def test_adding_again_changes_nothing(take: Add, fleet: Path, folder: Folder) ->
     assert question(folder, "refused") == rows
 
 
+@pytest.mark.slow
 def test_a_log_that_fails_is_kept_and_nothing_of_it_is_indexed(
     take: Add, fleet: Path, folder: Folder, tmp_path: Path
 ) -> None:
@@ -173,6 +176,7 @@ def test_of_an_unclosed_log_only_what_is_signed_for_is_indexed(
     assert folder.log(entry.log).read_bytes() == whole[:-20]
 
 
+@pytest.mark.slow
 def test_what_is_changed_in_the_archive_is_found_and_no_longer_answers(take: Add, fleet: Path, folder: Folder) -> None:
     one, other = take([fleet / "quad-07-0.jsonl", fleet / "quad-08-0.jsonl"])
     path = folder.log(one.entry.log)
@@ -195,6 +199,7 @@ def test_what_is_changed_in_the_archive_is_found_and_no_longer_answers(take: Add
     )
 
 
+@pytest.mark.slow
 def test_a_crash_before_the_catalogue_leaves_nothing_twice(
     take: Add, fleet: Path, folder: Folder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -218,6 +223,7 @@ def test_a_crash_before_the_catalogue_leaves_nothing_twice(
     assert len(question(folder, "refused")) == len(refused([fleet / "quad-07-0.jsonl", fleet / "quad-07-1.jsonl"]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("damage", "seen"), each_once(["changed", "shorter", "gone"], [False, True]))
 def test_a_copy_that_was_damaged_is_replaced_by_the_log_taken_in_again(
     take: Add, fleet: Path, folder: Folder, damage: str, seen: bool
@@ -245,6 +251,7 @@ def test_a_copy_that_was_damaged_is_replaced_by_the_log_taken_in_again(
     assert [done.known for done in take([source])] == [True]
 
 
+@pytest.mark.slow
 def test_an_index_that_was_changed_is_made_anew(take: Add, fleet: Path, folder: Folder) -> None:
     """Who can write in the folder can let the index say anything; the logs still say what they said."""
     done = take(sorted(fleet.glob("*.jsonl")))
@@ -315,6 +322,7 @@ def anchored(log: Path, key: SigningKey) -> str:
     return f"{note}{line}"
 
 
+@pytest.mark.slow
 def test_anchors_beside_a_log_come_along_and_count(take: Add, fleet: Path, folder: Folder, tmp_path: Path) -> None:
     log = tmp_path / "run" / "log.jsonl"
     log.parent.mkdir()
@@ -402,6 +410,7 @@ def test_an_archive_that_nothing_was_added_to_has_no_answer(folder: Folder) -> N
         Asker(folder)
 
 
+@pytest.mark.slow
 def test_a_witness_holds_both_flights_of_a_bundle_that_flew_twice(
     take: Add, fleet: Path, folder: Folder, tmp_path: Path
 ) -> None:

@@ -40,6 +40,7 @@ def rows(folder: Folder, name: str, **conditions: object) -> list[tuple[object, 
         asker.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", canned())
 def test_what_ships_says_what_it_tells_and_answers(name: str, asker: Asker) -> None:
     question = canned()[name]
@@ -63,6 +64,7 @@ def test_who_was_refused_what(wanted: list[tuple[object, ...]], filled: Folder) 
     assert (first[8], first[9]) == (min(times), max(times))
 
 
+@pytest.mark.slow
 def test_by_skill_reason_clause_rule_and_day(wanted: list[tuple[object, ...]], filled: Folder, fleet: Path) -> None:
     decisions = [r for log in fleet.glob("*.jsonl") for r in records(log) if r["type"] == "decision"]
     by_skill = {row[0]: (row[1], row[2]) for row in rows(filled, "refused-by-skill")}
@@ -84,6 +86,7 @@ def test_policies(filled: Folder) -> None:
     assert [row[:4] for row in found] == [("bridge_inspection", 7, 2, 4), ("bridge_inspection", 8, 1, 1)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("conditions", "holds"),
     [
@@ -141,6 +144,7 @@ def test_a_question_of_ones_own(asker: Asker, fleet: Path) -> None:
     assert len(asker.ask("SELECT * FROM decided", 5).rows) == 5
 
 
+@pytest.mark.slow
 def test_a_log_that_is_not_there_is_missing(take: Add, fleet: Path, folder: Folder) -> None:
     first, last = take([fleet / "quad-07-0.jsonl", fleet / "quad-07-2.jsonl"])
     assert [row[:2] for row in rows(folder, "missing")] == [("quad-07", last.entry.log)]
@@ -180,6 +184,7 @@ def test_the_beginning_of_a_log_does_not_contradict_it(take: Add, folder: Folder
     assert rows(folder, "conflicts") == []
 
 
+@pytest.mark.slow
 def test_a_bundle_that_flew_twice_is_told(take: Add, fleet: Path, folder: Folder) -> None:
     """What kept used bundles was emptied, put back or made anew: each log is whole, and an archive has both."""
     (first,) = take([fleet / "quad-07-0.jsonl"])
@@ -191,6 +196,7 @@ def test_a_bundle_that_flew_twice_is_told(take: Add, fleet: Path, folder: Folder
     assert sorted(logs[::2]) == sorted([first.entry.log, second.entry.log])
 
 
+@pytest.mark.slow
 def test_two_flights_after_the_same_one_are_a_fork(take: Add, fleet: Path, folder: Folder, tmp_path: Path) -> None:
     (first,) = take([fleet / "quad-07-0.jsonl"])
     generated_logs.write(tmp_path / "other.jsonl", "quad-07", 5, before=first.entry.last_leaf)

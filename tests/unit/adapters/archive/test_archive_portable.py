@@ -62,6 +62,7 @@ def clickhouse(folder: Folder) -> Engine:
     return ask
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [sqlite, datafusion, clickhouse], ids=lambda engine: engine.__name__)
 def test_every_question_has_the_same_answer(engine: Callable[[Folder], Engine], filled: Folder) -> None:
     ask, asker = engine(filled), Asker(filled)

@@ -22,6 +22,7 @@ def entries(done: Sequence[Done]) -> list[Entry]:
     return [each.entry for each in done]
 
 
+@pytest.mark.slow
 def test_processes_come_to_the_same(take: Add, fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(examine, "_LITTLE", 0)
     logs = sorted(fleet.glob("*.jsonl"))

@@ -112,10 +112,12 @@ def each_operation(kinds: Sequence[str], step: int) -> list[str]:
     return wrong
 
 
+@pytest.mark.slow
 def test_what_was_acknowledged_is_kept_when_process_or_power_fail() -> None:
     assert campaigns(range(25)) == []
 
 
+@pytest.mark.slow
 def test_what_was_acknowledged_is_kept_whatever_operation_fails() -> None:
     assert each_operation(KINDS, 29) == []
 

@@ -18,6 +18,7 @@ def kill(count: int, seed: int) -> None:
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
 
 
+@pytest.mark.slow
 def test_what_was_acknowledged_survives_a_kill() -> None:
     kill(15, 1)
 

@@ -129,6 +129,7 @@ def test_a_file_with_another_name_elsewhere_is_not_written_to(tmp_path: Path) ->
     assert unverified(path, lines, len(lines)) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["died", "torn", "late", "refused", "failed", "short"])
 def test_it_may_be_broken_off_anywhere_and_called_again(tmp_path: Path, what: str) -> None:
     number, over = 0, False

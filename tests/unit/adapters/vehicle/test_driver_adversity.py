@@ -124,6 +124,7 @@ def goes_on(one: Any, command: int) -> None:
         assert isinstance(one.fly(MotionKind.HOME), Succeeded)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "flavour"), each_once(OURS, ["px4", "ardupilot"]))
 def test_lost_acknowledgements_change_nothing(flyer: Make, command: int) -> None:
     """What was obeyed and not acknowledged is seen by its effect; the retry's refusal is not taken for the first's."""
@@ -140,6 +141,7 @@ def test_lost_acknowledgements_change_nothing(flyer: Make, command: int) -> None
     goes_on(one, command)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "flavour"), each_once(OURS, ["ardupilot", "px4"]))
 def test_lost_commands_are_sent_again(flyer: Make, flavour: str, command: int) -> None:
     confirmations: list[int] = []
@@ -381,6 +383,7 @@ def test_a_battery_too_low_to_arm_is_not_ready(flyer: Make) -> None:
     assert one.vehicle.driver.unready.startswith("its own checks before arming fail")
 
 
+@pytest.mark.slow
 def test_a_pilot_who_changes_the_mode_before_it_is_armed_has_taken_over(flyer: Make, flavour: str) -> None:
     one = flyer()
     one.until(Ready)

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from rtshcua.model.faults import Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import AirState, Crashed, Ready, Sent, Succeeded
@@ -101,6 +103,7 @@ def test_landing_what_stands_already_is_done_at_once(flyer: Make) -> None:
         assert one.now_us - begun < 1_000_000
 
 
+@pytest.mark.slow
 def test_one_command_replaces_another_without_a_false_take_over(aloft: Make) -> None:
     """Modes show in the heartbeat with a delay, so the mode of a command just replaced may still come."""
     one = aloft()

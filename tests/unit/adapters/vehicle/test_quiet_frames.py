@@ -31,6 +31,7 @@ def flown(flavour: str, fault: str) -> tuple[list[bytes], Sequence[Event]]:
     return flight.fly().lines, flight.events
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "fault"), CASES)
 def test_a_flight_is_the_same_when_every_frame_is_shown(
     flavour: str, fault: str, monkeypatch: pytest.MonkeyPatch

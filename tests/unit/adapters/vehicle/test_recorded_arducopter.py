@@ -29,6 +29,7 @@ def flown() -> Recorded:
     ))  # fmt: skip
 
 
+@pytest.mark.slow
 def test_it_knows_no_place_before_its_estimator_uses_gps(watched: Recorded) -> None:
     """GLOBAL_POSITION_INT began 39 seconds before, and the receiver had its fix for 31 seconds."""
     for signal in ("position", "height"):
@@ -99,6 +100,7 @@ def test_its_texts_are_heard_whole(watched: Recorded) -> None:
     assert texts["EKF Failsafe: changed to LAND Mode"][1] == 2
 
 
+@pytest.mark.slow
 def test_the_effects_of_our_commands_are_seen_in_the_recording(flown: Recorded) -> None:
     ends = [(at, event.token) for at, event in flown.of(Succeeded)]
     assert [token for _, token in ends] == [1, 2, 3]

@@ -94,6 +94,7 @@ def test_the_place_where_it_stops_is_nobody_elses_target(aloft: Make, delay_us: 
     stops(one, 15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
 def test_a_return_from_far_gets_somewhere_wherever_home_is(aloft: Make) -> None:
     """A program that began in the air never saw the vehicle stand at home."""
@@ -258,6 +259,7 @@ def stalled(flavour: str, after_ms: int, for_ms: int) -> list[Event]:
     return [event for event in one.wait(8) if isinstance(event, (Failed, TakenOver, Crashed))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("after_ms", "flavour"), each_once([2_200, 2_900, 3_400], ["px4", "ardupilot"]))
 def test_what_waited_while_nobody_read_is_held_against_its_own_time(after_ms: int, flavour: str) -> None:
     """A speed of before was held against what it may be a second later: `did-not-stop`, and it was flown home."""

@@ -141,6 +141,7 @@ def ready(flavour: str) -> Flyer:
     return one
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TAKEOVERS)
 def test_a_takeover_in_a_leg_is_seen_and_not_fought(flavour: str, name: str) -> None:
     """PX4's pause and go-to, and ArduCopter's guided target, change no mode (recorded)."""
@@ -275,6 +276,7 @@ CLIMBING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLIMBING)
 @pytest.mark.parametrize("height", [3_000, 17_800])
 def test_a_takeover_in_a_climb_is_seen_and_not_fought(flavour: str, name: str, height: int) -> None:
@@ -453,6 +455,7 @@ def test_sticks_end_what_px4_does_by_itself(flavour: str) -> None:
         assert not any(isinstance(event, (TakenOver, Failed)) for event in one.wait(10))
 
 
+@pytest.mark.slow
 def test_our_own_targets_are_nobody_elses(aloft: Make) -> None:
     """Leg after leg, a hold, and another leg."""
     one = aloft()
@@ -560,6 +563,7 @@ def try_all(aloft: Make, flavour: str, name: str, *, whole: bool) -> None:
         holds(copied(flights[delay_us]), flavour, name, acts_us, phase_us, delay_us)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "flavour"), each_once(["land", "go-to"], ["px4", "ardupilot"]))
 def test_no_frame_leaves_later_than_w(aloft: Make, flavour: str, name: str) -> None:
     try_all(aloft, flavour, name, whole=False)

@@ -50,6 +50,7 @@ def notes(events: list[Event]) -> list[str]:
 # ---------------------------------------------------------------- a serial line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", [Kind.PX4, Kind.ARDUPILOT])
 @pytest.mark.parametrize("baud", [57_600, 921_600])
 def test_a_vehicle_on_a_serial_line_gets_ready_and_the_line_is_not_oversubscribed(

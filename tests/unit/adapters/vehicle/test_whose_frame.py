@@ -92,6 +92,7 @@ def test_the_gate_takes_no_other_heartbeat_for_the_vehicles(name: str, kind: int
 # ---------------------------------------------------------------- what is heard of it
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [(26, NONE), (18, NONE), (26, 0), (2, NONE)])
 def test_a_heartbeat_of_no_autopilot_under_its_ids_is_no_mode_and_is_noted_once(
     aloft: Make, kind: tuple[int, int]
@@ -119,6 +120,7 @@ def test_a_heartbeat_of_another_under_its_ids_is_no_sign_of_life(aloft: Make) ->
     assert any(isinstance(each, LinkLost) for each in one.events)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("voice", [Voice.GIMBAL, Voice.ANSWERS])
 def test_the_simulated_second_voice_does_no_harm_from_the_start(flavour: str, voice: Voice) -> None:
     one = Flyer(flavour, faults=(SecondVoice(0, voice),))
@@ -127,6 +129,7 @@ def test_the_simulated_second_voice_does_no_harm_from_the_start(flavour: str, vo
     assert isinstance(one.fly(MotionKind.LAND), Succeeded)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [(2, ARDUPILOT), (13, PX4), (1, ARDUPILOT), (13, ARDUPILOT)])
 def test_another_vehicle_under_its_ids_keeps_it_from_being_ready(flavour: str, kind: tuple[int, int]) -> None:
     if kind == (2, OWN[flavour]):
@@ -156,6 +159,7 @@ def test_a_message_without_target_is_for_everybody() -> None:
     assert is_addressed(mavlink.MAVLink_param_value_message(b"A", 1.0, 9, 1, 0), 1, OURS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", [(2, OURS), (255, OURS), (1, 190)])
 def test_a_denial_to_somebody_else_refuses_no_command(aloft: Make, target: tuple[int, int]) -> None:
     one = aloft()
@@ -213,6 +217,7 @@ FORGED: dict[str, Callable[[Flyer], Any]] = {
 BAD = TakenOver | Failed | Crashed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "after_s"), each_once(FORGED, (2.0, 2.31, 4.07)))
 def test_one_forged_frame_ends_no_leg(aloft: Make, name: str, after_s: float) -> None:
     one = aloft()

@@ -99,6 +99,7 @@ def repair(value: Any, rejected: list[dict[str, Any]]) -> None:
             continue  # what was put right around it took it along
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [25, pytest.param(100, marks=pytest.mark.soak)])
 def test_wrong_missions_are_put_right(missions: Missions, most: int) -> None:
     chance, wrong, stuck = random.Random(21), 0, []
@@ -173,6 +174,7 @@ ALTITUDES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("given", "same", "why"), ALTITUDES)
 def test_advice_names_the_same_value_as_it_is_accepted_or_none(
     missions: Missions, given: Any, same: str | None, why: str

@@ -201,6 +201,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @rows("name", CASES)
 def test_rules_are_told_apart(name: str) -> None:
     rules, expected = CASES[name]

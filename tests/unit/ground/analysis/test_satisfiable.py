@@ -110,6 +110,7 @@ def situations(numeric: bool, placed: bool) -> Iterator[Environment]:
             yield Environment(slots, [one, two, point(0), point(0), point(0)], ((0, 0),), (0, 0))
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(conditions(NUMERIC), GOALS), min_size=1, max_size=3))
 def test_numbers_are_decided_as_by_trying_all(goals: list[tuple[tree.Node, int]]) -> None:
     built = [(build(node, TABLES), wanted) for node, wanted in goals]

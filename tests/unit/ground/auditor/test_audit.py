@@ -29,6 +29,7 @@ def fly(*faults: Fault, of: Mission | None = None) -> list[bytes]:
     return Flight(case.seal(mission), case.simulated("px4", faults=faults), attested=False).fly().lines
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("behaviour", "kind"), each_once(OnInadmissible, ["wind", "no fix for a while", "low battery"])
 )
@@ -90,6 +91,7 @@ def test_a_log_that_fails_proves_nothing() -> None:
     assert [claim.slug for claim in report.unproven] == ["log"]
 
 
+@pytest.mark.slow
 def test_mode_none_needs_no_permits_and_says_so() -> None:
     report = sound_without_permits(recorded("wind", "ardupilot", Mode.NONE).lines)
     assert "enforcement" in [claim.slug for claim in report.report.unproven]

@@ -36,6 +36,7 @@ def forged(lines: tuple[bytes, ...], number: int, **fields: object) -> tuple[str
     return expect(signed([*lines[:number], edit(lines[number], **fields), *lines[number + 1 :]]))
 
 
+@pytest.mark.slow
 def test_the_contingency_is_derived_again() -> None:
     lines = denied_in_the_air()
     assert decisions(lines, 2)

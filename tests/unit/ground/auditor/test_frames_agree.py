@@ -39,6 +39,7 @@ VALUES = (0, 1, -1, 2, 3, 4, 5, 6, 9, 12, 15.0, 17, 22, 21_196, 176, 178, 192, 4
 POINTS = ((473_978_000, 85_456_000), (473_979_000, 85_457_000))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", AUTOPILOTS)
 @given(data=some.data())
 def test_the_same_frames_carry_out_the_same_commands(kind: str, data: some.DataObject) -> None:

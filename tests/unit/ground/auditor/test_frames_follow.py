@@ -32,6 +32,7 @@ def joined(lines: Sequence[bytes], entries: Entries) -> tuple[Finding | None, Fr
 FLAVOURS = ("px4", "ardupilot")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "flavour"), each_once(FAULTS, FLAVOURS))
 def test_log_and_frames_of_every_kind_of_flight_are_sound(fault: str, flavour: str) -> None:
     lines, entries = recorded(fault, flavour)

@@ -90,6 +90,7 @@ def covered(of: Case, octets: bytes, at_us: int, autopilot: int) -> bool:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", AUTOPILOTS)
 @given(data=some.data())
 def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:

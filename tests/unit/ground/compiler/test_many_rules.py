@@ -40,6 +40,7 @@ def effort(monkeypatch: pytest.MonkeyPatch) -> Check:
     return check
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_effort_grows_with_the_rules_not_with_their_pairs(effort: Check, kind: str) -> None:
     few, _ = effort(policy(kind, FEW))

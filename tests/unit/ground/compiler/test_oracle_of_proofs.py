@@ -53,6 +53,7 @@ def refused_on_board(program: Drawn) -> list[str] | None:
     return wrong
 
 
+@pytest.mark.slow
 def test_a_return_that_is_proved_is_let_through_on_board_from_all_along_the_way() -> None:
     found = {seed: refused_on_board(draw(seed)) for seed in range(40)}
     accepted = {seed: wrong for seed, wrong in found.items() if wrong is not None}
@@ -87,6 +88,7 @@ def compared(seeds: Iterable[int]) -> tuple[list[bool | None], list[str]]:
     return judgements, wrong
 
 
+@pytest.mark.slow
 def test_some_programs_are_judged_as_dense_sampling_judges_them() -> None:
     judgements, wrong = compared(range(25))
     assert judgements.count(True) > 5

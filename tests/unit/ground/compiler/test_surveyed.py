@@ -89,6 +89,7 @@ def along(one: Invocation, *path: int) -> Invocation:
     return replace(one, plan=replace(one.plan, path=path))
 
 
+@pytest.mark.slow
 @rows("call", CALLS)
 def test_the_compilers_own_path_is_the_planners_from_either_end(call: str) -> None:
     policy, one = compiled(call)

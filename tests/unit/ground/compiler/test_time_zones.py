@@ -54,6 +54,7 @@ def nights(name: str) -> tuple[datetime, ...]:
     ) or (days[100],)
 
 
+@pytest.mark.slow
 @pytest.mark.hypothesis
 @settings(deadline=None, max_examples=12)
 @given(

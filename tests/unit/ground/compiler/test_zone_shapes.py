@@ -328,6 +328,7 @@ def test_a_file_that_is_no_geojson_is_named_where_it_is_asked_for() -> None:
         assert loaded.sources["probe.rts"].slice(told.span).startswith('from "site.geojson"')
 
 
+@pytest.mark.slow
 def test_no_zone_needs_shapely() -> None:
     """It is a third of a second to import, and its floats differ between machines."""
     script = (

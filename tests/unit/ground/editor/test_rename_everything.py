@@ -142,6 +142,7 @@ def every() -> tuple[list[Named], list[Named]]:
     return shipped, samples
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [0, 1], ids=["shipped", "samples"])
 def test_some_names(kind: int) -> None:
     chance = Random(SEED)

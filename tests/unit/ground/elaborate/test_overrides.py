@@ -107,6 +107,7 @@ def test_a_clause_says_where_it_stands_among_the_policys_files_and_then_the_miss
     assert text[clause.start : clause.end] == clause.text == "height <= 30 m"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("block", "codes"),
     [

@@ -81,6 +81,7 @@ def test_the_kinds_of_tokens_that_may_hold_blanks_are_known() -> None:
     assert found - {"<SPACE>"} == SPACED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "start", ["declaration", "skill_item", "policy_item", "mission_item", "test_item", "scenario_item", "zone"]
 )

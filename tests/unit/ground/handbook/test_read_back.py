@@ -9,6 +9,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import structs
@@ -241,6 +242,7 @@ def listed(words: str, names: Vocabulary) -> Tree:
     return flat(("and", *(read(part, atoms) for part in parts))) if len(parts) > 1 else read(words, atoms)
 
 
+@pytest.mark.slow
 def test_every_place_of_the_page_tells_conditions_apart(everything: Handbook, part: Callable[[Path], Part]) -> None:
     lowered = part(Path(__file__).with_name("everything.rts")).policies[0]
     program = part(Path(__file__).with_name("everything.rts")).program

@@ -27,6 +27,7 @@ def words(markup: str) -> str:
     return " ".join(unescape(re.sub(r"<[^>]*>", "", markup)).split())
 
 
+@pytest.mark.slow
 def test_the_page_begins_with_what_is_signed_on_one_page(everything: Handbook) -> None:
     text = page(everything)
     (chapter,) = everything.chapters

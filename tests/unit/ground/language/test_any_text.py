@@ -150,6 +150,7 @@ def long_run(before: str, part: str) -> None:
     sound(before + part * (200_000 // len(part)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("before", "part"), ONE_PLACE)
 def test_a_long_run_of_one_thing_ends_with_findings(before: str, part: str) -> None:
     long_run(before, part)

@@ -22,6 +22,7 @@ def test_is_current(grammar: str) -> None:
     assert PATH.read_text(encoding="utf-8") == generate.generate(grammar), "python -m rtshcua.ground.language.generate"
 
 
+@pytest.mark.slow
 def test_grammar_has_no_conflict(grammar: str, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG, logger.name)
     Lark(grammar, start=generate.START, parser="lalr", debug=True)

@@ -1,5 +1,7 @@
 """Words of the language are names wherever the grammar asks for a name."""
 
+import pytest
+
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.parse import parse
@@ -66,6 +68,7 @@ test "x" from § {
 LED = ["abs", "circle", "corridor", "difference", "falling", "grow", "max", "min", "polygon", "rising", "union"]
 
 
+@pytest.mark.slow
 @rows("word", [*SOFT, *LED, "repeat", "one", "local"])
 def test_soft(word: str) -> None:
     assert parse(Source("x", EVERYWHERE.replace("§", word))).diagnostics == ()

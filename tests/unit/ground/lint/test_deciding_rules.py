@@ -1,5 +1,7 @@
 """The rules about what a policy decides: what they find, and above all what they leave alone."""
 
+import pytest
+
 from reference.linted import HEAD, decided
 from virtual.rows import rows
 
@@ -27,6 +29,7 @@ zone near = circle(47.3977 N, 8.5456 E, 12 km)
 ALL = "permit takeoff by any when altitude <= 40 m permit takeoff by any when altitude > 30 m"
 
 
+@pytest.mark.slow
 @rows(
     ("rules", "gates"),
     [
@@ -93,6 +96,7 @@ BOX = "polygon(47.599 N, 8.545 E, 47.599 N, 8.546 E, 47.598 N, 8.546 E, 47.598 N
 WIDE = "polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)"
 
 
+@pytest.mark.slow
 @rows(
     ("zone", "airspace", "idle"),
     [
@@ -135,6 +139,7 @@ def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, 
 # ---------------------------------------------------------------------------------------------------- E1308
 
 
+@pytest.mark.slow
 @rows(
     ("rules", "bounded"),
     [
@@ -224,6 +229,7 @@ def test_authority_that_is_broader_than_anyone_means(rules: str, broad: bool) ->
 ON = "vehicle equipped"  # tuned to estimate the wind
 
 
+@pytest.mark.slow
 @rows(
     ("rules", "grounded"),
     [

@@ -1,5 +1,7 @@
 """What a configuration says, and how one that is wrong is refused: with the nearest that would be accepted."""
 
+import pytest
+
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.patterns import matches
@@ -114,6 +116,7 @@ def test_patterns(pattern: str, meant: list[str], not_meant: list[str]) -> None:
     assert [matches(pattern, path) for path in (*meant, *not_meant)] == [True] * len(meant) + [False] * len(not_meant)
 
 
+@pytest.mark.slow
 @rows("part", ["a", '"a,b"', "a-b_c ", "'a'"])
 def test_a_key_of_very_many_parts_is_refused_unread(part: str) -> None:
     """The library takes the square of them in time: an hour for a file of a megabyte."""

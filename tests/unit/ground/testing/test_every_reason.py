@@ -1,5 +1,7 @@
 """Every reason that a decision can have is reached by some test, written as people write them."""
 
+import pytest
+
 from reference.deciding import IMPORT, NOMINAL, WHEN, decided
 from rtshcua.model.outcome import Reason, outcome_of
 from virtual.rows import rows
@@ -83,6 +85,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @rows(("before", "parts", "expected"), CASES, ids=[" ".join(case[1])[-60:] for case in CASES])
 def test_decided(before: str, parts: tuple[str, ...], expected: str) -> None:
     assert decided(*parts, before=before) == expected

@@ -85,6 +85,7 @@ def test_there_are_limits_of_every_kind_of_clause(small: Generated) -> None:
     assert any("delegate rise" in each.part.text for each in small.limits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("written", "moved"),
     [
@@ -133,6 +134,7 @@ def test_the_shipped_policy_has_limits_to_move() -> None:
     assert UNNOTICED in LIMITS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "place",
     [

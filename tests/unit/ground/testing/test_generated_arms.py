@@ -48,6 +48,7 @@ def test_they_pass(arms: Generated) -> None:
     assert failures(arms, {"arms.rts": TEXT}) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("written", "moved"),
     [

@@ -280,6 +280,7 @@ def test_a_program_with_errors_has_no_policies_to_compare() -> None:
 # ------------------------------------------------------------------------------------------ stricter or looser
 
 
+@pytest.mark.slow
 @rows(
     ("old", "new", "way"),
     [

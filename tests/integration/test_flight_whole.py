@@ -24,6 +24,8 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
 from rtshcua.mavlink.radio import RADIO_STATUS
 from virtual.forked import Forked
 
+pytestmark = pytest.mark.slow
+
 
 class Flown(NamedTuple):
     """A flight that is over, and what else ran beside it or before."""
@@ -128,7 +130,6 @@ def kept(flown: Flown, folder: Path) -> Path:
 # -------------------------------------------------------------------------------------------- the flight
 
 
-@pytest.mark.slow
 def test_a_short_mission_is_flown_and_recorded(flown: Flown) -> None:
     run = flown.run
     assert run.dispatched() == ["takeoff", "goto", "return_home"]
@@ -154,7 +155,6 @@ def test_each_decision_is_written_before_it_is_acted_on(flown: Flown) -> None:
     assert kinds == [("decision", "allow"), *[("effect", each) for each in ("dispatched", "obeyed", "succeeded")]]
 
 
-@pytest.mark.slow
 def test_sim_ends_cleanly_after_it_served_a_run(signed: Flown) -> None:
     (vehicle,) = signed.others
     assert vehicle.end().code == ExitCode.OK
@@ -172,7 +172,6 @@ def test_dry_run_decides_the_mission_and_leaves_nothing_behind(watched: Flown) -
     assert len(list((watched.ground.folder / "runs").iterdir())) == 1
 
 
-@pytest.mark.slow
 def test_dry_run_names_what_refuses_a_step(watched: Flown) -> None:
     poor = watched.ground.run(watched.ground.bundle(name="poor"), "--dry-run", "--battery", "30").end()
     assert poor.code == ExitCode.REFUSED
@@ -181,7 +180,6 @@ def test_dry_run_names_what_refuses_a_step(watched: Flown) -> None:
     assert first["nearest"][0]["subject"] == "battery"
 
 
-@pytest.mark.slow
 def test_bundle_flies_once(watched: Flown) -> None:
     """A run that follows is a new process: it is on the disk."""
     again = watched.ground.run(watched.bundle).end()
@@ -193,7 +191,6 @@ def test_bundle_flies_once(watched: Flown) -> None:
     assert len(list((watched.ground.folder / "runs").iterdir())) == 1
 
 
-@pytest.mark.slow
 def test_bundle_flies_again_with_fresh_state_and_a_pipe_gets_plain_lines(watched: Flown, tmp_path: Path) -> None:
     words = ["run", watched.bundle, "--fresh-state", "--runs", str(tmp_path), "--speed", str(watched.ground.speed)]
     run = subprocess.run(
@@ -241,7 +238,6 @@ def test_flight_that_two_witnesses_watch_is_anchored_to_its_end(
     assert 0 < audited(commands, watched.ground, folder)["anchored"] < count
 
 
-@pytest.mark.slow
 def test_witness_notices_a_log_that_was_cut(watched: Flown, tmp_path: Path) -> None:
     """Who holds the log's keys still cannot cut it: the witness remembers."""
     log = kept(watched, tmp_path) / "log.jsonl"
@@ -278,7 +274,6 @@ def test_records_of_a_flight_are_proven_without_its_log(commands: Forked, watche
 # ---------------------------------------------------------------------------------------- what it is made of
 
 
-@pytest.mark.slow
 def test_nothing_of_the_ground_is_loaded_on_board(watched: Flown) -> None:
     loaded = watched.modules
     ours = [name for name in loaded if name.startswith("rtshcua.")]

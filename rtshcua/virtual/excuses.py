@@ -272,7 +272,9 @@ class Excuses:
         """
         since_us = failure.at_us - failure.amount - _TICK_US  # what a pilot told it before changed nothing
         told = [*self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)]
-        if any(fault.at_us >= since_us and not self._ends_the_climb(fault) for fault in told):
+        if any(
+            fault.at_us >= since_us and not self._ends_the_climb(fault) and not self._stands(fault) for fault in told
+        ):
             return None
         if self._is_copter:
             return "unseen" if self._is_silent(failure) else None
@@ -308,6 +310,13 @@ class Excuses:
             if not shows or failure.at_us - fault.at_us <= _STANDS_US + _NOTICED_US:
                 return True
         return False
+
+    def _stands(self, fault: Fault) -> bool:
+        """Whether a pilot chose the mode that ArduCopter was in: that changes nothing (Copter::set_mode, mode.cpp)."""
+        before = self._sample(fault.at_us - _TICK_US)
+        return (
+            isinstance(fault, faults.PilotMode) and self._is_copter and before is not None and before.mode is fault.mode
+        )
 
     def _ends_the_climb(self, fault: Fault) -> bool:
         """Whether a go-to in ArduCopter's takeoff names the place where that ends, as older ones do themselves."""

@@ -135,6 +135,14 @@ def test_a_takeoff_that_a_pilot_chose_in_the_air_shows_once_it_is_over(
 
 
 @pytest.mark.slow
+def test_a_pause_in_a_takeoff_shows_as_little_where_a_pilot_also_chose_the_mode_that_it_was_in() -> None:
+    """ArduCopter stays in its mode then, and pauses: the judge took the mode for the takeover."""
+    was = flown(of("ardupilot", at(7, faults.PilotMode(0, Mode.GUIDED)), at(7, PAUSE)))
+    assert (was.samples[-1].taken_over_by, slugs(was)) == ("pilot", set())
+    assert {each.cause for each in judge(was).exceptions} == {"unseen"}
+
+
+@pytest.mark.slow
 def test_a_return_that_is_paused_as_it_begins_is_not_taken_for_the_hold_before_it() -> None:
     """Nothing says yet that it was obeyed; the place is the hold's, but for centimetres."""
     was = flown(of("px4", at(44.58, faults.RuntimeKilled(0, 200_000)), at(44.8, PAUSE)))

@@ -6,8 +6,9 @@ given up, and counts as a failure.
 
 import errno
 import os
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import time
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from multiprocessing import get_context
@@ -54,6 +55,15 @@ class Workers(Protocol):
 
 #: how often a process may die while it flies a flight
 _MOST_DEATHS: Final = 2
+#: how long flights are waited for, in seconds, before `look` is called again; and between two looks at a cluster
+_LOOK_S: Final = 0.5
+_POLL_S: Final = 0.1
+#: what is called while flights are waited for; it raises where they are not to be waited for any more
+Look = Callable[[], None]
+
+
+def _on() -> None:
+    """They are waited for."""
 
 
 class Here:
@@ -70,8 +80,9 @@ class Here:
 class Processes:
     """`jobs` processes, as many as there are cores if it is not said."""
 
-    def __init__(self, jobs: int | None = None) -> None:
+    def __init__(self, jobs: int | None = None, look: Look = _on) -> None:
         self._jobs = jobs or cores()
+        self._look = look
         self._pool: ProcessPoolExecutor | None = None
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
@@ -98,9 +109,13 @@ class Processes:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(self._jobs, mp_context=get_context("spawn"), initializer=_quiet)
         futures = [self._pool.submit(work.fly, flight) for flight in flights]
+        waits = set(futures)
         try:
-            for future in as_completed(futures):
-                yield future.result()
+            while waits:
+                self._look()
+                for future in _soon(waits):
+                    waits.remove(future)
+                    yield future.result()
         finally:
             for future in futures:
                 future.cancel()
@@ -121,7 +136,8 @@ class Cluster:
     They have this package installed, in this version. How connections are secured (`tls://`) is Dask's configuration.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, look: Look = _on) -> None:
+        self._look = look
         from distributed import Client  # noqa: PLC0415  # an extra, and slow to load
 
         try:
@@ -131,7 +147,7 @@ class Cluster:
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
         """Flies these; one whose worker is lost is given to another."""
-        from distributed import KilledWorker, as_completed  # noqa: PLC0415
+        from distributed import KilledWorker  # noqa: PLC0415
 
         by_key = {}
         futures = []
@@ -140,11 +156,18 @@ class Cluster:
             by_key[future.key] = flight
             futures.append(future)
         try:
-            for future in _loose(as_completed)(futures):
-                try:
-                    yield future.result()
-                except KilledWorker:
-                    yield work.lost(by_key[future.key])
+            waits = list(futures)
+            while waits:
+                self._look()
+                done = [future for future in waits if future.done()]  # each asked once: it may be done a moment later
+                if not done:
+                    time.sleep(_POLL_S)
+                for future in done:
+                    waits.remove(future)
+                    try:
+                        yield future.result()
+                    except KilledWorker:
+                        yield work.lost(by_key[future.key])
         finally:
             self._client.cancel(futures)
 
@@ -156,6 +179,12 @@ class Cluster:
 def cores() -> int:
     """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _soon(futures: Collection[Future[R]]) -> Iterator[Future[R]]:
+    """Those that are done before it is time to look again."""
+    with suppress(TimeoutError):
+        yield from as_completed(futures, timeout=_LOOK_S)
 
 
 def _loose(untyped: Any) -> Any:

@@ -26,6 +26,7 @@ from rtshcua.campaign.workers import Cluster, Here, Processes, Workers, cores
 from rtshcua.campaign.written import scenario_text
 from rtshcua.cli.faults import say, words_of
 from rtshcua.cli.findings import Findings, exit_code
+from rtshcua.cli.interrupts import Stopped, StopRequest
 from rtshcua.cli.moments import moment
 from rtshcua.cli.sources import compile_sources, no_source
 from rtshcua.cli.stdout import out
@@ -115,12 +116,13 @@ def campaign(
     space = _space(field, compiled.policy, compiled.mission, flavours, kinds, approve)
     if isinstance(space, Refusal):
         return findings.end(space)
+    stop = StopRequest()
     try:
-        workers: Workers = Cluster(cluster) if cluster is not None else _here(jobs or cores())
+        workers: Workers = Cluster(cluster, stop.look) if cluster is not None else _here(jobs or cores(), stop)
     except ImportError:
         help = "install it with the extra: `pip install 'rtshcua[cluster]'`"
         return findings.refuse(ExitCode.USAGE, "usage", "`--cluster` needs Dask, which is not installed", help)
-    with closing(workers):
+    with closing(workers), stop:
         if begun is None:
             try:
                 folder.begin(identity)
@@ -128,22 +130,21 @@ def campaign(
                 return findings.refuse(ExitCode.FULL, "io", f"cannot write to `{folder.path}`: {words_of(error)}")
         order = Order(seed, flights, space)
         past = folder.past()
-        progress = _Progress(flights, sum(number < flights for number in past), quiet=as_json_)
+        progress = _Progress(flights, sum(number < flights for number in past), quiet=as_json_, stop=stop)
         progress.begun(folder)
         try:
             flying.fly(order, field, workers, past, lambda result: progress.flown(result, folder))
-        except KeyboardInterrupt:
-            progress.clear()
-            say(f"{len(past)} of {flights} flights are kept in `{folder.path}`: the same command again goes on")
-            raise
+            wanted = {number: past[number] for number in range(flights)}
+            if not quickly:
+                folder.tell(_summary(identity, past, folder))
+                _shrink(order, field, wanted, past, folder, identity, _imported(source, folder), progress)
+        except Stopped:
+            text = f"interrupted; {len(past)} of {flights} flights are kept in `{folder.path}`"
+            return findings.refuse(ExitCode.INTERRUPTED, "interrupted", text, "repeat the command to continue")
         finally:
             progress.clear()
             folder.tell(_summary(identity, past, folder))
-    wanted = {number: past[number] for number in range(flights)}
-    if not quickly:
-        _shrink(order, field, wanted, past, folder, identity, _imported(source, folder), progress)
     summary = _summary(identity, past, folder)
-    folder.tell(summary)
     if not as_json_:
         out(*_told(summary, folder))
     return findings.finish(
@@ -160,8 +161,8 @@ def _misused(source: Path, cluster: str | None, jobs: int | None) -> Refusal | N
     return no_source(source)
 
 
-def _here(jobs: int) -> Workers:
-    return Here() if jobs == 1 else Processes(jobs)
+def _here(jobs: int, stop: StopRequest) -> Workers:
+    return Here() if jobs == 1 else Processes(jobs, stop.look)
 
 
 def _kinds(names: Sequence[str]) -> frozenset[type] | Refusal:
@@ -281,6 +282,7 @@ class _Progress:
     before: int
     """How many were flown when it began."""
     quiet: bool
+    stop: StopRequest
     failed: int = 0
     done: int = 0
     told: int = 0
@@ -297,7 +299,7 @@ class _Progress:
             say(f"{self.before} of {self.flights} flights are kept in `{folder.path}`: it goes on behind them")
 
     def flown(self, result: Result, folder: Folder) -> None:
-        """A flight is over; it is kept."""
+        """A flight is over; it is kept. Raises Stopped."""
         folder.keep(result)
         self.done += 1
         self.failed += bool(result.failures)
@@ -305,9 +307,11 @@ class _Progress:
         if self._changes or (self._shows and reached * 10 // self.flights > self.told):
             self.told = reached * 10 // self.flights
             self._say(f"{reached}/{self.flights} flights, {self.failed} failed, {self._left(reached)} left")
+        self.stop.look()
 
     def shrinks(self, slug: str) -> None:
-        """Another flight is flown to make a failure small."""
+        """Another flight is flown to make a failure small. Raises Stopped."""
+        self.stop.look()
         if self._changes:
             self._say(f"{slug}: looking for the smallest flight that fails so")
 

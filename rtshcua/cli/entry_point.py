@@ -2,8 +2,8 @@
 
 Python makes an exception of it, wherever it comes: amid imports, or in code of C that does not expect one. A process
 that dies of SIGINT loses nothing that one loses which is killed, and a shell counts it as 130. A command that has
-something to put in order asks for the exception while it does (`interrupts.breakable`), or keeps the wish
-(`interrupts.Interrupts`). Nothing may be imported here that takes time.
+something to put in order looks at a flag that the signal sets (`interrupts.StopRequest`, `Interrupts`), or asks for the
+exception (`interrupts.breakable`). Nothing may be imported here that takes time.
 """
 
 import signal

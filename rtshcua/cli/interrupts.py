@@ -31,17 +31,40 @@ def breakable() -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-@contextmanager
-def terminated_as_interrupted() -> Iterator[None]:
-    """Within this, in the main thread, SIGTERM is what Ctrl-C is."""
-    if current_thread() is not main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+class Stopped(Exception):
+    """Somebody asked for the end; raised by `StopRequest.look` alone, never amid other work."""
+
+
+class StopRequest:
+    """While entered, in the main thread, SIGINT and SIGTERM set a flag, which `look` reads between two pieces of work.
+
+    A signal that is ignored stays so: a shell ignores SIGINT for what it starts in the background.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: dict[signal.Signals, signal._HANDLER] = {}
+
+    def __enter__(self) -> Self:
+        if current_thread() is main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                if signal.getsignal(number) is not signal.SIG_IGN:
+                    self._before[number] = signal.signal(number, self._note)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def look(self) -> None:
+        """Raises Stopped once a signal came."""
+        if self.asked:
+            raise Stopped
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
 
 
 class Wish(Enum):

@@ -16,6 +16,7 @@ from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.document_options import ApprovalKey, AsJson, FlyingBundle, PassphraseFile, Person, SignedRoot
 from rtshcua.cli.documents import MOST_S, subject
 from rtshcua.cli.faults import refuse, untrusted
+from rtshcua.cli.interrupts import Stopped, StopRequest
 from rtshcua.cli.recalling import GOOD_S, HELP, Recalled
 from rtshcua.cli.showing.bundle import Claimed
 from rtshcua.cli.showing.log import Names
@@ -69,9 +70,8 @@ def operator(
         output=sys.stdout.fileno(), as_json=as_json,
     )  # fmt: skip
     try:
-        return console.follow()
-    except KeyboardInterrupt:
-        return console.leave()
+        with StopRequest() as stop:
+            return console.follow(stop)
     finally:
         console.close()
 
@@ -122,27 +122,29 @@ class OperatorConsole:
         self._sent_s = self._heard_s = self._lost_s = time.monotonic()
         self._told_silence = self._told_unanswered = False
 
-    def follow(self) -> ExitCode:
-        """Until the flight is over, somebody leaves it, or the connection is lost for too long."""
+    def follow(self, stop: StopRequest) -> ExitCode:
+        """Until the flight is over, somebody leaves it (also by a signal), or the connection is lost for too long."""
         self._greet()
         self.tell("ready", _HELP)
         code: ExitCode | None = None
-        while code is None:
-            self._output.write()
-            code = self._turn()
+        try:
+            while code is None:
+                stop.look()
+                self._output.write()
+                code = self._turn()
+        except Stopped:
+            code = self._leave()
         self._output.drain(self._patience.drain_s)
         return code
-
-    def leave(self) -> ExitCode:
-        """Somebody leaves the flight."""
-        self.tell("left", "the flight goes on")
-        self._output.drain(self._patience.drain_s)
-        return self._left()
 
     def close(self) -> None:
         """Hang up."""
         if self._follower is not None:
             self._follower.close()
+
+    def _leave(self) -> ExitCode:
+        self.tell("left", "the flight goes on")
+        return self._left()
 
     def _left(self) -> ExitCode:
         return self._code if self._unanswered is None else ExitCode.LINK
@@ -169,8 +171,7 @@ class OperatorConsole:
             if over:
                 return self._left()
         if self._typing in readable and self._type():
-            self.tell("left", "the flight goes on")
-            return self._left()
+            return self._leave()
         return self._wait()
 
     def _wait(self) -> ExitCode | None:

@@ -8,7 +8,8 @@ The door to a command, for whoever writes one:
   would be swallowed;
 - the function returns an `ExitCode`. It reports what it refuses itself, in one way for all: `return
   fail(ExitCode.INPUT, "...")` from `rtshcua.cli.faults`; OSError, Ctrl-C and faults simply rise to the barrier there;
-- Ctrl-C ends it at once, by the signal, unless its row says that it ends in order.
+- Ctrl-C ends it at once, by the signal, unless its row says that it ends in order, or it enters what sets a flag
+  instead (`rtshcua.cli.interrupts`).
 """
 
 from typing import NamedTuple
@@ -34,12 +35,7 @@ COMMANDS = (
     Row("lint", "write", "report that and what is worth a second look; fix it, ignore it, for CI too", quick=True),
     Row("fmt", "write", "lay sources out in the one style; comments stay where they are"),
     Row("test", "write", "run the tests of sources, say what they cover, and write tests for each limit"),
-    Row(
-        "campaign",
-        "write",
-        "fly a mission thousands of times with faults drawn by chance, and judge each",
-        ends_in_order=True,
-    ),
+    Row("campaign", "write", "fly a mission thousands of times with faults drawn by chance, and judge each"),
     Row("compile", "write", "check a mission and sign it into a bundle that can fly"),
     Row("explain", "write", "print what a diagnostic code means, with a bad and a good example"),
     Row("docs", "write", "render skills and policies as one page that a person can sign off on"),
@@ -51,7 +47,7 @@ COMMANDS = (
     Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),
     Row("approve", "fly", "answer a step that asks for confirmation, with your signature", ends_in_order=True),
     Row("recall", "fly", "call a flight home, with your signature", quick=True),
-    Row("operator", "fly", "follow a flight, and hold its recall ready: one key calls it home", ends_in_order=True),
+    Row("operator", "fly", "follow a flight, and hold its recall ready: one key calls it home"),
     Row("replace", "fly", "hand a flight the mission that takes the place of its own"),
     Row("mcp", "fly", "let an agent's host propose missions to a vehicle that waits (MCP)"),
     Row("agent-bundle", "fly", "make a plug-in of that for hosts of agents: OpenClaw, Claude"),
@@ -59,7 +55,7 @@ COMMANDS = (
     Row("qualify", "fly", "fly a short test of the autopilot itself, and sign the result", ends_in_order=True),
     Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station", ends_in_order=True),
     Row("recover", "fly", "end the log of a flight that broke off, and lose nothing of it"),
-    Row("witness", "fly", "cosign logs from the ground, so that they cannot be rewritten or cut", ends_in_order=True),
+    Row("witness", "fly", "cosign logs from the ground, so that they cannot be rewritten or cut"),
     Row(
         "verify-log",
         "audit",

@@ -17,7 +17,7 @@ from rtshcua.adapters.vehicle.address import AddressError, Way
 from rtshcua.adapters.witness_link import WitnessLink
 from rtshcua.cli.faults import as_json as saying_json
 from rtshcua.cli.faults import distrust, exit_code_of, fail, misaddressed, refuse, untrusted
-from rtshcua.cli.interrupts import terminated_as_interrupted
+from rtshcua.cli.interrupts import Stopped, StopRequest
 from rtshcua.cli.shown import many
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import unlock
@@ -31,6 +31,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
+#: how long it waits at most before it looks whether it is to stop
 _SERVE_S = 0.5
 
 Say = Callable[[dict[str, object], str], None]
@@ -70,7 +71,6 @@ def witness(
     store = KeyStore(data_folder())
     with ExitStack() as stack:
         stack.enter_context(saying_json(wanted=as_json))
-        stack.enter_context(terminated_as_interrupted())
         try:
             signed = store.root() if root is None else read_root(root)
             trust = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=_now_us())
@@ -81,7 +81,10 @@ def witness(
             memory = WitnessStore(state_dir or state_folder(), own)
             stack.callback(memory.close)
             made = FileWitness(memory, own, lambda vehicle: _log_keys(trust, vehicle), lambda: _now_us() // 1_000_000)
-            desk = _Desk(made, paths or [], watch, _saying(as_json=as_json))
+            stop = StopRequest()
+            if link is not None or watch is not None:  # else a signal ends it at once: what it has written is whole
+                stack.enter_context(stop)
+            desk = _Desk(made, paths or [], watch, _saying(as_json=as_json), stop)
             return desk.work() if link is None else desk.serve((link.host, link.port), stack)
         except WitnessError as error:
             if error.slug != "in-use":
@@ -91,18 +94,21 @@ def witness(
             )
         except Untrusted as error:
             return refuse(untrusted(error))
-        except KeyboardInterrupt:
-            return ExitCode.OK if link is not None or watch is not None else ExitCode.INTERRUPTED
+        except Stopped:
+            return ExitCode.OK
 
 
 class _Desk:
     """What a witness is asked, and what it tells. `code` is the gravest that happened."""
 
-    def __init__(self, witness: FileWitness, paths: list[Path], watch: float | None, say: Say) -> None:
+    def __init__(
+        self, witness: FileWitness, paths: list[Path], watch: float | None, say: Say, stop: StopRequest
+    ) -> None:
         self._witness = witness
         self._paths = paths
         self._watch = watch
         self._say = say
+        self._stop = stop
         self._looked: dict[Path, tuple[int, int]] = {}
         self._unread: dict[Path, str] = {}
         self._due_s = 0.0
@@ -113,8 +119,15 @@ class _Desk:
         if self._watch is None:
             return max([code, *(self._none_in(path) for path in self._paths)])
         while True:
-            time.sleep(self._watch)
+            self._rest(self._watch)
             self._look()
+
+    def _rest(self, seconds: float) -> None:
+        """Wait, in short parts, for a signal cuts none short."""
+        while seconds > 0:
+            time.sleep(min(seconds, _SERVE_S))
+            self._stop.look()
+            seconds -= _SERVE_S
 
     def _none_in(self, path: Path) -> ExitCode:
         """Whether there was anything to look at."""
@@ -132,6 +145,7 @@ class _Desk:
         self._look()
         while True:
             link.serve(min(_SERVE_S, self._watch or _SERVE_S))
+            self._stop.look()
             if self._watch is not None and time.monotonic() >= self._due_s:
                 self._look()
 
@@ -141,6 +155,7 @@ class _Desk:
         self._due_s = time.monotonic() + (self._watch or 0)
         for path in self._paths:
             for log in logs_in(path):
+                self._stop.look()
                 try:
                     found = self._looked_at(log, path)
                 except FileNotFoundError:

@@ -177,3 +177,31 @@ def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown
 def test_one_process_is_enough() -> None:
     assert list(Here().fly(Nothing(b"", b"", ()), few())) == [result(flight) for flight in few()]
     assert campaign.FIRST < campaign.ROUND
+
+
+class Enough(Exception):
+    """No flight is waited for any more."""
+
+
+class NeverEnds(Nothing):
+    """A flight that lasts longer than anybody waits."""
+
+    __slots__ = ()
+
+    def fly(self, flight: Flight) -> Result:
+        while True:
+            signal.pause()
+
+
+@pytest.mark.slow
+def test_a_flight_that_is_under_way_is_not_waited_for_once_somebody_asks_for_the_end() -> None:
+    looks = iter([None, None])
+
+    def look() -> None:
+        if next(looks, Enough) is Enough:
+            raise Enough
+
+    processes = Processes(1, look)
+    with pytest.raises(Enough):
+        list(processes.fly(NeverEnds(b"", b"", ()), few()))
+    processes.close()

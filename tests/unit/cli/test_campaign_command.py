@@ -1,6 +1,7 @@
 """`rtshcua campaign`: what it asks for, how it goes on, what it keeps, and how it ends."""
 
 import json
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -114,19 +115,47 @@ def test_it_goes_on_where_it_stopped(
 
     def interrupted(field: Field, flight: Flight) -> Result:
         seen.append(flight.number)
-        if len(seen) == 12:
-            raise KeyboardInterrupt
+        if len(seen) == 12:  # the flight that is under way is flown to its end
+            signal.raise_signal(signal.SIGTERM)
         return good(field, flight)
 
     flies(interrupted)
-    code, _, _ = run(capsys, "--flights", "30")
+    code, _, err = run(capsys, "--flights", "30")
     assert code == ExitCode.INTERRUPTED
     folder = Path("runs/campaign-short-1")
-    assert json.loads((folder / "report.json").read_text())["flights"] == 9  # two calm ones were flown before
+    assert f"interrupted; 10 of 30 flights are kept in `{folder}`" in err  # two calm ones were flown before
+    assert json.loads((folder / "report.json").read_text())["flights"] == 10
     flies(good)
     assert run(capsys, "--flights", "30")[0] == ExitCode.OK
     assert json.loads((folder / "report.json").read_text())["flights"] == 30
     assert len((folder / "results.jsonl").read_text().splitlines()) == 30
+
+
+def test_it_stops_while_a_failure_is_shrunk_and_shrinks_it_the_next_time(
+    here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
+) -> None:
+    seen: list[int] = []
+
+    def interrupted(field: Field, flight: Flight) -> Result:
+        seen.append(flight.number)
+        if len(seen) == 122:  # the calm ones, those that are drawn, and then candidates
+            signal.raise_signal(signal.SIGINT)
+        return without_gps(field, flight)
+
+    flies(interrupted)
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        code, out, _ = run(capsys, "--flights", "119", "--json")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    error = json.loads(out)
+    assert (code, error["error"]["slug"]) == (ExitCode.INTERRUPTED, "interrupted")
+    report = json.loads(Path("runs/campaign-short-1/report.json").read_text())
+    assert report["flights"] == 119
+    assert not list(Path("runs/campaign-short-1").glob("failures/*.rts"))
+    flies(without_gps)
+    assert run(capsys, "--flights", "119")[0] == ExitCode.TESTS
+    assert Path("runs/campaign-short-1/failures/collision.rts").exists()
 
 
 def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(

@@ -2,12 +2,13 @@
 
 import os
 import signal
+import threading
 from typing import Any
 
 import pytest
 
 from rtshcua.cli import interrupts
-from rtshcua.cli.interrupts import Interrupts, Wish
+from rtshcua.cli.interrupts import Interrupts, Stopped, StopRequest, Wish
 
 
 @pytest.fixture
@@ -56,3 +57,46 @@ def test_the_handlers_before_are_put_back() -> None:
     with Interrupts():
         assert signal.getsignal(signal.SIGINT) != before
     assert signal.getsignal(signal.SIGINT) == before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_request_to_stop_raises_where_it_is_looked_at_and_nowhere_else(number: signal.Signals) -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        with StopRequest() as stop:
+            stop.look()
+            press(number)
+            assert stop.asked
+            for _ in range(2):
+                with pytest.raises(Stopped):
+                    stop.look()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_what_is_started_with_ctrl_c_ignored_goes_on_ignoring_it() -> None:
+    """As a shell starts what runs in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with StopRequest() as stop:
+            press()
+            assert not stop.asked
+            press(signal.SIGTERM)
+            assert stop.asked
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_a_thread_that_is_not_the_main_one_gets_no_signals() -> None:
+    seen = []
+
+    def work() -> None:
+        with StopRequest() as stop:
+            seen.append(stop.asked)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [False]

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import socket
 import tempfile
 import threading
@@ -16,6 +17,7 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.cli.app import main
 from rtshcua.cli.documents import subject
+from rtshcua.cli.interrupts import StopRequest
 from rtshcua.cli.operator import OperatorConsole, Patience
 from rtshcua.cli.stdout import MOST_LINES, NewestLines
 from rtshcua.cli.unlock import unlock_person
@@ -95,7 +97,8 @@ class Seat:
             patience=patience,
         )  # fmt: skip
         try:
-            return console.follow()
+            with StopRequest() as stop:
+                return console.follow(stop)
         finally:
             console.close()
 
@@ -263,3 +266,18 @@ def test_the_newest_lines_are_kept(seat: Seat) -> None:
     without = int(lines[lines.index(b"without") + 1])
     assert len(lines) - 2 == 5 * MOST_LINES - without
     assert without > 2 * MOST_LINES
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_leaves_the_flight_as_quit_does(seat: Seat, place: Path, number: signal.Signals) -> None:
+    """It comes while the console waits, and ends that wait."""
+
+    def turn(link: socket.socket) -> None:
+        seat.until("ready")
+        os.kill(os.getpid(), number)
+        link.recv(1)
+
+    flight = Flight(place, turn)
+    assert seat.sits(place) is ExitCode.OK
+    flight.end()
+    assert seat.events() == ["following", "ready", "left"]

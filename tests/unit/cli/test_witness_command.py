@@ -233,7 +233,7 @@ def test_a_folder_is_watched(
         assert seconds == 0.5
         turn = next(turns, None)
         if turn is None:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGTERM)
         if turn == 1:
             flown.epoch()
             os.utime(flown.path)
@@ -273,7 +273,7 @@ def test_what_cannot_be_read_keeps_no_other_log_waiting(
 
     def sleep(_: float) -> None:
         if next(turns, None) is None:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGTERM)
         (tmp_path / "b.jsonl").unlink(missing_ok=True)
 
     monkeypatch.setattr(command.time, "sleep", sleep)
@@ -295,8 +295,8 @@ def test_a_log_whose_anchors_could_not_be_written_is_looked_at_again(
 
     def sleep(_: float) -> None:
         if next(turns, None) is None:
-            raise KeyboardInterrupt
-        if beside.is_dir():
+            signal.raise_signal(signal.SIGTERM)
+        elif beside.is_dir():
             beside.rmdir()
 
     monkeypatch.setattr(command.time, "sleep", sleep)

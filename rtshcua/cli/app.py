@@ -20,8 +20,6 @@ from rtshcua.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
 from rtshcua.cli.width import fitted
 from rtshcua.diagnostics.exits import ExitCode
 
-#: the commands whose `--json` is that of `Findings`
-_REPORTING = ("check", "compile", "fmt", "lint", "test")
 #: when the collector looks for garbage while sources are checked: syntax trees come by thousands, and stay
 _COLLECTING = (50_000, 20, 100)
 
@@ -145,7 +143,7 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
         help = f"did you mean `{path} {meant}`?" if meant else f"`{path} --help` lists the commands"
         return fail(ExitCode.USAGE, f"no such command: `{path.partition(' ')[2]} {verb[1]}`", help)
     help = f"`{path} --help` explains it"
-    if row.name in _REPORTING and "--json" in given:
+    if row.reports and "--json" in given:
         from rtshcua.cli.findings import Findings
 
         return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, help)

@@ -10,10 +10,9 @@ from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store.writing import replace_inside
 from rtshcua.cli.bounds import bounds_dict, bounds_told
-from rtshcua.cli.faults import say
 from rtshcua.cli.findings import Findings, exit_code
 from rtshcua.cli.moments import moment
-from rtshcua.cli.replacing import Replacing, replace_with
+from rtshcua.cli.replacing import Replacing, replace_with, warned
 from rtshcua.cli.sources import compile_sources, meant, no_source
 from rtshcua.cli.stdout import out
 from rtshcua.cli.unlock import another_key, check_trusted, strangers, unlock, unlock_for
@@ -111,7 +110,9 @@ def compile(
         return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())
     if replaces and first is not None and flight is not None:
-        order = Replacing(replaces, index_of(first), flight, root, mission_key, passphrase_file, issued_at, target)
+        order = Replacing(
+            replaces, index_of(first), flight, root, mission_key, passphrase_file, issued_at, deny_warnings, target
+        )  # fmt: skip
         return replace_with(compiled.policy, compiled.mission, order, store, findings, quiet=as_json)
     try:
         signers = (
@@ -125,10 +126,8 @@ def compile(
         warnings = strangers(store, signers, compiled.policy.vehicle.identity, issued_at)
     except Untrusted as error:
         return findings.end(another_key(error, compiled.policy, compiled.mission))
-    if warnings and deny_warnings:
-        return findings.refuse(ExitCode.UNTRUSTED, "unknown-key", warnings[0], "sign with keys that the root names")
-    for each in warnings:
-        say(f"warning: {each}")
+    if not warned(warnings, findings, deny=deny_warnings):
+        return ExitCode.UNTRUSTED
     replace_inside(target, data)
     if not as_json:
         out(_told(compiled.policy, compiled.mission, target))

@@ -26,7 +26,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.compiler.program import Checked, compile_program
 from rtshcua.ground.handbook.cases import Tried
-from rtshcua.ground.handbook.handbook import Flown, Part, handbook
+from rtshcua.ground.handbook.handbook import Flown, Part, called, handbook
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.testing.run import run_case
 from rtshcua.ground.testing.suite import suite
@@ -127,8 +127,8 @@ def docs(
         out_rendered(text, end="")
         return ExitCode.OK
     replace_inside(target, text.encode("utf-8"))
-    for chapter in book.chapters:
-        out(f"{chapter.name}: version {chapter.version}, digest {chapter.digest}")
+    for chapter, name in zip(book.chapters, called(book.chapters), strict=True):
+        out(f"{name}: version {chapter.version}, digest {chapter.digest}")
     out(f"{len(book.chapters)} {'policies' if len(book.chapters) > 1 else 'policy'}, written to {target}")
     return ExitCode.OK
 

@@ -39,7 +39,7 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.cli.configured import MeantSettings, settings_of
-from rtshcua.cli.connection import Connect, LinkKey, System, UnsignedRadio, UtcError, duration_us
+from rtshcua.cli.connection import Connect, DecidesIn, LinkKey, System, UnsignedRadio, UtcError, duration_us, mode_of
 from rtshcua.cli.faults import code_of, distrust, fail, misaddressed, refuse
 from rtshcua.cli.launch import expect_no_source
 from rtshcua.cli.meeting import unmet, unopened
@@ -57,6 +57,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.isolated import Caller
+from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
 from rtshcua.wire.clock import Source
@@ -67,6 +68,7 @@ app = typer.Typer(add_completion=False)
 
 _HEARTBEAT_S = 10.0
 _POLL_US = 50_000
+_SOFTWARE = "a run with `--mode software` decides in its own process, in reach of whoever takes it over"
 _EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
 
 
@@ -87,6 +89,7 @@ def doctor(
     boundary_socket: Annotated[
         Path | None, typer.Option(metavar="PATH", help="where a boundary listens that is to decide: look at that one")
     ] = None,
+    mode: DecidesIn = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
 ) -> ExitCode:  # fmt: skip
     """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
@@ -102,6 +105,9 @@ def doctor(
     if utc_error is not None and boundary_socket is not None:
         text = "`--utc-error` does not go with `--boundary-socket`: the boundary there is told in its own command line"
         return fail(ExitCode.USAGE, text)
+    if boundary_socket is not None and mode not in (None, Mode.PROCESS):
+        return fail(ExitCode.USAGE, f"`--boundary-socket` goes with `--mode process`, not with `{mode}`")
+    decides, _ = mode_of(mode, own=False, named=boundary_socket is not None)
     try:
         agents = [] if agent_user is None else [told_apart(agent_user, pwd.getpwnam(agent_user).pw_uid, os.geteuid())]
     except KeyError:
@@ -136,8 +142,8 @@ def doctor(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
         keyed = signing_key is not None
-        time_of_day = _time_of_day(boundary_socket, duration_us(utc_error), keyed=keyed)
-        findings = _boundary(boundary_socket) + agents + _settle(socket, vehicle, clock)
+        time_of_day = _time_of_day(boundary_socket, duration_us(utc_error), keyed=keyed, apart=decides is Mode.PROCESS)
+        findings = _boundary(decides, boundary_socket) + agents + _settle(socket, vehicle, clock)
         findings += list(
             diagnose(
                 vehicle, policy, mission, keyed=keyed,
@@ -159,13 +165,18 @@ def doctor(
     return code
 
 
-def _boundary(socket: Path | None = None) -> list[VehicleFinding]:
-    """Where a run on this machine decides, or one that calls the boundary at this socket, and which measures that keep
+def _boundary(mode: Mode, socket: Path | None = None) -> list[VehicleFinding]:
+    """Where a run in this mode decides, or one that calls the boundary at this socket, and which measures that keep
     others out of a process of its own that would be without.
     """
     slug = "boundary/process"
-    if socket is None and program() is None:
-        return [VehicleFinding(slug, MissionVerdict.WARN, UNBUILT, "a process of its own", UNBUILT_HELP)]
+    if mode is Mode.NONE:
+        text, help = "a run with `--mode none` flies the simulated vehicle only", "without `--mode`"
+        return [VehicleFinding(slug, MissionVerdict.STOP, text, "a process of its own", help)]
+    if mode is Mode.SOFTWARE:
+        built = program() is not None
+        text, help = (_SOFTWARE, "without `--mode`") if built else (UNBUILT, UNBUILT_HELP)
+        return [VehicleFinding(slug, MissionVerdict.WARN, text, "a process of its own", help)]
     try:
         if socket is None:
             here, where = measures_here(None), "a run decides in a process of its own (`run --mode process`)"
@@ -174,8 +185,7 @@ def _boundary(socket: Path | None = None) -> list[VehicleFinding]:
             listening.close()
             here, where = listening.measures, f"a boundary listens at `{socket}`"
     except BoundaryError as error:
-        verdict = MissionVerdict.WARN if socket is None else MissionVerdict.STOP
-        return [VehicleFinding(slug, verdict, str(error), "a process of its own", error.help)]
+        return [VehicleFinding(slug, MissionVerdict.STOP, str(error), "a process of its own", error.help)]
     found = [VehicleFinding(slug, MissionVerdict.OK, where)]
     for measure, text in MISSING.items():
         if measure not in here:
@@ -184,10 +194,12 @@ def _boundary(socket: Path | None = None) -> list[VehicleFinding]:
     return found
 
 
-def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool) -> TimeOfDay:
-    """What a run would take the time of day from: one as it begins by itself, or one by the boundary that listens."""
+def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool, apart: bool) -> TimeOfDay:
+    """What a run would take the time of day from: one as it begins by itself, with a boundary `apart` or in its own
+    process, or one by the boundary that listens.
+    """
     if socket is None:
-        return TimeOfDay(kernel_error_us(), vehicle_counts(apart=program() is not None, keyed=keyed), stated_us)
+        return TimeOfDay(kernel_error_us(), vehicle_counts(apart=apart, keyed=keyed), stated_us)
     try:
         listening = ListeningBoundary(socket)
     except BoundaryError:  # nothing flies by it, and that was said

@@ -40,7 +40,7 @@ class Findings:
             self._object = as_json(found, sources)
         elif found:
             found = folded(found)
-            text = _laid_out(render(most_severe(found), sources, columns()))
+            text = laid_out(render(most_severe(found), sources, columns()))
             say_rendered((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say_lines(f"\n{_count(found)}")
             if len(found) > MOST_SHOWN:
@@ -100,7 +100,7 @@ def _wants_colour() -> bool:
     return sys.stderr is not None and sys.stderr.isatty() and not os.environ.get("NO_COLOR")
 
 
-def _laid_out(text: str) -> str:
+def laid_out(text: str) -> str:
     """What is said, in lines of a terminal; lines of a source stay as they are cut."""
     lines = text.split("\n")
     return "\n".join("\n".join([line] if " | " in line else fitted(line)) for line in lines)

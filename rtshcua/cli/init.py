@@ -55,7 +55,7 @@ def init(
     places, rules and tests in. Nothing that is there already is touched; when it fails, nothing is left behind. In a
     repository that has its README.md, .gitignore or a LICENSE, --keep makes what is missing.
 
-    Ends with 0 where it was made, 2 where the name cannot be one or --force and --keep are both given, 3 where
+    Ends with 0 where it was made, 2 where the name cannot name a policy or --force and --keep are both given, 3 where
     files of the same names are there, 74 where they cannot be written.
     """
     if force and keep:
@@ -84,7 +84,7 @@ def init(
         return fail(
             ExitCode.INPUT, f"nothing was made, for a file or a folder is in the way: {there}", slug="in-the-way"
         )
-    _tell(directory, chosen, [*made], kept, as_json)
+    _tell(directory, chosen, [*made], kept, None if name is not None else _renamed(directory, chosen), as_json)
     return ExitCode.OK
 
 
@@ -99,6 +99,14 @@ def _named_after(directory: Path) -> str:
     """A name from the folder's: `My-Site 2` is `my_site_2`."""
     word = re.sub(r"[^a-z0-9]+", "_", directory.absolute().resolve().name.lower()).strip("_")
     return (word if re.match("[a-z]", word) else f"site_{word}")[:40].rstrip("_")
+
+
+def _renamed(directory: Path, chosen: str) -> str | None:
+    """Why the policy has another name than the folder; None where it has the same."""
+    folder = directory.absolute().resolve().name
+    if folder == chosen:
+        return None
+    return f"the folder's name `{folder}` cannot name a policy, so it is called `{chosen}`; `--name` chooses another"
 
 
 def _first_finding(files: Mapping[str, bytes]) -> str | None:
@@ -116,14 +124,18 @@ def _first_finding(files: Mapping[str, bytes]) -> str | None:
     return None if not checked.diagnostics else checked.diagnostics[0].message
 
 
-def _tell(directory: Path, name: str, files: list[str], kept: tuple[str, ...], as_json: bool) -> None:
+def _tell(
+    directory: Path, name: str, files: list[str], kept: tuple[str, ...], renamed: str | None, as_json: bool
+) -> None:
     if as_json:
-        told = {"name": name, "folder": str(directory), "files": files, "kept": [*kept]}
+        told = {"name": name, "folder": str(directory), "files": files, "kept": [*kept], "renamed": renamed}
         out_json(json.dumps(told, ensure_ascii=False))
         return
     out(f"made {name} in {directory.absolute()}:")
     for path in files:
         out(f"  {path}")
+    if renamed is not None:
+        out(renamed)
     if kept:
         out(f"kept as they were: {', '.join(kept)}")
     out("next, in there: `rtshcua lint .`, `rtshcua test .`, and what README.md says")

@@ -92,6 +92,8 @@ def mcp(
             gc.freeze()
         return desk
 
+    if not to.exists():
+        say(f"note: `{to}` does not exist yet: `rtshcua run BUNDLE --wait --agent-socket {to}` makes it")
     if http is None or token_file is None:
         with breakable():
             serve(make)

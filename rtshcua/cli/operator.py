@@ -24,6 +24,7 @@ from rtshcua.cli.stdout import NewestLines
 from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.suggest import nearest
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, Decision, Effect
@@ -36,6 +37,8 @@ _HELP: Final = "recall: call this flight home · policy: all under its policy ·
 _RECALLS: Final = {"r": False, "recall": False, "p": True, "policy": True}
 _QUITS: Final = frozenset({"q", "quit", "exit"})
 _CHUNK: Final = 4_096
+#: of a line that is no command
+_SHOWN: Final = 40
 
 app = typer.Typer(add_completion=False)
 
@@ -289,6 +292,10 @@ class OperatorConsole:
             return True
         under_policy = _RECALLS.get(word)
         if under_policy is None:
+            near = nearest(word, [*_RECALLS, *_QUITS]) if word else None
+            meant = f"; did you mean `{near}`?" if near else ""
+            if word:
+                self.tell("unknown", f"`{word[:_SHOWN]}` is no command{meant}")
             self.tell("ready", _HELP)
         else:
             self._recall(under_policy=under_policy)

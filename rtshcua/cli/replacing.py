@@ -6,10 +6,10 @@ from typing import NamedTuple
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.store.writing import replace
 from rtshcua.cli.documents import flight_id, subject
-from rtshcua.cli.faults import code_of
+from rtshcua.cli.faults import code_of, say
 from rtshcua.cli.findings import Findings
 from rtshcua.cli.stdout import out
-from rtshcua.cli.unlock import check_trusted, unlock_for
+from rtshcua.cli.unlock import check_trusted, strangers, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -34,7 +34,18 @@ class Replacing(NamedTuple):
     mission_key: Path | None
     passphrase_file: Path | None
     issued_at_us: int
+    deny_warnings: bool
     target: Path
+
+
+def warned(warnings: list[str], findings: Findings, *, deny: bool) -> bool:
+    """Says that a key is one that the trust root does not name; whether it is signed with it all the same."""
+    if warnings and deny:
+        findings.refuse(ExitCode.UNTRUSTED, "unknown-key", warnings[0], "sign with keys that the root names")
+        return False
+    for each in warnings:
+        say(f"warning: {each}")
+    return True
 
 
 def replace_with(
@@ -54,6 +65,7 @@ def replace_with(
         assert name is not None
         key = unlock_for(store, mission, path=order.mission_key, passphrase_file=order.passphrase_file)
         check_trusted(store, key, policy, mission)
+        warnings = strangers(store, [key], policy.vehicle.identity, order.issued_at_us)
         document = sign_replacement(mission, over=over, flight=name, kept=order.first, key=key)
     except DocumentError as error:
         return findings.refuse(ExitCode.REFUSED, error.slug, str(error), "the steps before `--from` stay as they fly")
@@ -63,6 +75,8 @@ def replace_with(
     if len(document) > MAX_DOCUMENT:
         text = f"the replacement has {len(document)} bytes, and a flight reads {MAX_DOCUMENT} at most"
         return findings.refuse(ExitCode.REFUSED, "too-large", text)
+    if not warned(warnings, findings, deny=order.deny_warnings):
+        return ExitCode.UNTRUSTED
     replace(order.target, document)
     steps = len(mission.invocations)
     if not quiet:
@@ -78,4 +92,5 @@ def replace_with(
             "steps": steps,
             "mission_key": key.kid.hex(),
         },
+        warnings=warnings,
     )

@@ -13,14 +13,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rtshcua.adapters.boundary_process import program
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address, AddressError, Way
 from rtshcua.adapters.vehicle.transport import Transport, open_transport
 from rtshcua.cli import simulated, witnessed
 from rtshcua.cli.configured import Settings, settings_of
-from rtshcua.cli.connection import LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_text, duration_us
+from rtshcua.cli.connection import (
+    DecidesIn,
+    LinkKey,
+    NoFence,
+    System,
+    UnsignedRadio,
+    UtcError,
+    duration_text,
+    duration_us,
+    mode_of,
+)
 from rtshcua.cli.faults import fail, misaddressed
 from rtshcua.cli.refused import Refused, say_refused
 from rtshcua.diagnostics.exits import ExitCode
@@ -43,13 +52,7 @@ def run(
             help="another vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
         ),
     ] = None,
-    mode: Annotated[
-        Mode | None,
-        typer.Option(
-            help="where decisions are made: in a process of their own (default with --connect, where its program was "
-            "built) or in this one; `none` enforces nothing, in simulation",
-        ),
-    ] = None,
+    mode: DecidesIn = None,
     boundary_user: Annotated[
         str | None, typer.Option(metavar="USER", help="with `--mode process`: the user that it runs as; needs root")
     ] = None,
@@ -149,7 +152,7 @@ def run(
         return fail(ExitCode.USAGE, "`--fresh-state` is for the simulated vehicle, and without `--state-dir`")
     if unsigned_radio and signing_key is None and boundary_socket is None:
         return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
-    mode, unbuilt = _mode(mode, own=own, named=boundary_user is not None or boundary_socket is not None)
+    mode, unbuilt = mode_of(mode, own=own, named=boundary_user is not None or boundary_socket is not None)
     user = _boundary_user(boundary_user, mode)
     group = _group(agent_socket, operator_socket, agent_group)
     if isinstance(user, str) or isinstance(group, str):
@@ -280,16 +283,6 @@ def _not_with_socket(given: Mapping[str, object], *, own: bool, mode: Mode | Non
     if found is None:
         return ""
     return f"`{found}` does not go with `--boundary-socket`: {_OWN_TIME if found == _UTC_ERROR else _OWN}"
-
-
-def _mode(mode: Mode | None, *, own: bool, named: bool) -> tuple[Mode, bool]:
-    """Where decisions are made, and whether that is in this process only because there is no program of the boundary.
-    `own`: the vehicle is our simulated one; `named`: a user of the boundary's own was given.
-    """
-    if mode is not None or (own and not named):
-        return mode or Mode.SOFTWARE, False
-    unbuilt = program() is None and not named
-    return (Mode.SOFTWARE if unbuilt else Mode.PROCESS), unbuilt
 
 
 def _boundary_user(name: str | None, mode: Mode) -> tuple[int, int] | str | None:

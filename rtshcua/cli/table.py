@@ -22,6 +22,7 @@ class Row(NamedTuple):
     group: str
     help: str
     quick: bool = False  # plain command lines of it are read by `rtshcua.cli.quick`, without typer
+    reports: bool = False  # its `--json` is that of `Findings`, also where the command line is wrong
     ends_in_order: bool = False  # Ctrl-C raises in it, for something is put in order; else the signal ends it
 
     @property
@@ -31,14 +32,31 @@ class Row(NamedTuple):
 
 
 COMMANDS = (
-    Row("check", "write", "report everything that is wrong with sources or a mission specification", quick=True),
-    Row("lint", "write", "report that and what is worth a second look; fix it, ignore it, for CI too", quick=True),
-    Row("fmt", "write", "lay sources out in the one style; comments stay where they are"),
-    Row("test", "write", "run the tests of sources, say what they cover, and write tests for each limit"),
-    Row("campaign", "write", "fly a mission thousands of times with faults drawn by chance, and judge each"),
-    Row("compile", "write", "check a mission and sign it into a bundle that can fly"),
+    Row(
+        "check",
+        "write",
+        "report everything that is wrong with sources or a mission specification",
+        reports=True,
+        quick=True,
+    ),
+    Row(
+        "lint",
+        "write",
+        "report that and what is worth a second look; fix it, ignore it, for CI too",
+        reports=True,
+        quick=True,
+    ),
+    Row("fmt", "write", "lay sources out in the one style; comments stay where they are", reports=True),
+    Row("test", "write", "run the tests of sources, say what they cover, and write tests for each limit", reports=True),
+    Row(
+        "campaign",
+        "write",
+        "fly a mission thousands of times with faults drawn by chance, and judge each",
+        reports=True,
+    ),
+    Row("compile", "write", "check a mission and sign it into a bundle that can fly", reports=True),
     Row("explain", "write", "print what a diagnostic code means, with a bad and a good example"),
-    Row("docs", "write", "render skills and policies as one page that a person can sign off on"),
+    Row("docs", "write", "render skills and policies as one page that a person can sign off on", reports=True),
     Row("schema", "write", "print the JSON Schema of a mission specification, for agents"),
     Row("init", "write", "make a project of your own, with policy, mission, tests and CI", ends_in_order=True),
     Row("lsp", "write", "serve an editor: findings while you write, hover, renaming, completion"),
@@ -52,7 +70,13 @@ COMMANDS = (
     Row("mcp", "fly", "let an agent's host propose missions to a vehicle that waits (MCP)"),
     Row("agent-bundle", "fly", "make a plug-in of that for hosts of agents: OpenClaw, Claude"),
     Row("doctor", "fly", "say what a vehicle supports, and what would stop a mission"),
-    Row("qualify", "fly", "fly a short test of the autopilot itself, and sign the result", ends_in_order=True),
+    Row(
+        "qualify",
+        "fly",
+        "fly a short test of the autopilot itself, and sign the result",
+        reports=True,
+        ends_in_order=True,
+    ),
     Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station", ends_in_order=True),
     Row("recover", "fly", "end the log of a flight that broke off, and lose nothing of it"),
     Row("witness", "fly", "cosign logs from the ground, so that they cannot be rewritten or cut"),

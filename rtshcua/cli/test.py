@@ -19,6 +19,7 @@ from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.report.junit import junit
+from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.testing.coverage.coverage import enough, share
 from rtshcua.ground.testing.flown import flown_json, flown_suites
 from rtshcua.ground.testing.report import coverage_json, suites, summary_json, tests_json
@@ -74,6 +75,9 @@ def run_tests(
         help = "`--policy`, `--skill`, `--nominal`, `--output` and `--force` go with `--generate`"
         return findings.refuse(ExitCode.USAGE, "usage", "there is nothing to write without `--generate`", help)
     projects = Projects(config, isolated=isolated)
+    lost = next((path for path in paths or () if not path.exists() and path.suffix == ""), None)
+    if lost is not None:
+        return findings.refuse(ExitCode.INPUT, "input", f"no such file or directory: `{lost}`", _meant(lost))
     files = _files(paths or [Path()], projects, keep=generating)
     if isinstance(files, Refusal):
         return findings.end(files)
@@ -85,7 +89,17 @@ def run_tests(
     whole = not chosen and all(path.is_dir() for path in paths or [Path()])  # of a part, nobody asked for a share
     least = fail_under if fail_under is not None or not whole else _least(paths or [Path()], projects)
     results = run_all(files, chosen, with_coverage=coverage or least is not None, quiet=as_json)
-    return _finish(results, findings, least, junit_file, verbose=verbose, quiet=as_json)
+    return _finish(results, chosen, findings, least, junit_file, verbose=verbose, quiet=as_json)
+
+
+def _meant(lost: Path) -> str:
+    """A source below this folder that is called almost so, or how cases are chosen by their names."""
+    by_name = f"`-k {lost}` chooses tests by name"
+    below = unfolded([Path()])
+    near = None if isinstance(below, Refusal) else nearest(lost.name, {each.stem for each in below})
+    if near is None or isinstance(below, Refusal):
+        return by_name
+    return f"did you mean `{next(each for each in below if each.stem == near)}`? {by_name}"
 
 
 def _files(paths: list[Path], projects: Projects, *, keep: bool) -> tuple[Path, ...] | Refusal:
@@ -114,7 +128,14 @@ def _least(paths: list[Path], projects: Projects) -> int | None:
 
 
 def _finish(
-    results: Results, findings: Findings, least: int | None, junit_file: Path | None, *, verbose: bool, quiet: bool
+    results: Results,
+    chosen: str,
+    findings: Findings,
+    least: int | None,
+    junit_file: Path | None,
+    *,
+    verbose: bool,
+    quiet: bool,
 ) -> ExitCode:
     """Say what was found, write the report, and end."""
     ran, flown, covered = results.ran, results.flown, results.covered
@@ -141,7 +162,7 @@ def _finish(
         for line in told.coverage(covered or (), verbose=verbose):
             for each in fitted(line):
                 out_rendered(each)
-        out_rendered(told.summary(ran, flown, results.left_out) if ran or flown else _none(results))
+        out_rendered(told.summary(ran, flown, results.left_out) if ran or flown else _none(results, chosen))
         if short:
             reached = sum(one.coverage.covered for one in covered or ())
             found = share(reached, sum(one.coverage.total for one in covered or ()))
@@ -156,9 +177,12 @@ def _finish(
     )
 
 
-def _none(results: Results) -> str:
+def _none(results: Results, chosen: str) -> str:
     if has_errors(results.diagnostics):
         return "no test could be run: the sources have errors"
     if results.left_out:
-        return f"no test was run: none of {results.left_out} has that in its name"
+        by_word = {word: name for name in sorted(results.names) for word in (*name.split(), name)}
+        near = nearest(chosen, by_word)
+        help = "" if near is None else f"; the nearest is `{by_word[near]}`"
+        return f"no test was run: none of {results.left_out} has `{chosen}` in its name{help}"
     return "no test was found; docs/testing.md says how to write one"

@@ -6,13 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import MISSING, Measure, measures_here
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.adapters.simulator import Simulator
+from rtshcua.cli import doctor as doctor_command
 from rtshcua.cli.doctor import _boundary
+from rtshcua.onboard.enforcement.load import Mode
 from virtual.forked import Forked
 
 COMMAND = [sys.executable, "-m", "rtshcua.cli.app", "doctor"]
@@ -68,7 +71,7 @@ def test_each_measure_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, 
     def asked(program: str) -> list[tuple[str, MissionVerdict, str]]:
         script.write_text(f"#!{sys.executable}\n{program}\n")
         script.chmod(0o755)
-        return [(each.slug, each.verdict, each.found) for each in _boundary()]
+        return [(each.slug, each.verdict, each.found) for each in _boundary(Mode.PROCESS)]
 
     says = "import os, sys; os.write(int(sys.argv[2]), ({}).to_bytes(4, 'little') + bytes(8))"
     every = sum(Measure)
@@ -80,5 +83,16 @@ def test_each_measure_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, 
     assert [each[:2] for each in asked(says.format(every))] == [("boundary/process", MissionVerdict.OK)]
     for broken in ("raise SystemExit(3)", "pass"):
         ((slug, verdict, text),) = asked(broken)
-        assert (slug, verdict) == ("boundary/process", MissionVerdict.WARN)
+        assert (slug, verdict) == ("boundary/process", MissionVerdict.STOP), "as `run` refuses"
         assert "does not begin" in text
+
+
+def test_a_run_that_decides_in_its_own_process_is_judged_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its boundary's process is not asked, also where its program was built."""
+    for built in (Path("rtshcua-boundary"), None):
+        monkeypatch.setattr(doctor_command, "program", lambda built=built: built)
+        ((slug, verdict, text),) = [each[:3] for each in map(msgspec.structs.astuple, _boundary(Mode.SOFTWARE))]
+        assert (slug, verdict) == ("boundary/process", MissionVerdict.WARN)
+        assert "decides in its own process" in text
+    ((_, verdict, _),) = [each[:3] for each in map(msgspec.structs.astuple, _boundary(Mode.NONE))]
+    assert verdict is MissionVerdict.STOP, "as `run` refuses it"

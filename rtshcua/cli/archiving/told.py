@@ -9,6 +9,7 @@ from enum import StrEnum
 from rtshcua.cli.outcome import exit_code_of
 from rtshcua.cli.shown import shorten, utc
 from rtshcua.cli.stdout import out, out_json
+from rtshcua.cli.width import columns
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -29,21 +30,27 @@ class Shape(StrEnum):
     CSV = "csv"
 
 
-def tell(columns: Sequence[str], rows: Sequence[Sequence[object]], shape: Shape) -> None:
+def tell(names: Sequence[str], rows: Sequence[Sequence[object]], shape: Shape) -> None:
     """Prints rows on the standard output."""
     if shape is Shape.JSON:
-        out_json(json.dumps([dict(zip(columns, row, strict=True)) for row in rows], ensure_ascii=False, default=str))
+        out_json(json.dumps([dict(zip(names, row, strict=True)) for row in rows], ensure_ascii=False, default=str))
     elif shape is Shape.CSV:
         writer = csv.writer(sys.stdout, lineterminator="\n")
-        writer.writerow(columns)
+        writer.writerow(names)
         writer.writerows([visible(each) if isinstance(each, str) else each for each in row] for row in rows)
     else:
-        _table(columns, [[_cell(name, value) for name, value in zip(columns, row, strict=True)] for row in rows])
+        _table(names, [[_cell(name, value) for name, value in zip(names, row, strict=True)] for row in rows])
 
 
-def _table(columns: Sequence[str], cells: list[list[str]]) -> None:
-    widths = [max(len(row[i]) for row in [list(columns), *cells]) for i in range(len(columns))]
-    for row in [list(columns), *cells]:
+def _table(names: Sequence[str], cells: list[list[str]]) -> None:
+    """As a table where that fits, else each row as lines of a name and a value."""
+    widths = [max(len(row[i]) for row in [list(names), *cells]) for i in range(len(names))]
+    if cells and not _WHOLE & {*names} and sum(widths) + 2 * (len(widths) - 1) > columns():
+        width = max(map(len, names))
+        for number, row in enumerate(cells):
+            out(*[""] * (number > 0), *(f"{name:<{width}}  {text}" for name, text in zip(names, row, strict=True)))
+        return
+    for row in [list(names), *cells]:
         out("  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=True)).rstrip())
 
 

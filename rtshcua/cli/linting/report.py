@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from rtshcua import __version__
-from rtshcua.cli.findings import ended
+from rtshcua.cli.findings import ended, laid_out
 from rtshcua.cli.linting.gathered import Gathered
+from rtshcua.cli.width import columns
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.folding import folded
@@ -20,7 +21,7 @@ def written(form: str, told: Gathered, asked: Sequence[str], code: ExitCode, fai
     """The report in one of the forms, for a file or a machine, ending in a newline, unless it is empty."""
     here = str(Path.cwd())
     if form == "human":
-        return render(folded(told.found), told.sources)
+        return laid_out(render(folded(told.found), told.sources, columns()))
     if form == "github":
         from rtshcua.diagnostics.report.github import github
 

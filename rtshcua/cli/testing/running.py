@@ -27,7 +27,8 @@ ISSUED_AT_US: Final = 1_780_308_000_000_000
 
 class Results(NamedTuple):
     """What was run and flown, in the order of the files and their text; what is wrong with sources, each finding once;
-    the texts; the coverage, where it was asked for; and how many cases and scenarios there are that were not chosen.
+    the texts; the coverage, where it was asked for; and how many cases and scenarios there are that were not chosen,
+    of all there are the names.
     """
 
     ran: tuple[Ran, ...]
@@ -36,6 +37,7 @@ class Results(NamedTuple):
     sources: dict[str, Source]
     covered: tuple[Covered, ...] | None
     left_out: int
+    names: frozenset[str]
 
 
 class _Work(NamedTuple):
@@ -55,6 +57,7 @@ def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool, quiet: b
     ran: list[Ran] = []
     tally = Tally() if with_coverage else None
     left_out = 0
+    names: set[str] = set()
     scenarios: list[ScenarioFlight] = []
     tested: set[tuple[str, int]] = set()  # where policies are declared that some test is under
     for each in watched(work):
@@ -64,12 +67,14 @@ def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool, quiet: b
             found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
         cases = [case for case in made.cases if chosen.casefold() in case.name.casefold()]
         left_out += len(made.cases) - len(cases)
+        names |= {case.name for case in made.cases}
         tested |= {_declared(one) for one in made.policies}
         _count_policies(tally, made.policies, each.reading)
         ran += [_run(case, tally) for case in cases]
         of_file = _scenarios(each.reading, found, sources)
         named = [one for one in of_file if chosen.casefold() in one.scenario.name.casefold()]
         left_out += len(of_file) - len(named)
+        names |= {one.scenario.name for one in of_file}
         tested |= {_declared(one.policy) for one in of_file}
         _count_policies(tally, [one.policy for one in of_file], each.reading)
         scenarios += named
@@ -82,7 +87,7 @@ def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool, quiet: b
                 found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
         sources |= tally.sources
     covered = None if tally is None else tally.all()
-    return Results(tuple(ran), flown, tuple(found.values()), sources, covered, left_out)
+    return Results(tuple(ran), flown, tuple(found.values()), sources, covered, left_out, frozenset(names))
 
 
 def _suite(reading: Reading) -> Suite:

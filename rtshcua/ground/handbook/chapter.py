@@ -62,6 +62,7 @@ def chapter(
     return Chapter(
         name=policy.name,
         version=policy.version,
+        place=subject.place(declaration.name.span).rpartition(":")[0],
         note=subject.note(declaration),
         digest=digest_of(policy),
         files=tuple(

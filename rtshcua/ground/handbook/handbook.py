@@ -104,6 +104,15 @@ def handbook(
     )
 
 
+def called(chapters: Sequence[Chapter]) -> list[str]:
+    """The names of policies; of several with one name with the vehicle and the file that tell them apart."""
+    names = [each.name for each in chapters]
+    return [
+        each.name if names.count(each.name) == 1 else f"{each.name} for {each.vehicle[0].value} ({each.place})"
+        for each in chapters
+    ]
+
+
 def _scenarios(part: Part) -> Iterator[tuple[Policy, ScenarioTold]]:
     """The scenarios that were asked for, with the policy of the mission that each flies."""
     if not part.scenarios:
@@ -127,7 +136,7 @@ def _by_policy(tried: Tried) -> Mapping[Tested, list[Ran]]:
 
 
 def _title(chapters: Sequence[Chapter]) -> str:
-    names = listed([each.name for each in chapters])
+    names = listed(called(chapters))
     return f"Handbook of the {'policies' if len(chapters) > 1 else 'policy'} {names}"
 
 

@@ -260,6 +260,7 @@ class Chapter:
 
     name: str
     version: int
+    place: str  # the file that declares it
     note: str
     digest: str
     files: tuple[FileDigest, ...]

@@ -380,3 +380,16 @@ def test_a_log_that_becomes_a_link_before_it_is_copied_is_not_taken_in(
     assert archive("add", "flown", *ROOT) == ExitCode.INPUT
     assert "symbolic links are not followed here: `flown/a/log.jsonl`" in capsys.readouterr().err
     assert not list(Path("archive/logs").rglob("*.jsonl"))
+
+
+def test_a_table_that_is_too_wide_is_told_row_by_row(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [["a" * 30, "b" * 30, 1], ["c", "d", 2]]
+    monkeypatch.setenv("COLUMNS", "80")
+    told.tell(["one", "another", "third"], rows, told.Shape.TABLE)
+    assert capsys.readouterr().out.splitlines()[0].split() == ["one", "another", "third"]
+    monkeypatch.setenv("COLUMNS", "60")
+    told.tell(["first", "another", "third"], rows, told.Shape.TABLE)
+    lines = ["first    " + "a" * 30, "another  " + "b" * 30, "third    1", "", "first    c", "another  d", "third    2"]
+    assert capsys.readouterr().out.splitlines() == lines

@@ -220,3 +220,18 @@ def test_scenarios_of_the_files_that_were_asked_for_are_told(capsys: pytest.Capt
 def test_as_json_a_refusal_is_an_object(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["docs", "missing.rts", "--json"]) == ExitCode.INPUT
     assert json.loads(capsys.readouterr().out)["exit"] == "input"
+
+
+def test_policies_of_one_name_are_told_apart_by_vehicle_and_file(capsys: pytest.CaptureFixture[str]) -> None:
+    text = POLICY.read_text(encoding="utf-8")
+    for folder, digits in (("east", "20"), ("west", "25")):
+        Path(folder).mkdir()
+        changed = text.replace("<= 15 m", f"<= {digits} m")
+        assert changed != text
+        Path(folder, "own.rts").write_text(changed, encoding="utf-8")
+    assert main(["docs", "east", "west", "-o", "page.html", *AT]) == ExitCode.OK
+    said, page = capsys.readouterr().out, Path("page.html").read_text(encoding="utf-8")
+    for folder in ("east", "west"):
+        assert f"for quad-07 ({folder}/own.rts): version" in said
+        assert f'<dt>Declared in</dt><dd><span class="path">{folder}/own.rts</span>' in page
+        assert f'for quad-07</a>, in <span class="path">{folder}/own.rts</span>' in page

@@ -26,9 +26,8 @@ TOLD = Struct(">BqqqQ")
     ("apart", "keyed", "counts"), [(True, False, False), (True, True, True), (False, False, True), (False, True, True)]
 )
 def test_of_a_run_on_this_machine(monkeypatch: pytest.MonkeyPatch, apart: bool, keyed: bool, counts: bool) -> None:
-    monkeypatch.setattr(doctor, "program", lambda: Path("rtshcua-boundary") if apart else None)
     monkeypatch.setattr(doctor, "kernel_error_us", lambda: None)
-    assert doctor._time_of_day(None, 500_000, keyed=keyed) == TimeOfDay(None, counts, 500_000)
+    assert doctor._time_of_day(None, 500_000, keyed=keyed, apart=apart) == TimeOfDay(None, counts, 500_000)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +56,7 @@ def test_of_a_boundary_that_listens(
     made: Any = SimpleNamespace(link_name=b"name" if linked else None, call=call, close=close)
     monkeypatch.setattr(doctor, "ListeningBoundary", lambda path: made)
     monkeypatch.setattr(doctor, "kernel_error_us", lambda: 9)
-    assert doctor._time_of_day(SOCKET, None, keyed=False) == found
+    assert doctor._time_of_day(SOCKET, None, keyed=False, apart=True) == found
     assert asked == [bytes([TIME, True]), b"closed"]
 
 
@@ -67,7 +66,7 @@ def test_of_one_that_does_not_answer_is_said_elsewhere(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(doctor, "ListeningBoundary", nobody)
     monkeypatch.setattr(doctor, "kernel_error_us", lambda: 9)
-    assert doctor._time_of_day(SOCKET, None, keyed=False) == TimeOfDay(9, listens=True)
+    assert doctor._time_of_day(SOCKET, None, keyed=False, apart=True) == TimeOfDay(9, listens=True)
 
 
 def test_a_boundary_that_listens_is_told_in_its_own_command_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,6 +22,7 @@ from rtshcua.cli.subject import Subject, after, prepared, unpacked
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.wire.keys import Duty
 from rtshcua.wire.receipt import Receipt, decode
 from rtshcua.wire.trust import open_root
 
@@ -80,6 +81,27 @@ def presented(of: Loaded, document: Path) -> Receipt:
     receipt = decode(of.boundary.present(document.read_bytes(), now(), 0))
     assert isinstance(receipt, Receipt)
     return receipt
+
+
+def test_a_replacement_by_a_key_of_another_root_is_warned_of(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = data_folder()
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(here / "other"))
+    assert main(["keys", "init"]) == ExitCode.OK
+    other = KeyStore(data_folder())
+    kid = other.signing_key(Duty.MISSION, whose="operator").kid
+    path = other.paths(open_root(other.root(), pinned=other.pin(), now_us=0))[kid]
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(own))
+    capsys.readouterr()
+    words = ["compile", "shorter.rts", "--replaces", "low.bundle", "--from", "3", *FLIGHT, "--mission-key", str(path)]
+    assert main([*words, "--deny-warnings"]) == ExitCode.UNTRUSTED
+    assert not (here / "shorter.replacement").exists()
+    capsys.readouterr()
+    assert main([*words, "--json"]) == ExitCode.OK
+    said = capsys.readouterr()
+    assert f"names no mission key of this name: {kid.hex()}" in json.loads(said.out)["warnings"][0]
+    assert said.err.startswith("warning: the trust root of this key store")
 
 
 def test_from_the_command_line_to_the_boundary(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

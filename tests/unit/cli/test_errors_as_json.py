@@ -66,6 +66,7 @@ def test_a_missing_file_and_wrong_usage_have_one_form_in_all_commands(
     capsys.readouterr()
     cases = [(f"{name} --none-such", ExitCode.USAGE)]
     cases += [] if MISSING[name] is None else [(f"{name} {MISSING[name]}", ExitCode.INPUT)]
+    members: list[set[str]] = []
     for words, code in cases:
         assert app.main([*words.split(), "--json"]) == code, words
         said = capsys.readouterr()
@@ -75,6 +76,8 @@ def test_a_missing_file_and_wrong_usage_have_one_form_in_all_commands(
         assert found["error"]["slug"] == code.slug
         assert found["error"]["help"] != ""
         assert said.err.startswith((f"error[{code.slug}]: ", "error[E0108]: ")) or not said.err
+        members.append(set(found) - {"error", "exit_code"})
+    assert all("diagnostics" in each for each in members) or not any(members), "its row says whether it `reports`"
 
 
 def test_every_command_is_tried() -> None:

@@ -50,7 +50,19 @@ def test_without_a_folder_it_is_made_where_one_is(
     Path(".git").mkdir()
     assert app.main(["init", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
+    renamed = said.pop("renamed")
     assert said == {"name": "site_2_farms", "folder": ".", "files": [*FILES], "kept": []}
+    assert "`2 farms`" in renamed
+    assert "`site_2_farms`" in renamed
+
+
+def test_a_folder_whose_name_cannot_be_taken_is_said_with_the_way_to_another(tmp_path: Path, capsys: Said) -> None:
+    assert app.main(["init", str(tmp_path / "a b" / "ü")]) == 0
+    said = capsys.readouterr().out
+    assert "the folder's name `ü` cannot name a policy, so it is called `site`; `--name` chooses another" in said
+    for words in (["--name", "own"], []):  # nothing to say where it was chosen, or is the folder's
+        assert app.main(["init", str(tmp_path / "x" / ("ü" if words else "fields")), *words]) == 0
+        assert "--name" not in capsys.readouterr().out
 
 
 def test_a_long_name_is_cut(tmp_path: Path) -> None:

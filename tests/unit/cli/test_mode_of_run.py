@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from reference.world import loaded
-from rtshcua.adapters.boundary_process import UNBUILT
+from rtshcua.adapters.boundary_process import UNBUILT, Measure
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
-from rtshcua.cli import doctor, launch, run
+from rtshcua.cli import connection, doctor, launch
 from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.library import root as library
@@ -37,8 +37,8 @@ BUILT = Path("/usr/lib/rtshcua-boundary")
 def test_the_mode_that_counts(
     asked: Mode | None, own: bool, named: bool, built: bool, found: tuple[Mode, bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run, "program", lambda: BUILT if built else None)
-    assert run._mode(asked, own=own, named=named) == found
+    monkeypatch.setattr(connection, "program", lambda: BUILT if built else None)
+    assert connection.mode_of(asked, own=own, named=named) == found
 
 
 @pytest.mark.parametrize("unbuilt", [True, False])
@@ -51,8 +51,11 @@ def test_a_run_says_that_there_is_no_program(tmp_path: Path, unbuilt: bool) -> N
 
 @pytest.mark.parametrize("built", [True, False])
 def test_the_doctor_says_whether_there_is_one(built: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "program", lambda: BUILT if built else None)
-    finding, *_ = doctor._boundary()
+    for module in (doctor, connection):
+        monkeypatch.setattr(module, "program", lambda: BUILT if built else None)
+    monkeypatch.setattr(doctor, "measures_here", lambda user: ~Measure(0))
+    mode, _ = connection.mode_of(None, own=False, named=False)
+    finding, *_ = doctor._boundary(mode)
     assert finding.verdict is (MissionVerdict.OK if built else MissionVerdict.WARN)
     assert (finding.found == UNBUILT) != built
 

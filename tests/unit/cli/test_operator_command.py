@@ -281,3 +281,17 @@ def test_a_signal_leaves_the_flight_as_quit_does(seat: Seat, place: Path, number
     assert seat.sits(place) is ExitCode.OK
     flight.end()
     assert seat.events() == ["following", "ready", "left"]
+
+
+def test_a_word_that_is_no_command_is_said_with_the_nearest(seat: Seat, place: Path) -> None:
+    def turn(link: socket.socket) -> None:
+        seat.type("recal\n")
+        seat.until("unknown")
+        seat.type("q\n")
+        link.recv(1)
+
+    flight = Flight(place, turn)
+    assert seat.sits(place) is ExitCode.OK
+    flight.end()
+    assert flight.documents == []
+    assert {"event": "unknown", "text": "`recal` is no command; did you mean `recall`?"} in seat.told()

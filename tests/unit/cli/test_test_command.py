@@ -85,7 +85,10 @@ def test_only_those_that_are_named(here: Path, capsys: pytest.CaptureFixture[str
     assert [each["name"] for each in found["tests"]] == ["coming home"]
     assert found["summary"]["left_out"] == 3
     code, out, _ = run(capsys, "-k", "no such")
-    assert (code, out) == (ExitCode.TESTS, "no test was run: none of 4 has that in its name\n")
+    assert (code, out) == (ExitCode.TESTS, "no test was run: none of 4 has `no such` in its name\n")
+    for near in ("comming home", "comming"):
+        _, out, _ = run(capsys, "-k", near)
+        assert out == f"no test was run: none of 4 has `{near}` in its name; the nearest is `coming home`\n"
 
 
 def test_no_test_is_no_success(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -270,3 +273,19 @@ def test_a_reader_that_left(here: Path) -> None:
     with os.fdopen(write, "wb") as closed:
         ended = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False)
     assert (ended.returncode, ended.stderr) == (ExitCode.FULL, b"")
+
+
+def test_a_word_that_is_no_file_gets_the_nearest_file_and_the_way_to_choose_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests/charge.rts").write_text("")
+    assert app.main(["test", "charg"]) == ExitCode.INPUT
+    said = capsys.readouterr().err
+    assert "no such file or directory: `charg`" in said
+    assert "did you mean `tests/charge.rts`? `-k charg` chooses tests by name" in said
+    assert app.main(["test", "hovering"]) == ExitCode.INPUT
+    said = capsys.readouterr().err
+    assert "did you mean" not in said
+    assert "`-k hovering` chooses tests by name" in said

@@ -145,3 +145,11 @@ def test_a_further_source_that_is_none_is_the_fault_of_the_configuration(
     assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
     assert found[0][1].startswith(f"rtshcua.toml: `{further}` in `with`")
     assert said in found[0][1]
+
+
+def test_a_report_for_a_person_is_as_wide_as_what_is_printed(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    (here / "long.rts").write_text("skill look() { require wind.sped < 5 m/s and batery > 20 % and altitude < 20 m }")
+    assert main(["lint", "long.rts", "--output", "report.txt"]) == ExitCode.DIAGNOSTICS
+    lines = (here / "report.txt").read_text(encoding="utf-8").splitlines()
+    assert max(len(line) for line in lines if "|" not in line and "-->" not in line) <= 60

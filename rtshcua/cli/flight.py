@@ -39,6 +39,7 @@ from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Append, Ending, Event, Interrupted, Presented
+from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.runtime import Runtime
 
 if TYPE_CHECKING:
@@ -145,15 +146,17 @@ class Flight:
             self._sink.settle()
         witnesses.begin(log.path, lambda: self._sink.synced)
         self._incidents = incidents
+        slack = max(1, round(speed / 5))
         self._preparations = Preparations(
-            loaded, vehicle.driver, clock, debts.left, self._record, self._note, debts.keep, max(1, round(speed / 5)),
+            loaded, vehicle.driver, clock, debts.left, self._record, self._note, debts.keep, slack,
             debts.trouble,
         )  # fmt: skip
         self._preparing, self._told = True, ""
         self._left = ""  # that the operator stopped watching what may be flying
         if debts.trouble is not None:
             self._feed.post(Note(debts.trouble))
-        self._runtime = Runtime(loaded, self._recorder, resumed=resumed)
+        limits = Limits(stalled_us=Limits().stalled_us * slack)
+        self._runtime = Runtime(loaded, self._recorder, limits=limits, resumed=resumed)
         vehicle.driver.resumes = resumed
         self._feed.post(self._plan())
         self._watch = Watching(

@@ -20,6 +20,7 @@ from rtshcua.cli.shown import utc
 from rtshcua.cli.subject import Subject, after, unpacked
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.gaps import STALLED
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
@@ -27,6 +28,7 @@ from rtshcua.ground.why.link import of_contingency, trace_link
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.outcome import Reason
+from rtshcua.onboard.runtime.link import STOOD_STILL
 from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import STEP
 
@@ -34,12 +36,16 @@ from rtshcua.wire.request import STEP
 _TURNS = frozenset({
     "violated", "failed", "taken-over", "interrupted", "recall", "cancellation", "gap", "link-lost", "long-silence",
     "crashed", "stranded", "not-landed", "resumed", "already-airborne", "left", "refused", "undecided", "stood-down",
-    "boundary-lost",
+    "boundary-lost", STOOD_STILL,
 })  # fmt: skip
 #: of these, what only says how it went on after the cause
 _FOLLOWS = frozenset({"stood-down", "not-landed", "stranded", "left", "resumed", "already-airborne"})
 #: what is over when something else is recorded
-_OVER = {"link-back": ("link-lost", "long-silence"), "gap-over": ("gap",)}
+_OVER = {"link-back": ("link-lost", "long-silence"), "gap-over": ("gap",), "fresh": (STOOD_STILL,)}
+#: what says that the computer stood still
+_STALLS = (STOOD_STILL, STALLED)
+#: how a condition and a decision say that they failed for want of what is known
+_UNKNOWN, _FOR_UNKNOWN = ": unknown for longer than its grace", ("state/unknown", "safety/unknown")
 _NO_SLACK = Reason.NO_SLACK.value
 _MOST = 20  # what is told of how it ended, in records
 
@@ -63,6 +69,7 @@ class _Log:
         self.aloft = False  # something was sent before the chosen record that may have lifted it off
         self.ended: list[_Told] = []
         self.answers: list[tuple[int, _Told]] = []  # approvals, by their step
+        self.stalls: list[_Told] = []  # when the computer stood still
         self.cause: _Told | None = None  # why it ended early, if it did
         self._caused_by = ""  # the event of that
         self._falls = False  # a link flies: what comes now is no cause any more
@@ -104,6 +111,8 @@ class _Log:
         self._names.follow(record)
         self._choose(record)
         self._find_cause(record)
+        if isinstance(record, Effect) and record.event in _STALLS:
+            self.stalls.append(self._tell(record))
         if isinstance(record, Seal):
             return None
         if isinstance(record, Effect):
@@ -126,8 +135,10 @@ class _Log:
 
     def _find_cause(self, record: Decision | Effect | Close | Recover | Seal) -> None:
         """The last thing that turned the mission away from its steps, before a link flew: a step that is admitted
-        later says that it went on all the same.
+        later says that it went on all the same. What is not known because the computer stood still, that caused.
         """
+        if self._caused_by == STOOD_STILL and _for_unknown(record):
+            return
         if isinstance(record, Decision):
             if record.kind != STEP:
                 self._falls = True
@@ -164,6 +175,13 @@ class _Log:
         self.what = self._names.tell(record)
 
 
+def _for_unknown(record: Decision | Effect | Close | Recover | Seal) -> bool:
+    """Whether it says that something failed for want of what is known."""
+    if isinstance(record, Decision):
+        return record.kind == STEP and record.reason in _FOR_UNKNOWN
+    return isinstance(record, Effect) and record.event == "violated" and _UNKNOWN in record.detail
+
+
 def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | ExitCode:
     """Adds the record asked for to the page, and what ended the flight."""
     log = _Log(path, number)
@@ -189,11 +207,13 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
         return shown
     answers = [told for step, told in log.answers if isinstance(chosen, Decision) and step == chosen.step]
     _list(page, "What was answered about this step", answers, log.start_us)
+    _list(page, "When the computer stood still: nothing was read, judged or sent", log.stalls, log.start_us)
     _list(page, "How it ended: what turned it homeward, and what was then decided", log.ended[-_MOST:], log.start_us)
     return shown | {
         "record": chosen.seq,
         "cause": None if cause is None else cause._asdict(),
         "answers": [told._asdict() for told in answers],
+        "stalls": [told._asdict() for told in log.stalls],
         "ended": [told._asdict() for told in log.ended],
     }
 

@@ -35,6 +35,7 @@ from rtshcua.model.step_number import step_words
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.journal import Detail, said
 from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.link import STOOD_STILL
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.onboard.runtime.supervisor import DURATION, Supervisor
 from rtshcua.virtual.excuses import Failure
@@ -315,9 +316,10 @@ class Conduct:
             if runs and step is not None and supervisor is None:
                 supervisor = Supervisor(self._invocations[step.step], self._policy, step.since_us + start_us)
                 found, stood_us, away_us = None, None, 0
-            silent = any(since_us <= at_us < until_us for since_us, until_us in silences)
-            if runs and silent and stood_us is None:
-                stood_us = at_us
+            began_us = next((since_us for since_us, until_us in silences if since_us <= at_us < until_us), None)
+            silent = began_us is not None
+            if runs and began_us is not None and stood_us is None and step is not None:
+                stood_us = max(began_us, step.since_us)  # a stall is told once it is over
             if runs and not silent and stood_us is not None and supervisor is not None:
                 supervisor.grace.stood(now.monotonic_us - stood_us - start_us)
                 away_us += at_us - stood_us
@@ -353,8 +355,8 @@ class Conduct:
         return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in silences)
 
     def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int, int]]:
-        """From when a link was lost until state was judged again, and for how long after that what was not reported yet
-        may still be waited for.
+        """From when a link was lost, or the computer stood still, until state was judged again, and for how long after
+        that what was not reported yet may still be waited for.
         """
         since_us: int | None = None
         back_us = 0
@@ -365,6 +367,11 @@ class Conduct:
                 since_us = self._at(record)
             elif record["event"] == "link-back":
                 back_us = self._at(record)
+            elif record["event"] == STOOD_STILL:
+                back_us = self._at(record)
+                stood_us = int(record["detail"].split()[1]) * 1_000
+                began_us = back_us - stood_us + self._limits.stalled_us
+                since_us = began_us if since_us is None else since_us
             elif record["event"] in ("fresh", "not-fresh") and since_us is not None:
                 yield since_us, self._at(record), max(0, back_us + self._limits.fresh_us - self._at(record))
                 since_us = None
@@ -439,7 +446,7 @@ class Conduct:
     def _hasty(self, record: Record, records: Sequence[Record]) -> Iterator[Failure]:
         """Fresh state is waited for as long as it may still come."""
         before = [each for each in records if each["type"] == "effect" and each["at_us"] <= record["at_us"]]
-        backs = [each for each in before if each["event"] == "link-back"]
+        backs = [each for each in before if each["event"] in ("link-back", STOOD_STILL)]
         ends = [each for each in before if each["event"] in ("fresh", "not-fresh") and each is not record]
         in_this = [each for each in backs if not ends or each["at_us"] > ends[-1]["at_us"]]
         if len(in_this) == 1 and record["at_us"] - in_this[0]["at_us"] < self._limits.fresh_us:

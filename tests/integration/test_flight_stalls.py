@@ -86,6 +86,22 @@ def test_a_vehicle_that_lands_while_nobody_reads_has_landed(for_s: int, height: 
     assert flown.ending is Ending.COMPLETED
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("flavour", "at", "for_us"), [("px4", 464, 14_297_001), ("ardupilot", 427, 20_466_187)])
+def test_what_was_lost_while_nobody_read_is_waited_for_and_the_flight_goes_on(
+    flavour: str, at: int, for_us: int
+) -> None:
+    """The socket keeps what was said first: the newest of it is old when the computer goes on."""
+    flown = StallingFlight(bundle(), flavour, {at: for_us}).fly()
+    (stood,) = flown.effects("stood-still")
+    (fresh,) = flown.effects("fresh")
+    told_us = int(stood["detail"].removeprefix("for ").removesuffix(" ms")) * 1_000
+    assert for_us - 1_000 <= told_us <= for_us + 200_000, "from one step of the loop to the next"
+    assert fresh["at_us"] > stood["at_us"], "else nothing is shown here"
+    assert (flown.ending, flown.effects("violated")) == (Ending.COMPLETED, [])
+    assert flown.audit().report.failure is None
+
+
 def test_a_gap_is_recorded_before_anything_else_and_sealed_at_once() -> None:
     flight = StallingFlight(bundle(), "px4", {600: 30 * case.S})
     flown = flight.fly()

@@ -17,7 +17,6 @@ from rtshcua.adapters.vehicle.link import (
     LinkWatch,
     VehicleLink,
     is_radio,
-    stood_still,
     two_speak,
 )
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendings
@@ -58,8 +57,6 @@ from rtshcua.onboard.ports import Command, Event, Said
 HEARTBEAT_US = 1_000_000
 #: who an autopilot is that was heard is asked so often
 WHO_US = 200_000
-#: us: a computer that stood still in the air for longer is told
-TOLD_US = 2_000_000
 #: so long what no waiting changes must stand until it is told: somebody may be about to set a parameter right
 UNFIT_US = 5_000_000
 #: why a vehicle that signs answers nothing to whoever does not
@@ -649,8 +646,6 @@ class Driver:
             watch.unasked()
         changed = watch.look(now_us)
         self.seen.up_us, self.seen.stood_us = watch.up_us, watch.stood_us
-        if watch.stood_for_us >= TOLD_US and self.seen.airborne:
-            events.append(ports.Noted(now_us, stood_still(watch.stood_for_us)))
         if watch.mute != self._was_mute:
             self._was_mute = watch.mute
             events.append(ports.Answering(now_us, answers=not self._was_mute))

@@ -38,11 +38,6 @@ def two_speak(system: int, who: str) -> str:
     return f"two speak as {system}/{AUTOPILOT}: {who} besides the vehicle; give each component ids of its own"
 
 
-def stood_still(for_us: int) -> str:
-    """That the computer stood still for so long, for a person."""
-    return f"the computer stood still for {for_us // 1_000_000} s: what was known of the vehicle is of before"
-
-
 class Heard(NamedTuple):
     """What a datagram brought: events, frames that answer it, and its good frames, for the raw log."""
 
@@ -214,8 +209,6 @@ class LinkWatch:
         self.down: str | None = None
         #: when the computer last went on that had stood still
         self.stood_us: int | None = None
-        #: and for how long it had, where it went on just now
-        self.stood_for_us = 0
 
     def asked(self, now_us: int) -> None:
         """Something was asked that the autopilot answers."""
@@ -235,9 +228,9 @@ class LinkWatch:
         heard_us, seen_us, was, silent_us = self.heard_us, self._seen_us, self.down, self._silent_us
         if heard_us is None:
             return False
-        self._seen_us, self.stood_for_us = now_us, 0
+        self._seen_us = now_us
         if seen_us is not None and now_us - seen_us > self._stood_us:
-            self.stood_us, self.stood_for_us = now_us, now_us - seen_us
+            self.stood_us = now_us
         if seen_us is not None and was is None:
             self.up_us += min(now_us - seen_us, silent_us)  # we may have been held up
         down, asked_us = None, self._unanswered_us

@@ -6,7 +6,8 @@ counts: `skip` goes on with the next step, `hold` waits like a deferral, `replan
 place, `abort` flies the step's fallback and, when that is used up, the contingency. On the ground nothing is sent, and
 the run ends.
 
-While the link is down, and until fresh state came or its time is over, there is no turn at all (`link`).
+While the link is down, or after this computer stood still, and until fresh state came or its time is over, there is no
+turn at all (`link`).
 """
 
 from typing import Final
@@ -26,7 +27,7 @@ from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.link import LinkState, LinkSupervision, Silence
+from rtshcua.onboard.runtime.link import STOOD_STILL, LinkState, LinkSupervision, Silence
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
 from rtshcua.onboard.runtime.view import Stage, View
@@ -263,7 +264,11 @@ class MissionController:
 
     def _violated(self, now: Now, what: Detail) -> bool:
         """Something that must hold for the current step does not."""
-        self.dispatcher.end(now, "violated", what)
+        current = self.queue.current
+        if self.dispatcher.active is not None:
+            self.dispatcher.end(now, "violated", what)
+        elif current is not None:  # it waits for its step, and nothing flies that this would end
+            self._journal.effect(now, "violated", Ref(STEP, current.step, -1), detail=what)
         self.fall_back(FALLBACK_LINK)
         return True
 
@@ -361,6 +366,13 @@ class MissionController:
         if self.link.lost(now.monotonic_us, event.heard_us or now.monotonic_us, takes_off=takes_off):
             self._journal.effect(now, "link-lost", detail=event.why)
             self.retry.news()
+
+    def stalled(self, now: Now, before_us: int) -> None:
+        """This computer stood still since `before_us`: what is known of the vehicle is of before."""
+        takes_off = self.dispatcher.active is not None and self.vehicle.airborne is not True
+        self.link.stalled(before_us, now.monotonic_us, takes_off=takes_off)
+        self._journal.effect(now, STOOD_STILL, detail=f"for {(now.monotonic_us - before_us) // 1_000} ms")
+        self.retry.news()
 
     def link_back(self, now: Now) -> None:
         """The vehicle is heard again."""

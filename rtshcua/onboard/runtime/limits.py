@@ -2,9 +2,9 @@
 
 The bounds are computed from the policy, and held against every path of small runs by a search (docs/model-checking.md).
 Each wait of the runtime has a limit of its own. It is noticed at the next step of the loop, at most `period_us` later,
-and when the link was lost only on fresh state, at most `flapping_us` after it was back. Time in which the vehicle is
-not heard, or answers nothing, is not counted here: that lasts no longer than the vehicle can fly and `silent_us`, then
-the run stands down.
+and when the link was lost, or this computer stood still, only on fresh state, at most `flapping_us` after that was
+over. Time in which the vehicle is not heard, or answers nothing, or in which this computer stands still, is not counted
+here: a silence lasts no longer than the vehicle can fly and `silent_us`, then the run stands down.
 """
 
 from rtshcua.model.flat.contract import Contract, Link
@@ -22,6 +22,9 @@ class Limits(Frozen):
     lost, so that nothing is judged after one message and no more. A link that comes and goes is waited for
     `flapping_us` in all, from when it was back first.
 
+    Where two steps of the runtime are more than `stalled_us` apart, this computer stood still, and fresh state is
+    waited for in the same way.
+
     The last link of the contingency has nothing after it: it is tried `tries` times, `retry_us` apart. `again_us`
     bounds how long a deferred step is left without asking again when nothing was received.
     """
@@ -30,6 +33,7 @@ class Limits(Frozen):
     silent_us: int = 30_000_000
     fresh_us: int = 1_500_000
     flapping_us: int = 5_000_000
+    stalled_us: int = 1_000_000
     retry_us: int = 2_000_000
     tries: int = 5
     again_us: int = 100_000

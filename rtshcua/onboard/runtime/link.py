@@ -9,24 +9,30 @@ What is known of a vehicle that was silent is old. What was current when the lin
 back, has to be reported again, measured after the loss, before anything is decided on it; for a bounded time, for it
 may never be. Signals that were stale or missing before are not waited for: their absence is no news.
 
+A computer that stood still is a silence of our own: what was known when it goes on is as old, and what it reads first
+was said meanwhile. Fresh state is awaited in the same way.
+
 A vehicle that is heard, but answers nothing, is judged as ever: what is sent may arrive yet. It is waited for no longer
 than one that is silent.
 """
 
 from enum import Enum, auto
+from typing import Final
 
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.ports import Frozen
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
+#: the effect that says that this computer stood still, and for how long: nothing was read, judged or sent meanwhile
+STOOD_STILL: Final = "stood-still"
 #: what stands for the vehicle's word on whether it flies, among the names of signals
 AIR_STATE = "whether it is in the air"
 
 
 class Silence(Frozen):
-    """A silence that is over: how long the vehicle was not heard, how long fresh state was then waited for, both in us,
-    and what was not reported again in time.
+    """A silence that is over, or a stall of this computer: how long the vehicle was not heard (0 if there was only a
+    stall), how long fresh state was then waited for, both in us, and what was not reported again in time.
     """
 
     lasted_us: int
@@ -62,6 +68,7 @@ class LinkSupervision:
         self._lost_us = 0  # the link was lost last
         self._first_back_us: int | None = None  # the link was back first in this silence,
         self._back_us = 0  # and last
+        self._resumed_us = 0  # this computer last went on that had stood still (0: it is not known to have)
         self._until_us = 0  # fresh state is awaited until then, at the latest
         self._standing_us: int | None = None  # since then nothing is judged
         self._awaited: frozenset[int] = frozenset()
@@ -125,11 +132,32 @@ class LinkSupervision:
         """
         if not self.down:
             return None
-        self.state = LinkState.AWAITING
         self._back_us = now_us
+        self._await(now_us)
+        return now_us - self._lost_us
+
+    def _await(self, now_us: int) -> None:
+        self.state = LinkState.AWAITING
         self._first_back_us = now_us if self._first_back_us is None else self._first_back_us
         self._until_us = min(now_us + self._limits.fresh_us, self._first_back_us + self._limits.flapping_us)
-        return now_us - self._lost_us
+
+    def stalled(self, before_us: int, now_us: int, *, takes_off: bool) -> None:
+        """This computer stood still from `before_us` to `now_us`: nothing that was known is current because of that.
+
+        `takes_off` as for `lost`. What the vehicle said meanwhile may be read at once; where that is too old, fresh
+        state is awaited as after a silence. The time of the stall is none in which that was waited for, nor, but for
+        `stalled_us` of it, one in which the vehicle had a link.
+        """
+        self._awaited |= self._monitor.current(before_us)
+        self._awaits_air = self._awaits_air or takes_off
+        self._resumed_us = now_us
+        since_us = before_us + self._limits.stalled_us
+        self._standing_us = since_us if self._standing_us is None else self._standing_us
+        if self._first_back_us is not None:
+            self._first_back_us += now_us - before_us
+        if not self.down:
+            self._await(now_us)
+        self._count_away(since_us)
 
     def air_reported(self) -> None:
         """The vehicle said whether it is in the air."""
@@ -162,9 +190,10 @@ class LinkSupervision:
         self._standing_us = None
         self._count_away(now_us)
         silence = None
-        if self._since_us is not None:
-            lasted_us = self._back_us - self._since_us
-            silence = Silence(lasted_us, now_us - self._back_us, self._missing(now_us))
+        if self._first_back_us is not None:
+            lasted_us = 0 if self._since_us is None else self._back_us - self._since_us
+            awaited_us = now_us - max(self._back_us, self._resumed_us)
+            silence = Silence(lasted_us, awaited_us, self._missing(now_us))
             self._since_us = self._waits_us = self._first_back_us = None
         if now_us >= self._until_us or not (self._awaits_air or self._pending):
             self._forget()
@@ -174,13 +203,13 @@ class LinkSupervision:
         """All that was awaited has come, or is not awaited any more."""
         self.state = LinkState.UP
         self._until_us = 0
-        self._lost_us = self._back_us = 0
+        self._lost_us = self._back_us = self._resumed_us = 0
         self._awaited = frozenset()
         self._awaits_air = False
 
     @property
     def _pending(self) -> frozenset[int]:
-        return self._monitor.unreported(self._awaited, self._lost_us)
+        return self._monitor.unreported(self._awaited, max(self._lost_us, self._resumed_us))
 
     def _missing(self, now_us: int) -> tuple[str, ...]:
         """The names of what is not known any more, and was awaited in vain so far."""

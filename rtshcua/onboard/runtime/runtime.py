@@ -49,8 +49,11 @@ class Runtime:
     ) -> None:
         recorder.lost = lambda: loaded.boundary.lost
         self._journal = Journal(recorder)
-        self._controller = MissionController(loaded, self._journal, limits or Limits(), resumed=resumed)
+        limits = limits or Limits()
+        self._controller = MissionController(loaded, self._journal, limits, resumed=resumed)
         self._handler = EventHandler(self._controller, self._journal, loaded.boundary)
+        self._stalled_us = limits.stalled_us
+        self._stepped_us: int | None = None  # when the last step was
 
     @property
     def ending(self) -> Ending | None:
@@ -72,6 +75,9 @@ class Runtime:
         that it may be sent before the records are made. `actions` has it once more, in its place.
         """
         controller, monitor = self._controller, self._controller.monitor
+        before_us, self._stepped_us = self._stepped_us, now.monotonic_us
+        if before_us is not None and now.monotonic_us - before_us > self._stalled_us and controller.stage is not _ENDED:
+            controller.stalled(now, before_us)
         for event in last_words_first(events):
             if isinstance(event, Readings) and controller.stage is _RUNNING and monitor.hides(event):
                 controller.turn(now)  # no state goes by unwatched, however many came at once

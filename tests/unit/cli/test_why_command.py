@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from reference.flat_case import POSITION_X, S
 from reference.forgery import flight
-from reference.world import Run
+from reference.world import FakeVehicle, Run
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.onboard.ports import Failed
+from rtshcua.onboard.ports import Failed, Interrupted
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 STANDARD = str(CHECKOUT / "missions" / "standard.rts")
@@ -236,3 +237,56 @@ def test_a_takeoff_that_was_late_and_flew_is_no_cause(capsys: pytest.CaptureFixt
     log = tmp_path / "log.jsonl"
     log.write_bytes(b"".join(late_until(2)))
     assert shown(capsys, str(log))["cause"] is None
+
+
+def logged(run: Run) -> bytes:
+    return b"".join([*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)])
+
+
+def stalled(run: Run, slot: int | None) -> bytes:
+    """The log of a run that stood still for 14 s in its third step; then `slot` is not known any more."""
+    run.until_flies("inspect_area")
+    if slot is not None:
+        run.vehicle.values[slot] = None
+    run.clock.advance(14 * S)
+    run.step()
+    return logged(run.until_over())
+
+
+def test_what_a_stall_left_unknown_the_stall_caused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(stalled(Run(vehicle=FakeVehicle(deaf={"inspect_area"})), POSITION_X))
+    found = shown(capsys, str(log))
+    cause, (stall,) = found["cause"], found["stalls"]  # type: ignore[misc]
+    assert cause == stall
+    assert "stood-still" in stall["what"]
+    assert "for 14000 ms" in stall["what"]
+    assert "violated" in " ".join(each["what"] for each in found["ended"])  # type: ignore[attr-defined]
+    page = why(capsys, str(log))[1]
+    assert "When the computer stood still" in page
+
+
+def test_a_stall_after_which_it_flew_on_is_told_and_no_cause(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(stalled(Run(), None))
+    found = shown(capsys, str(log))
+    assert found["cause"] is None
+    assert len(found["stalls"]) == 1  # type: ignore[arg-type]
+
+
+def test_what_ends_a_flight_long_after_a_stall_is_its_own_cause(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    run = Run(vehicle=FakeVehicle(deaf={"inspect_area"})).until_flies("inspect_area")
+    run.clock.advance(14 * S)
+    run.step()
+    for _ in range(20):
+        run.tick()
+    run.tick(Interrupted(0))
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(logged(run.until_over()))
+    cause = shown(capsys, str(log))["cause"]
+    assert isinstance(cause, dict)
+    assert "interrupted" in cause["what"]

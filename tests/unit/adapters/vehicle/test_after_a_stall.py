@@ -8,7 +8,7 @@ import pytest
 
 from rtshcua.model.faults import Mode, PilotMode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Noted, Succeeded, TakenOver
+from rtshcua.onboard.ports import Succeeded, TakenOver
 from virtual.copying import copied
 from virtual.flyer import Flyer, climbed
 from virtual.sampling import each_once
@@ -24,14 +24,6 @@ def in_a_leg(flavour: str) -> Flyer:
     one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
     return one
-
-
-@pytest.mark.parametrize(("for_s", "told"), [(1, []), (6, [6])])
-def test_a_stall_in_the_air_is_told(for_s: int, told: list[int]) -> None:
-    one = copied(in_a_leg("px4"))
-    one.vehicle.stand_still(for_s * S)
-    texts = [event.text for event in one.wait(1) if isinstance(event, Noted)]
-    assert texts == [f"the computer stood still for {s} s: what was known of the vehicle is of before" for s in told]
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -75,7 +75,7 @@ class Client:
     """Speaks to a server that it starts."""
 
     def __init__(self, folder: str) -> None:
-        command = [sys.executable, "-P", "-m", "rtshcua.cli.app", "lsp"]
+        command = [sys.executable, "-P", "-m", "rtshcua", "lsp"]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=folder)
         self._told: queue.SimpleQueue[tuple[float, dict[str, Any]]] = queue.SimpleQueue()
         self._number = 0

@@ -21,7 +21,7 @@ VEHICLES = 10
 SPEED = 1
 LATE_US = 1_200_000  # between two heartbeats; they are due every second
 ROOT = Path(__file__).resolve().parents[1]
-RTSHCUA = [sys.executable, "-m", "rtshcua.cli.app"]
+RTSHCUA = [sys.executable, "-m", "rtshcua"]
 _SYSTEM, _COMPONENT = 5, 6  # bytes of a frame's header
 
 

@@ -137,7 +137,7 @@ def seconds(words: list[str], folder: Path, environment: dict[str, str]) -> Time
 
 def main() -> int:
     """Measures, prints one line a command, and says whether the limits held."""
-    ours = [sys.executable, "-m", "rtshcua.cli.app"]
+    ours = [sys.executable, "-m", "rtshcua"]
     with TemporaryDirectory(prefix="rtshcua-lint-") as made:
         place = Path(made)
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}

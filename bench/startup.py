@@ -32,7 +32,7 @@ def milliseconds(command: list[str]) -> float:
 def main() -> int:
     """Measures, prints one line a command, and says whether the limits held."""
     script = Path(sys.executable).with_name("rtshcua")
-    ours = [str(script)] if script.exists() else [sys.executable, "-m", "rtshcua.cli.app"]
+    ours = [str(script)] if script.exists() else [sys.executable, "-m", "rtshcua"]
     bare, imports = [sys.executable, "-c", "pass"], [sys.executable, "-c", NEEDED]
     asked = [bare, imports, *([*ours, *words] for words in COMMANDS)]
     [milliseconds(command) for command in asked]  # warm: byte code is written, files are in memory

@@ -96,7 +96,7 @@ def agent_bundle(
 def plugin(words: list[str], socket: str, policy: str, vehicle: str) -> dict[str, bytes]:
     """Every file of a plug-in whose server is started with these words, by its path in it."""
     script = Path(sys.executable).parent / NAME
-    command = [str(script)] if script.is_file() else [sys.executable, "-P", "-m", "rtshcua.cli.app"]
+    command = [str(script)] if script.is_file() else [sys.executable, "-P", "-m", "rtshcua"]
     server: dict[str, object] = {"command": command[0], "args": [*command[1:], *words]}
     if any(map(os.environ.get, _CHOOSING)):
         server["env"] = {_DATA: _whole(data_folder())}

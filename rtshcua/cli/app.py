@@ -196,9 +196,3 @@ def overview(*, bold: bool) -> str:
 def _wants_colour() -> bool:
     terminal = sys.stdout is not None and sys.stdout.isatty()
     return terminal and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
-
-
-if __name__ == "__main__":
-    from rtshcua.cli.entry_point import main as run
-
-    sys.exit(run())

@@ -7,7 +7,6 @@ exception (`interrupts.breakable`). Nothing may be imported here that takes time
 """
 
 import signal
-import sys
 
 
 def main() -> int:
@@ -17,7 +16,3 @@ def main() -> int:
     from rtshcua.cli.app import main as run
 
     return run()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,7 +9,7 @@ from functools import partial
 from math import inf, sin
 from random import Random
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -35,9 +35,6 @@ from rtshcua.simulation.surroundings import Air, Surroundings
 from rtshcua.simulation.transfer import Transfer, TransferRules
 from rtshcua.simulation.vehicle import Event, Landed, Vehicle
 
-if TYPE_CHECKING:
-    from rtshcua.simulation.voices import SecondVoice
-
 TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
 _RIPPLE = 0.01
@@ -57,6 +54,14 @@ Handler = Callable[["Autopilot", Command], tuple[int, ...]]
 _FEEDS_MOTORS = frozenset({Purpose.FLIGHT, Purpose.PROPULSION})
 Builder = Callable[["Autopilot"], Message | None]
 """A message with what the vehicle knows now; None if it knows nothing."""
+
+
+class Speaker(Protocol):
+    """Who else sends frames under the vehicle's own ids, which a fault begins and ends (`voices.SecondVoice`)."""
+
+    def due(self, autopilot: "Autopilot", system: int, now_us: int) -> list[bytes]:
+        """What it sends by now, as frames."""
+        ...
 
 
 class Taker(StrEnum):
@@ -203,7 +208,7 @@ class Autopilot:
         """How long it goes on saying nothing, for it starts again."""
         self.taker: Taker | None = None
         """Who first took the vehicle over in flight, if somebody did."""
-        self.voices: list[SecondVoice] = []
+        self.voices: list[Speaker] = []
         """Who else speaks under its ids."""
         self.extras = config.extras
         self.link_quality = 10_000

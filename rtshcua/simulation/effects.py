@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode, Way
-from rtshcua.simulation.autopilot import Autopilot, Taker
+from rtshcua.simulation.autopilot import Autopilot, Speaker, Taker
 from rtshcua.simulation.command import Command
 from rtshcua.simulation.faults import message_number
 from rtshcua.simulation.link import Link
@@ -124,7 +124,7 @@ def _on_link(fault: faults.LinkFault, on: Affected) -> Iterator[Effect]:
         case faults.LinkQuality(at_us, quality):
             yield at_us, partial(_set, radio, "link_quality", quality)
         case faults.SecondVoice(at_us, says, each_us, for_us):
-            voice = SecondVoice(says, each_us, at_us)
+            voice: Speaker = SecondVoice(says, each_us, at_us)
             voices = on.autopilot.voices
             yield from _for(at_us, for_us, partial(_begin, voices, voice), partial(_end, voices, voice))
         case _:
@@ -236,11 +236,11 @@ def _command(
     a.flavour.commands[number](a, Command(number, p1, flags, 0.0, nan, latitude, longitude, amsl, frame, _STATION))
 
 
-def _begin(voices: list[SecondVoice], voice: SecondVoice) -> None:
+def _begin(voices: list[Speaker], voice: Speaker) -> None:
     voices.append(voice)
 
 
-def _end(voices: list[SecondVoice], voice: SecondVoice) -> None:
+def _end(voices: list[Speaker], voice: Speaker) -> None:
     voices.remove(voice)
 
 

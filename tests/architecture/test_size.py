@@ -11,13 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 880,
-    "code lines": 83_300,
+    "modules": 881,
+    "code lines": 83_400,
     "shared class names": 161,
     "of them across packages": 129,
     "shared file names": 116,
-    "import cycles": 7,
-    "modules below 80 lines with one importer": 78,
+    "import cycles": 3,
+    "modules below 80 lines with one importer": 77,
     "functions of more than 60 lines": 22,
     "functions of a complexity over 15": 170,
     "functions of a complexity over 25": 15,

@@ -26,7 +26,7 @@ from virtual.forked import Forked, Started
 PATIENCE_S = 240.0
 #: Faster, and what must leave within 1.5 s of flight must leave within less than a busy machine may hold a process up.
 SPEED = 5
-AFRESH = (sys.executable, "-m", "rtshcua.cli.app")
+AFRESH = (sys.executable, "-m", "rtshcua")
 
 
 class Run:

@@ -18,7 +18,7 @@ from rtshcua.cli.doctor import _boundary
 from rtshcua.onboard.enforcement.load import Mode
 from virtual.forked import Forked
 
-COMMAND = [sys.executable, "-m", "rtshcua.cli.app", "doctor"]
+COMMAND = [sys.executable, "-m", "rtshcua", "doctor"]
 
 
 def free_port() -> int:

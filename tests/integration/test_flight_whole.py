@@ -194,7 +194,7 @@ def test_bundle_flies_once(watched: Flown) -> None:
 def test_bundle_flies_again_with_fresh_state_and_a_pipe_gets_plain_lines(watched: Flown, tmp_path: Path) -> None:
     words = ["run", watched.bundle, "--fresh-state", "--runs", str(tmp_path), "--speed", str(watched.ground.speed)]
     run = subprocess.run(
-        [sys.executable, "-m", "rtshcua.cli.app", *words], cwd=watched.ground.folder, env=watched.ground.environment,
+        [sys.executable, "-m", "rtshcua", *words], cwd=watched.ground.folder, env=watched.ground.environment,
         capture_output=True, text=True, check=True, timeout=120,
     )  # fmt: skip
     lines = run.stdout.splitlines()

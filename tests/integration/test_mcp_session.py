@@ -297,7 +297,7 @@ def test_who_subscribed_is_told_when_the_flight_changes_and_not_after(ground: An
 def test_what_the_first_call_needs_is_loaded_before_the_host_is_greeted(ground: Any, base: str, place: Path) -> None:
     """A call that comes with the greeting finds the compiler there, and waits for the policy alone."""
     words = ["mcp", base, "--to", str(place), "--with", str(POLICY)]
-    command = [sys.executable, "-X", "importtime", "-m", "rtshcua.cli.app", *words]
+    command = [sys.executable, "-X", "importtime", "-m", "rtshcua", *words]
     ended = subprocess.run(
         command, cwd=ground.folder, env=ground.environment, stdin=subprocess.DEVNULL, capture_output=True, check=True
     )

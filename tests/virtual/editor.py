@@ -56,7 +56,7 @@ class Editor:
         return self.loop.run_until_complete(asyncio.wait_for(work, PATIENCE))
 
     async def start(self, folder: Path) -> lsp.InitializeResult:
-        await self.client.start_io(sys.executable, "-P", "-m", "rtshcua.cli.app", "lsp", cwd=str(folder))
+        await self.client.start_io(sys.executable, "-P", "-m", "rtshcua", "lsp", cwd=str(folder))
         capabilities = lsp.ClientCapabilities(
             general=lsp.GeneralClientCapabilities(position_encodings=["utf-16"]),
             workspace=lsp.WorkspaceClientCapabilities(

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Protocol
 
 from rtshcua import library
 from rtshcua.cli.linting.examined import Examined, Result
-from rtshcua.cli.linting.session import Session
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import Program, load
@@ -13,10 +13,30 @@ from rtshcua.ground.lint.lint import lint
 from rtshcua.mavlink import dialect
 
 
+class SourceFiles(Protocol):
+    """What reads sources, and knows their digests: a `session.Session`."""
+
+    def read(self, name: str) -> bytes:
+        """The octets of a source. Raises OSError, and ValueError for a name that leads nowhere."""
+        ...
+
+    def digest(self, name: str) -> str | None:
+        """The digest of a source; None where it cannot be read."""
+        ...
+
+    def folder(self, pack: str) -> str | None:
+        """The folder of an installed pack."""
+        ...
+
+    def listing(self, name: str) -> list[str]:
+        """The names in a folder, for suggestions. Raises OSError."""
+        ...
+
+
 class Fresh:
     """The programs of one run."""
 
-    def __init__(self, session: Session, asked: Mapping[str, int | None]) -> None:
+    def __init__(self, session: SourceFiles, asked: Mapping[str, int | None]) -> None:
         self._session = session
         self._asked = asked
         self._programs: dict[Path, tuple[Program, _Reads]] = {}
@@ -47,7 +67,7 @@ class Fresh:
 class _Reads:
     """Remembers what was read for one program."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: SourceFiles) -> None:
         self._session = session
         self._names: dict[str, str | None] = {}
         self._packs: dict[str, str | None] = {}
@@ -67,7 +87,7 @@ class _Reads:
 
 
 def examine_specification(
-    session: Session, files: Sequence[Path], further: Sequence[Path], asked: Mapping[str, int | None]
+    session: SourceFiles, files: Sequence[Path], further: Sequence[Path], asked: Mapping[str, int | None]
 ) -> Examined:
     """A mission specification with the sources of its policy, as one program."""
     from rtshcua.ground.agent.specification import load_specification

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import shapely
 
-from rtshcua.ground.analysis.plane import rings_of
+from rtshcua.decision.outline import rings
 from rtshcua.ground.compiler.shapes import Point
 from rtshcua.model.flat.zone import CIRCLE, Zone
 
@@ -30,6 +30,6 @@ def _plan(zone: Zone) -> shapely.Geometry:
         x, y, square = zone.data
         return shapely.Point(x, y).buffer(square**0.5, quad_segs=_QUARTER)
     plan = shapely.Polygon()
-    for ring in rings_of(zone):  # a hole takes away from what is around it, a part in a hole adds
+    for ring in rings(zone):  # a hole takes away from what is around it, a part in a hole adds
         plan = plan.symmetric_difference(shapely.Polygon(ring))
     return plan

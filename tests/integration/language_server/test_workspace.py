@@ -92,7 +92,7 @@ def test_formatting_is_as_wide_as_the_project_says(editor: Editor, folder: Path)
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 def test_it_ends_when_the_editor_dies(tmp_path: Path) -> None:
     """Without a word, in the middle of a message; and so does the process that proves."""
-    command = [sys.executable, "-P", "-m", "rtshcua.cli.app", "lsp"]
+    command = [sys.executable, "-P", "-m", "rtshcua", "lsp"]
     server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=tmp_path)
     assert server.stdin is not None
     assert server.stdout is not None

@@ -48,7 +48,7 @@ def test_a_worker_that_is_killed_takes_no_flight_with_it(tmp_path: Path, checkou
     assert there.returncode in (0, 13), there.stderr
     assert "killed" in there.stdout
     here = subprocess.run(
-        [sys.executable, "-m", "rtshcua.cli.app", "campaign", *WORDS, "-j", "2", "-o", str(tmp_path / "here")],
+        [sys.executable, "-m", "rtshcua", "campaign", *WORDS, "-j", "2", "-o", str(tmp_path / "here")],
         cwd=checkout, capture_output=True, text=True, check=False, timeout=600,
     )  # fmt: skip
     assert here.returncode == there.returncode, here.stderr

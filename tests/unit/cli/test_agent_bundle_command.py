@@ -195,7 +195,7 @@ def test_where_there_is_no_script_the_module_is_started_from_the_path_of_the_int
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
     assert made(base, tmp_path / "plug") == 0
     server = read(tmp_path / "plug/.mcp.json")["mcpServers"][NAME]
-    assert [server["command"], *server["args"][:3]] == [str(tmp_path / "python3"), "-P", "-m", "rtshcua.cli.app"]
+    assert [server["command"], *server["args"][:3]] == [str(tmp_path / "python3"), "-P", "-m", "rtshcua"]
 
 
 @pytest.mark.parametrize(

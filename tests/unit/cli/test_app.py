@@ -19,7 +19,7 @@ from rtshcua.diagnostics.exits import ExitCode
 
 
 def run_module(*words: str, **options: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "rtshcua.cli.app", *words]
+    command = [sys.executable, "-m", "rtshcua", *words]
     return subprocess.run(command, text=True, check=False, **{"capture_output": True, **options})
 
 

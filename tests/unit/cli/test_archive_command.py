@@ -235,7 +235,7 @@ def test_a_cluster_that_is_none_is_told(runs: Path) -> None:
     """In a process of its own: a client of a cluster leaves a thread behind."""
     words = ["archive", "add", str(runs / "quad-07-0"), *ROOT, "--cluster", "nonsense"]
     run = subprocess.run(
-        [sys.executable, "-m", "rtshcua.cli.app", *words], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-m", "rtshcua", *words], capture_output=True, text=True, check=False, timeout=120
     )
     assert (run.returncode, run.stderr) == (ExitCode.LINK, "error: no cluster answers: `nonsense`\n")
 

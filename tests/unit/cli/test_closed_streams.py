@@ -10,7 +10,7 @@ import pytest
 from rtshcua.diagnostics.exits import ExitCode
 from virtual import case
 
-COMMAND = f'"{sys.executable}" -m rtshcua.cli.app'
+COMMAND = f'"{sys.executable}" -m rtshcua'
 
 
 def shell(line: str, folder: Path) -> "subprocess.CompletedProcess[str]":
@@ -57,7 +57,7 @@ def test_a_help_page_whose_reader_left(tmp_path: Path) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(
-        [sys.executable, "-m", "rtshcua.cli.app", "run", "--help"],
+        [sys.executable, "-m", "rtshcua", "run", "--help"],
         cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True, check=False, timeout=60,
     )  # fmt: skip
     os.close(writer)

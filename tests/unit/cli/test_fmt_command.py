@@ -18,7 +18,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.format import attempt
 
 CHECKOUT = Path(__file__).resolve().parents[3]
-COMMAND = [sys.executable, "-m", "rtshcua.cli.app", "fmt"]
+COMMAND = [sys.executable, "-m", "rtshcua", "fmt"]
 
 BAD = "skill s() { deadline 2 s\n grace 1 s } // end\n"
 GOOD = "skill s() {\n  deadline 2 s\n  grace    1 s\n}  // end\n"

@@ -267,7 +267,7 @@ def test_ctrl_c(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pyt
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no pipes of this kind")
 def test_a_reader_that_left(here: Path) -> None:
-    command = [sys.executable, "-m", "rtshcua.cli.app", "test"]
+    command = [sys.executable, "-m", "rtshcua", "test"]
     read, write = os.pipe()
     os.close(read)
     with os.fdopen(write, "wb") as closed:

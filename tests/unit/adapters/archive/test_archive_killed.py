@@ -22,7 +22,7 @@ def test_nothing_is_lost_or_there_twice(fleet: Path, tmp_path: Path) -> None:
     wanted, random = refused(logs), Random(5)
 
     def adding(folder: Path) -> list[str]:
-        words = [sys.executable, "-m", "rtshcua.cli.app", "archive", "add", *map(str, logs), "--jobs", "1"]
+        words = [sys.executable, "-m", "rtshcua", "archive", "add", *map(str, logs), "--jobs", "1"]
         return [*words, "--root", generated_logs.ROOT_KEY.hex(), "--archive", str(folder)]
 
     start = monotonic()

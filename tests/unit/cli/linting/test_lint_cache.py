@@ -154,7 +154,7 @@ def test_an_entry_in_the_place_of_another_is_none(here: Path, lint: Lint, examin
 
 @pytest.mark.slow
 def test_runs_at_the_same_time_agree(here: Path) -> None:
-    words = [sys.executable, "-m", "rtshcua.cli.app", "lint", ".", "--format", "github"]
+    words = [sys.executable, "-m", "rtshcua", "lint", ".", "--format", "github"]
     runs = [subprocess.Popen(words, stdout=subprocess.PIPE, cwd=here) for _ in range(2)]
     said = {run.communicate()[0] for run in runs}
     assert len(said) == 1

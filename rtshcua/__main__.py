@@ -1,0 +1,8 @@
+"""`python -m rtshcua`: the command, as `rtshcua` is."""
+
+import sys
+
+from rtshcua.cli.entry_point import main
+
+if __name__ == "__main__":
+    sys.exit(main())

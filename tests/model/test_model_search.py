@@ -13,6 +13,7 @@ from model.searching import Found, Search
 from model.small import ALL, LIMITS, TINY, UNIT, Small
 from reference.flat_case import S
 from rtshcua.onboard.runtime.limits import falling_us, run_us
+from rtshcua.wire.permit import LINK_VALID_US
 from virtual.rows import rows
 
 #: after every so many transitions, a state that counts as one with another is held against it
@@ -83,6 +84,7 @@ def test_the_bounds_of_a_policy_are_sums_over_its_chains() -> None:
     slack = LIMITS.flapping_us + UNIT
     last = S + slack
     insisting = LIMITS.tries * (LIMITS.retry_us + slack + last) + slack
-    contingency = 3 * (S + slack) + insisting + last + insisting
+    late = LIMITS.tries * (LINK_VALID_US + slack)
+    contingency = 3 * (S + slack) + insisting + last + insisting + 2 * late
     assert falling_us(policy, None, LIMITS, UNIT) == contingency
     assert falling_us(policy, takeoff, LIMITS, UNIT) == S + slack + contingency

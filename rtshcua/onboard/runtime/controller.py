@@ -18,7 +18,7 @@ from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement import executor, frames
+from rtshcua.onboard.enforcement import frames
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Expect, Failed, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
@@ -39,8 +39,6 @@ REPLAN: Final = "replan"
 LATE: Final = "nothing was sent: this computer was too busy, or its disk too slow, to send it in its permit's time"
 #: what is `late`: the permit's time was over when it was to be sent, or when its first frame was
 _LATE: Final = ("late", frames.LATE.slug)
-#: and why no command came of a permit in time
-_OVERDUE: Final = (executor.LATE.slug, "time-apart")
 #: what ends a run matters more the further down it stands
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 _UP = LinkState.UP  # an enumeration's attributes are slow to find
@@ -232,13 +230,13 @@ class MissionController:
         unkept = self.retry.unkept(self._loaded.invocations[invocation.step], state, self._loaded.policy, now)
         if unkept is not None:
             return self._violated(now, unkept)
-        if self.dispatcher.active is None and self.retry.may_hold():
-            self._fallback.hold(now, state)
+        if self.dispatcher.active is None and self.retry.may_hold() and not self._fallback.hold(now, state):
+            self.retry.hold_again()
         return False
 
     def _start(self, now: Now, invocation: Invocation, answer: Decision) -> bool:
         if not self.dispatcher.fly(now, answer.permit, Ref(STEP, invocation.step, -1), None):
-            self._overdue = self.dispatcher.refused in _OVERDUE
+            self._overdue = self.dispatcher.overdue
             return not self._overdue and self._inadmissible(now, invocation)
         prepared = self._loaded.invocations[invocation.step]
         self._supervisor = Supervisor(
@@ -336,9 +334,12 @@ class MissionController:
             self._supervisor = None
             self.retry.renew(now.monotonic_us, at_once=True)
             self.stage = _DECIDING
+        elif event.reason in _LATE and self.stage is _FALLING:
+            self._fallback.late()
         elif self.stage is _DECIDING and self.aloft:
             # It was a hold: whatever the vehicle does, it does not wait where it should.
-            self.fall_back(FALLBACK_LINK, holds=False)
+            if event.reason not in _LATE or not self.retry.hold_again():
+                self.fall_back(FALLBACK_LINK, holds=False)
         elif self.stage is not _RUNNING:
             return
         elif event.reason == WITHHELD and not self._recording:

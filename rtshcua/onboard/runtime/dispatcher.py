@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement import executor
 from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.isolated import IsolatedExecutor
 from rtshcua.onboard.ports import Command, Frozen, Hindered, Obeyed, Release
@@ -22,6 +23,8 @@ OBEYED: Final = "obeyed"
 #: what is recorded of a fallback that was sent home or down, and ended without word of a landing
 UNCONFIRMED: Final = "it was sent, and not confirmed: no landing was seen"
 _UNCONFIRMED = ("time-over", "released")
+#: why no command came of a permit in time
+_OVERDUE: Final = (executor.LATE.slug, "time-apart")
 
 
 class RemainingLatency:
@@ -82,7 +85,7 @@ class Dispatcher:
         self.hindrance = ""  # what is known to keep the command that flies from getting on
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
         self._tried: _Tried | None = None  # the last step that was to be sent
-        self.refused = ""  # why nothing was sent by the last permit; empty where something was
+        self.overdue = False  # nothing was sent by the last permit, for it came too late
 
     def fly(self, now: Now, permit: bytes, ref: Ref, lasting_us: int | None) -> bool:
         """Dispatch what the permit is for, for at most `lasting_us` (None: until it succeeds or fails).
@@ -118,7 +121,7 @@ class Dispatcher:
         return self._send(now, self._executor.stand_in(permit, ref.kind, ref.link, now.monotonic_us), ref, lasting_us)
 
     def _send(self, now: Now, command: Command | Refusal, ref: Ref, lasting_us: int | None) -> bool:
-        self.refused = command.slug if isinstance(command, Refusal) else ""
+        self.overdue = isinstance(command, Refusal) and command.slug in _OVERDUE
         if isinstance(command, Refusal):
             self._journal.effect(now, "refused", ref, detail=command.slug)
             return False

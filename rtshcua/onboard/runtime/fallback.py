@@ -18,7 +18,7 @@ class _Chain(msgspec.Struct):
     """A chain that is being flown: its kind, the step it belongs to (-1: the contingency), and the last link used.
 
     `holds`: also those of its links fly that hold. The last link was tried `tried` times more, and is tried again at
-    `wait_until_us` (0: nothing is waited for).
+    `wait_until_us` (0: nothing is waited for). Links of it were too late `late` times, and tried again for that.
     """
 
     kind: int
@@ -27,6 +27,7 @@ class _Chain(msgspec.Struct):
     holds: bool
     tried: int = 0
     wait_until_us: int = 0
+    late: int = 0
 
     def ref(self, index: int) -> Ref:
         """The link of this index."""
@@ -46,6 +47,7 @@ class Fallback:
         self._dispatcher = dispatcher
         self._limits = limits
         self._chain = _Chain(CONTINGENCY_LINK, -1, START, True)
+        self._overdue = False  # what was to be flown last had a permit, which came too late
 
     def begin(self, kind: int, step: int, *, holds: bool = True) -> None:
         """Start a step's chain, or the contingency (`step` is -1); `holds`: also the links of it that hold."""
@@ -55,15 +57,32 @@ class Fallback:
         """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
         self._chain = _Chain(CONTINGENCY_LINK, -1, len(self._policy.contingency) - 2, True)
 
-    def hold(self, now: Now, state: State) -> None:
-        """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one."""
+    def late(self) -> None:
+        """This computer was too late to send the link that was dispatched last: it is asked for again, a bounded number
+        of times, for a link that brings the vehicle home must not be passed over because of that. The boundary lets no
+        link of a step's chain fly twice: the contingency flies in its place.
+        """
+        chain = self._chain
+        if chain.late == self._limits.tries:
+            return
+        if chain.kind == FALLBACK_LINK:
+            self.begin(CONTINGENCY_LINK, -1, holds=chain.holds)
+        else:
+            chain.after -= 1
+        self._chain.late = chain.late + 1
+
+    def hold(self, now: Now, state: State) -> bool:
+        """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one.
+        False if its permit came too late: it may be tried again.
+        """
         for index, link in enumerate(self._policy.contingency):
             if self._holds(link):
                 ref = Ref(CONTINGENCY_LINK, -1, index)
                 answer = self._admission.ask(now, state, ref)
                 if answer is not None and answer.permit:
-                    self._dispatcher.fly(now, answer.permit, ref, None)
-                return
+                    return self._dispatcher.fly(now, answer.permit, ref, None) or not self._dispatcher.overdue
+                break
+        return True
 
     def turn(self, now: Now, state: State) -> bool:
         """Fly the next link, unless one flies whose time is not over. False if there is nothing left to try: the last
@@ -75,10 +94,13 @@ class Fallback:
                 return True
             self._dispatcher.end(now, "time-over")
         while (choice := self._choose(state, now)) is not None:
-            chain.after = choice.index
+            before, chain.after = chain.after, choice.index
             if not chain.holds and self._holds(choice.link):
                 continue
             if self._fly(now, state, choice.index, choice.link, insist=False):
+                return True
+            if self._overdue and chain.late < self._limits.tries:
+                chain.after, chain.late = before, chain.late + 1
                 return True
         if chain.kind == FALLBACK_LINK:
             self.begin(CONTINGENCY_LINK, -1, holds=chain.holds)
@@ -112,6 +134,9 @@ class Fallback:
         """Ask for a link and fly it. `insist` flies it by its standing permit even if it was not admitted."""
         ref, lasting_us = self._chain.ref(index), link_us(self._policy, link)
         answer = self._admission.ask(now, state, ref)
-        if answer is not None and answer.permit and self._dispatcher.fly(now, answer.permit, ref, lasting_us):
-            return True
+        self._overdue = False
+        if answer is not None and answer.permit:
+            if self._dispatcher.fly(now, answer.permit, ref, lasting_us):
+                return True
+            self._overdue = self._dispatcher.overdue
         return (answer is None or insist) and self._dispatcher.stand_in(now, ref, lasting_us)

@@ -11,6 +11,7 @@ from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.onboard.ports import Frozen
+from rtshcua.wire.permit import LINK_VALID_US
 
 
 class Limits(Frozen):
@@ -50,7 +51,8 @@ def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period
 
     That it ended means: landed, stood down from, or given up after the last tries. A degrade rule's target, each link
     of the chain and each of the contingency fly once; the last link is sent again, `tries` times. A run that is left
-    alone meanwhile (`Runtime.leave`, once) begins with the last link once more.
+    alone meanwhile (`Runtime.leave`, once) begins with the last link once more. A link that could not be sent in its
+    permit's time is tried again, `tries` times in a chain.
     """
     slack_us = limits.flapping_us + period_us
     chain = contract.fallback if contract is not None else ()
@@ -59,7 +61,8 @@ def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period
     flown = sum(link_us(policy, link) + slack_us for link in (*chain, *policy.contingency))
     last_us = link_us(policy, policy.contingency[-1]) + slack_us
     insisting = limits.tries * (limits.retry_us + slack_us + last_us) + slack_us
-    return degraded + flown + insisting + last_us + insisting
+    late_us = limits.tries * (LINK_VALID_US + slack_us)
+    return degraded + flown + insisting + last_us + insisting + 2 * late_us
 
 
 def run_us(policy: Policy, mission: Mission, limits: Limits, period_us: int) -> int | None:

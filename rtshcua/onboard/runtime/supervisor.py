@@ -94,13 +94,15 @@ class RetryPolicy:
         self.grace = Grace()
         self._news = True  # something was received, or began, since the step was last asked for
         self._asked_us = 0  # when that was
-        self._held = False  # a hold for the step was tried
+        self._held = False  # a hold for the step was tried,
+        self._late = 0  # and so often it was too late
         self._called = False  # a replacement of it was asked for
 
     def renew(self, now_us: int, *, at_once: bool) -> None:
         """Another step is waited for from now on; it is asked for `at_once`, or when something was received."""
         self.grace = Grace()
         self._news, self._asked_us, self._held, self._called = at_once, now_us, False, False
+        self._late = 0
 
     def news(self) -> None:
         """Something was received: the answer may be another one now."""
@@ -125,9 +127,15 @@ class RetryPolicy:
         return in_time and may_ask_again(invocation, answer.outcome, answer.reason)
 
     def may_hold(self) -> bool:
-        """Whether a hold is to be tried while the step is waited for: once, for a hold goes on."""
+        """Whether a hold is to be tried while the step is waited for: once, for a hold that was sent goes on."""
         held, self._held = self._held, True
         return not held
+
+    def hold_again(self) -> bool:
+        """The hold was not sent, for this computer was too late: whether it is tried again, which is bounded."""
+        self._held = self._late == self._limits.tries
+        self._late += not self._held
+        return not self._held
 
     def may_call(self, invocation: Invocation, answer: Decision) -> bool:
         """Whether a replacement of the step is to be asked for, once: its mission says so, and it was not admitted."""

@@ -175,7 +175,7 @@ def held(*, chain: tuple[int, ...] = ()) -> Run:
     return run.until_flies("hover")
 
 
-@pytest.mark.parametrize("reason", ["did-not-stop", "no-progress", "refused", "late"])
+@pytest.mark.parametrize("reason", ["did-not-stop", "no-progress", "refused"])
 def test_a_hold_between_steps_that_fails_flies_the_steps_chain(reason: str) -> None:
     run = held()
     run.tick(Failed(0, run.vehicle.commands[-1].token, reason))

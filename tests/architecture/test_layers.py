@@ -71,7 +71,9 @@ def test_loading_all_of_onboard_loads_nothing_of_the_ground(checkout: Path) -> N
 
 def test_exhaustive_contract_names_every_part(checkout: Path) -> None:
     config = tomllib.loads((checkout / "pyproject.toml").read_text(encoding="utf-8"))
-    (layers,) = [c for c in config["tool"]["importlinter"]["contracts"] if c["type"] == "layers"]
-    assert layers["exhaustive"]
-    assert "exhaustive_ignores" not in layers
-    assert "ignore_imports" not in layers
+    layers = [c for c in config["tool"]["importlinter"]["contracts"] if c["type"] == "layers"]
+    assert {"rtshcua"} <= {container for each in layers for container in each["containers"]}
+    for each in layers:
+        assert each["exhaustive"]
+        assert "exhaustive_ignores" not in each
+        assert "ignore_imports" not in each

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Annotated, Final, NamedTuple
 
+import msgspec
 import typer
 
 from rtshcua.adapters.agent_socket import Answered, FlightFollower
@@ -92,6 +93,16 @@ class Patience(NamedTuple):
     silent_s: float = 30.0
     #: for whoever reads what is told, at the end
     drain_s: float = 1.0
+
+
+class _Told(msgspec.Struct):
+    """What is read of a line that is no record."""
+
+    type: str = ""
+    digest: str = ""
+
+
+_read_told = msgspec.json.Decoder(_Told).decode
 
 
 class OperatorConsole:
@@ -261,13 +272,13 @@ class OperatorConsole:
         if self._names is not None:
             return
         try:
-            told = json.loads(line)
+            told = _read_told(line)
         except (ValueError, RecursionError):
             raise ConnectionError("what listens there is no flight: it says what no flight says") from None
-        if not isinstance(told, dict) or told.get("type") != "mission":
+        if told.type != "mission":
             return
         flying = self._flying
-        if told.get("digest") == flying.mission_digest.hex():
+        if told.digest == flying.mission_digest.hex():
             keys = flying.policy_key.kid, flying.mission_key.kid
             self._names = Names(Claimed(flying.policy, flying.mission, flying.digest, flying.policy_digest, *keys))
         else:

@@ -329,7 +329,7 @@ class Desk:
 
     def _as_decided(self, chosen: Mapping[str, Any], mission: Mission) -> Mission | None:
         """This mission with the step as it was decided on, if the step is its own octet for octet."""
-        step = int(chosen.get("step", -1))
+        step = chosen.get("step", -1)
         if not 0 <= step < len(mission.invocations):
             return None
         bound = bind(mission, self._signer.digest)
@@ -362,7 +362,7 @@ def _checked(answer: Answer) -> dict[str, Any]:
 def _number(record: Mapping[str, Any]) -> int | None:
     """The number of the step that a record is about, from 1; a record holds its index, from 0."""
     step = record.get("step")
-    return number_of(step) if isinstance(step, int) and step >= 0 else None
+    return None if step is None or step < 0 else number_of(step)
 
 
 def _decided(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -374,11 +374,13 @@ def _explained(chosen: Mapping[str, Any], policy: Policy, mission: Mission) -> d
     """What the clause read, and the nearest values that would have passed, derived anew from the record."""
     ready = prepare(policy)
     invocations = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
-    step = int(chosen.get("step", -1))
+    step = chosen.get("step", -1)
     if isinstance(ready, Refusal) or isinstance(invocations, Refusal) or not 0 <= step < len(invocations):
         return {}
     record = msgspec.convert(dict(chosen), Decision)
     state, invocation = state_of(record), invocations[step]
+    if not len(state.values) == len(state.ages) == policy.slots or len(state.monitors) != len(policy.monitors):
+        return {}  # it is of another policy
     found = trace(invocation, state, ready, context_of(record), now_of(record))
     flat = invocation.invocation
     observed = [

@@ -7,6 +7,7 @@ from collections import deque
 from pathlib import Path
 from typing import Any, Final
 
+from rtshcua.adapters.mcp_server.lines import understood
 from rtshcua.ground.language.size import values_of, without_texts
 
 #: how long until it is tried again to follow, in seconds
@@ -86,9 +87,9 @@ class Following:
                 bare = without_texts(line, MOST_VALUES)
                 if bare is None:
                     raise ValueError("no line of a flight")
-                told = json.loads(line)
+                told = understood(json.loads(line))
                 with self.turn:
-                    self._take(told if isinstance(told, dict) else {}, len(line) + VALUE * values_of(bare))
+                    self._take(told, len(line) + VALUE * values_of(bare))
                     self.turn.notify_all()
 
     def _take(self, told: dict[str, Any], weight: int) -> None:

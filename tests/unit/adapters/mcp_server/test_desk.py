@@ -4,6 +4,7 @@ import json
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from rtshcua import library
 from rtshcua.adapters.mcp_server import desk as desks
 from rtshcua.adapters.mcp_server.desk import Desk, Misused, Signer
 from rtshcua.adapters.mcp_server.flight import Following
+from rtshcua.adapters.mcp_server.lines import understood
 from rtshcua.adapters.mcp_server.missions import Answer, Missions
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.wire import cose, names
@@ -23,6 +25,7 @@ from rtshcua.wire.cancellation import CancellationDocument
 from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.request import STEP
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))
@@ -196,3 +199,55 @@ def test_a_decision_is_explained_by_the_mission_that_it_is_of_alone(
         if explained:
             assert [each["name"] for each in told["untrusted"]["observed"]] == ["landed"]
             assert told["nearest"], "it says what would have passed"
+
+
+#: lines of a flight, of each type that is read
+LINES: dict[str, dict[str, Any]] = {
+    "hello": {"type": "hello", "vehicle": "quad-07", "flight": "07" * 16, "mode": "software"},
+    "waiting": {"type": "waiting", "policy": "p@1"},
+    "vehicle": {"type": "vehicle", "ready": True, "unready": None, "armed": False, "airborne": False, "signals": []},
+    "mission": {"type": "mission", "digest": "08" * 32},
+    "decision": RECORDED | {"binding": "09" * 32, "invocation": "0a" * 16, "state": {"values": [0], "ages": [0]}},
+    "effect": {"type": "effect", "seq": 8, "event": "replan", "step": 1, "detail": "within 5 ms", "token": -1},
+    "seal": {"type": "seal", "seq": 9},
+    "recover": {"type": "recover", "seq": 10},
+    "close": {"type": "close", "seq": 11, "ending": "completed"},
+}
+HOSTILE: tuple[Any, ...] = ("x", "\ud800", None, [], {}, True, -5, 1.5, 1 << 70)
+
+
+def ask_everything(desk: Desk) -> None:
+    """Each tool that reads what the vehicle told; it may say no."""
+    for ask in (desk.describe_vehicle, desk.flight, desk.explain_decision, desk.cancel, desk._in_force,
+                lambda: desk.explain_decision(7), lambda: desk.read_evidence(3, 2)):  # fmt: skip
+        try:
+            ask()
+        except Misused:
+            continue
+
+
+@rows("kind", tuple(LINES))
+def test_no_line_of_whoever_listens_at_the_socket_fails_a_tool(kind: str, desk: Desk, handed: list[bytes]) -> None:
+    """Its fields were taken to be numbers, and texts in hexadecimal."""
+    desk.following.hello, desk.following.mission = {}, {}
+    desk.following.connected = True
+    assert status(desk, desk.propose_mission(PROPOSAL, "one")["ticket"]) == "admitted"
+    for key in LINES[kind]:
+        for value in HOSTILE:
+            desk.following.records.clear()
+            for line in LINES.values():
+                told = line | {key: value} if line is LINES[kind] else line
+                with suppress(ValueError):  # the connection is given up
+                    desk.following._take(understood(told), 1)
+            ask_everything(desk)
+
+
+@pytest.mark.parametrize("line", [7, None, [], "hello", {"type": 7}, {"type": "later"}, {}])
+def test_a_line_of_no_type_that_is_read_is_passed_over(line: Any) -> None:
+    assert understood(line) == {}
+
+
+@pytest.mark.parametrize("kind", LINES)
+def test_a_line_is_passed_on_as_it_came(kind: str) -> None:
+    line = LINES[kind] | ({} if kind == "decision" else {"more": [1, {"a": None}]})
+    assert understood(line) is line

@@ -3,6 +3,7 @@
 from datetime import UTC, datetime
 
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
+from rtshcua.model.quantity import Dimension, display
 
 _LAST_US = 253_402_300_799_999_999  # the end of the year 9999
 
@@ -18,7 +19,7 @@ def true_to(error_us: int) -> str:
     """How far a UTC time may be off, or that nobody knows."""
     if error_us >= UTC_UNKNOWN_US:
         return "and nothing tells how far that is off"
-    return f"true to {error_us / 1_000:g} ms" if error_us < 1_000_000 else f"true to {error_us / 1_000_000:g} s"
+    return f"true to {display(error_us, Dimension.DURATION)}"
 
 
 def many(count: int, what: str) -> str:

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.evidence.chain import BOUNDARY, BOUNDARY_LOST
 from rtshcua.evidence.finding import Claim, Finding, Flaw
-from rtshcua.evidence.gaps import STALLED
+from rtshcua.evidence.gaps import STALLED, seconds
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.recovery import RECOVERED
@@ -256,8 +256,10 @@ class BoundaryEvidence:
             if claim is not None and not bears_out(own, claim.at(own, since_us)):
                 text = "it claims another time of day than the boundary has by its own clock"
                 known = self.last.source != Source.UNKNOWN
-                expected = f"{own.utc_us} us, to {own.utc_error_us} us" if known else "none: its clock is not known"
-                found = f"{own.monotonic_us + claim.ahead_us} us, to {claim.error_us} us"
+                expected = (
+                    f"{own.utc_us} us, true to {seconds(own.utc_error_us)}" if known else "none: its clock is not known"
+                )
+                found = f"{own.monotonic_us + claim.ahead_us} us, true to {seconds(claim.error_us)}"
                 return Flaw("boundary/clock", text, found, expected).at(claim.record, claim.offset)
         return None
 

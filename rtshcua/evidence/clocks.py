@@ -1,6 +1,7 @@
 """The clocks of a log: what the times of one record say about those of the next (docs/log-format.md, section 5)."""
 
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.gaps import seconds
 from rtshcua.evidence.records import AnyRecord, Genesis, Recover
 
 
@@ -34,7 +35,10 @@ class Clocks:
             return Flaw("clock/utc-backwards", text, latest, least)
         if abs(apart_us - self._apart_us) > error_us + self._apart_error_us:
             text = "its time of day went on by more or less than its monotonic time, beyond the errors stated for both"
-            found, most = f"{apart_us - self._apart_us} us apart", f"{error_us + self._apart_error_us} us at most"
+            found, most = (
+                f"{seconds(apart_us - self._apart_us)} apart",
+                f"{seconds(error_us + self._apart_error_us)} at most",
+            )
             return Flaw("clock/utc-jump", text, found, most)
         self.at_us = at_us
         if utc_us - error_us > self._utc_low_us:

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Claim, Flaw
 from rtshcua.evidence.records import Decision, Effect, Genesis, Recover, Signed
+from rtshcua.model.quantity import Dimension, display
 
 #: the effect that says how long nothing was recorded before it
 STALLED: Final = "stalled"
@@ -54,8 +55,8 @@ class Term:
                 return flaw
         if at_us > self._until_us or before > MOST_RECORDS:
             text = "an epoch was left unsealed: its seal should stand before this record"
-            found = f"{before} records, {at_us - self._until_us + LONGEST_US} us after the last signed record"
-            return Flaw("seal/missing", text, found, f"at most {MOST_RECORDS} records, {LONGEST_US} us")
+            found = f"{before} records, {seconds(at_us - self._until_us + LONGEST_US)} after the last signed record"
+            return Flaw("seal/missing", text, found, f"at most {MOST_RECORDS} records, {seconds(LONGEST_US)}")
         self._last_us = at_us
         return None
 
@@ -103,4 +104,4 @@ def told(gap: Gap) -> Claim:
 
 def seconds(us: int) -> str:
     """A time, for a person."""
-    return f"{us // 1_000_000}.{us // 100_000 % 10} s"
+    return display(us, Dimension.DURATION)

@@ -57,30 +57,37 @@ UNITS: dict[str, Unit] = {
     "V": Unit(Dimension.VOLTAGE, 1_000),
 }
 
-#: The unit in which a person reads a canonical value of each dimension, largest that divides it first.
+#: The units in which a person reads a canonical value of each dimension, largest first.
 DISPLAY: dict[Dimension, tuple[str, ...]] = {
-    Dimension.LENGTH: ("m", "cm", "mm"),
-    Dimension.ALTITUDE: ("m", "cm", "mm"),
-    Dimension.SPEED: ("m/s", "cm/s", "mm/s"),
+    Dimension.LENGTH: ("m", "mm"),
+    Dimension.ALTITUDE: ("m", "mm"),
+    Dimension.SPEED: ("m/s", "mm/s"),
     Dimension.DURATION: ("min", "s", "ms", "us"),
     Dimension.ANGLE: ("deg",),
     Dimension.RATIO: ("%",),
     Dimension.VOLTAGE: ("V", "mV"),
 }
+#: the least of a unit that is written with decimals, in tenths; else it is one whole
+_LEAST_TENTHS: dict[str, int] = {"m": 1, "m/s": 1}
 
 
 def display(value: int, dimension: Dimension) -> str:
-    """A canonical value as a person writes it, exactly: `20000` of LENGTH is `20 m`, `2550` of RATIO is `25.5 %`."""
+    """A canonical value as a person writes it, exactly: `20000` of LENGTH is `20 m`, 1500 `1.5 m`, 20 `20 mm`; 2550 of
+    RATIO is `25.5 %`.
+    """
     names = DISPLAY.get(dimension)
     if names is None:
         return str(value)
-    for name in names:
+    for name in names[:-1]:
         unit = UNITS[name]
         scaled = value * unit.denominator
-        if scaled % unit.numerator == 0:
+        if scaled % unit.numerator == 0 and (value or name != "min"):
             return f"{scaled // unit.numerator} {name}"
-    name = "s" if dimension is Dimension.DURATION else names[0]
-    return f"{_decimal(value, UNITS[name].numerator)} {name}"
+        decimal = str(unit.numerator).strip("0") == "1"  # so seconds have exact decimals, and minutes none
+        if decimal and 10 * abs(scaled) >= _LEAST_TENTHS.get(name, 10) * unit.numerator:
+            return f"{_decimal(scaled, unit.numerator)} {name}"
+    unit = UNITS[names[-1]]
+    return f"{_decimal(value * unit.denominator, unit.numerator)} {names[-1]}"
 
 
 def _decimal(value: int, denominator: int) -> str:

@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import msgspec
 
+from rtshcua.adapters.utc import CLOCK
 from rtshcua.cli.showing import words
 from rtshcua.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.cli.showing.document import recorded
@@ -15,6 +16,7 @@ from rtshcua.cli.showing.people import NOBODY, People
 from rtshcua.cli.shown import many, true_to, utc
 from rtshcua.evidence.chain import BOUNDARY
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.gaps import STALLED
 from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
@@ -30,6 +32,9 @@ DOCUMENTS = ("approval", "recall", "replacement", "cancellation")
 
 #: the target in the detail of what was obeyed: 1e-7 degree, and mm above the sea
 _TARGET = re.compile(r"(-?\d{1,10}) (-?\d{1,10}) (-?\d{1,10})", re.ASCII)
+#: effects whose detail has times in us, as a verifier reads them
+_TIMED = frozenset({STALLED, CLOCK, "clock-stepped"})
+_US = re.compile(r"([+-]?)(\d{1,18}) us\b", re.ASCII)
 _KINDS = {STEP: "step", FALLBACK_LINK: "fallback of step", CONTINGENCY_LINK: "contingency"}
 
 
@@ -65,7 +70,9 @@ def detail_of(event: str, detail: str, people: People = NOBODY) -> str:
         return f"it flies to {latitude / 1e7:.7f}, {longitude / 1e7:.7f}, {up / 1_000:.1f} m above the sea"
     if event == BOUNDARY:
         return _stated(detail)
-    return f"the same answer again, {detail} times" if event == "repeated" else detail
+    if event in _TIMED:
+        return _US.sub(lambda found: found[1] + words.duration(int(found[2])), detail)
+    return f"the same decision {detail} more times" if event == "repeated" else detail
 
 
 def _stated(detail: str) -> str:

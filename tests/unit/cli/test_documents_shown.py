@@ -15,7 +15,7 @@ from rtshcua.cli.app import main
 from rtshcua.cli.live.lines import ending
 from rtshcua.cli.live.story import Summary
 from rtshcua.cli.live.telling import NOTHING_FLIES, Teller
-from rtshcua.cli.showing.log import Names
+from rtshcua.cli.showing.log import Names, detail_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
@@ -275,7 +275,7 @@ def test_a_number_in_a_log_says_what_it_counts(tmp_path: Path, capsys: pytest.Ca
     path = tmp_path / "log.jsonl"
     path.write_bytes(b"".join(run.lines))
     assert main(["show", str(path)]) == ExitCode.OK
-    assert f"the same answer again, {count} times" in capsys.readouterr().out
+    assert f"the same decision {count} more times" in capsys.readouterr().out
     assert main(["why", str(path)]) == ExitCode.OK
     assert " us " not in capsys.readouterr().out
 
@@ -294,3 +294,10 @@ def test_one_record_of_a_decision_names_who_answered(broken_off: Path, capsys: p
     decided = next(each["seq"] for each in records if each["type"] == "decision" and each["context"]["approvals"])
     main(["verify-log", str(broken_off), "--root", ROOT_KEY.public.hex(), "--explain", str(decided)])
     assert "granted by ada" in " ".join(capsys.readouterr().out.split())
+
+
+def test_times_in_a_log_are_read_in_units_that_people_use() -> None:
+    assert detail_of("stalled", "22223836 us") == "22.223836 s"
+    assert detail_of("clock", "kernel: UTC is true to 100000 us") == "kernel: UTC is true to 100 ms"
+    assert detail_of("clock-stepped", "+1500000 us") == "+1.5 s"
+    assert detail_of("noted", "22223836 us") == "22223836 us", "what others wrote is left as it is"

@@ -15,9 +15,10 @@ from virtual.rows import rows
 def test_it_says_how_long_it_was_and_who_vouches_for_it(gap: Gap, words: str) -> None:
     claim = told(gap)
     assert claim.slug == "gap"
-    assert claim.text.startswith("what happened in a gap of 127.5 s before record 7: nothing was recorded; ")
+    assert claim.text.startswith("what happened in a gap of 127.56 s before record 7: nothing was recorded; ")
     assert words in claim.text
 
 
-def test_seconds_are_never_rounded_up() -> None:
-    assert [seconds(us) for us in (0, 99_999, 20_000_001, 60_999_999)] == ["0.0 s", "0.0 s", "20.0 s", "60.9 s"]
+def test_a_time_is_never_rounded() -> None:
+    told = ["0 s", "99.999 ms", "20.000001 s", "60.999999 s"]
+    assert [seconds(us) for us in (0, 99_999, 20_000_001, 60_999_999)] == told

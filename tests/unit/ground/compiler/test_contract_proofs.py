@@ -186,9 +186,9 @@ def test_what_takes_longer_to_observe_than_the_flight_lasts_is_never_known(windo
     ("to", "message"),
     [
         ("45 m", []),
-        ("45001 mm", ["`rise` lasts at most 37500 ms, and the step takes up to 1 ms longer"]),
-        ("45600 mm", ["`rise` lasts at most 37500 ms, and the step takes up to 400 ms longer"]),
-        ("50 m", ["the step takes up to 41 s, and `rise` lasts at most 37500 ms"]),
+        ("45001 mm", ["`rise` lasts at most 37.5 s, and the step takes up to 1 ms longer"]),
+        ("45600 mm", ["`rise` lasts at most 37.5 s, and the step takes up to 400 ms longer"]),
+        ("50 m", ["the step takes up to 41 s, and `rise` lasts at most 37.5 s"]),
     ],
 )
 def test_by_how_much_a_plan_takes_too_long(to: str, message: list[str]) -> None:

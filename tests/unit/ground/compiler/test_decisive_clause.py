@@ -42,7 +42,7 @@ def test_what_forbids_in_every_state_is_told_before_what_does_in_some(forbid: st
     ("when", "expected", "help"),
     [
         ("altitude > 19 m", "E0719", "nearest accepted: `altitude = 19 m`"),
-        ("battery < 20 % or altitude in 15 m .. 30 m", "E0719", "nearest accepted: `altitude = 14999 mm`"),
+        ("battery < 20 % or altitude in 15 m .. 30 m", "E0719", "nearest accepted: `altitude = 14.999 m`"),
         ("battery <= 100 %", "E0719", "narrow the condition of the rule, or leave the step out"),
         ("battery < 30 % or battery > 20 %", "", None),  # atoms that share a signal are looked at one by one
         ("battery < 30 %", "", None),

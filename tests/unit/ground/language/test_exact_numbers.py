@@ -96,3 +96,20 @@ def test_literals(text: str, value: int, dimension: Dimension, datum: Datum | No
 @given(st.integers(0, 10**9), st.sampled_from(["mm", "cm", "m", "ms", "s", "min", "%", "m/s"]))
 def test_a_literal_is_read_as_written(number: int, unit: str) -> None:
     assert quantity(f"{number:_} {unit}").value == number * UNITS[unit].numerator
+
+
+def test_a_value_is_shown_in_the_unit_that_a_person_would_write() -> None:
+    """Not 150 cm/s for 1.5 m/s, 2 cm for 20 mm, or 37500 ms for 37.5 s."""
+    shown = {
+        (20_000, Dimension.LENGTH): "20 m",
+        (20, Dimension.LENGTH): "20 mm",
+        (500, Dimension.LENGTH): "0.5 m",
+        (1_500, Dimension.SPEED): "1.5 m/s",
+        (14_800, Dimension.VOLTAGE): "14.8 V",
+        (22_223_836, Dimension.DURATION): "22.223836 s",
+        (500_000, Dimension.DURATION): "500 ms",
+        (90_000_000, Dimension.DURATION): "90 s",
+        (120_000_000, Dimension.DURATION): "2 min",
+        (0, Dimension.DURATION): "0 s",
+    }
+    assert {key: display(*key) for key in shown} == shown

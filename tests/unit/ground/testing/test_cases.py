@@ -138,7 +138,7 @@ def unmet(expectation: str, *given: str) -> Ran:
             "given wind.speed = 11 m/s",
             "the reason `timing/no-slack` is expected, and it is `state/violated`; "
             "`battery > 35 %` is expected to decide, and `wind.speed < 10 m/s` does",
-            "it would have passed with `wind.speed = 9999 mm/s`",
+            "it would have passed with `wind.speed = 9.999 m/s`",
         ),
         (
             "expect allow",

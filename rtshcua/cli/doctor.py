@@ -46,6 +46,7 @@ from rtshcua.cli.meeting import unmet, unopened
 from rtshcua.cli.opening import too_old
 from rtshcua.cli.qualified import record_of
 from rtshcua.cli.refused import Refused
+from rtshcua.cli.shown import many
 from rtshcua.cli.signing import Signing
 from rtshcua.cli.sources import compile_sources
 from rtshcua.cli.stdout import out, out_json
@@ -190,7 +191,7 @@ def _boundary(mode: Mode, socket: Path | None = None) -> list[VehicleFinding]:
     for measure, text in MISSING.items():
         if measure not in here:
             name = f"boundary/{str(measure.name).lower().replace('_', '-')}"
-            found.append(VehicleFinding(name, MissionVerdict.WARN, f"that process would be without {text}"))
+            found.append(VehicleFinding(name, MissionVerdict.WARN, f"the boundary process would run without {text}"))
     return found
 
 
@@ -316,8 +317,8 @@ def _print(findings: Sequence[VehicleFinding]) -> None:
                 out(f"{'':<5} {'':<{width}}  {label}: {text}")
     stops = sum(each.verdict is MissionVerdict.STOP for each in findings)
     warns = sum(each.verdict is MissionVerdict.WARN for each in findings)
-    end = f"{stops} would stop a mission" if stops else "nothing would stop a mission"
+    end = f"{many(stops, 'problem')} would stop a mission" if stops else "no problem would stop a mission"
     unknown = sum(each.verdict is MissionVerdict.UNKNOWN for each in findings)
     if unknown and not stops:
-        end = "nothing that was learned would stop a mission"
-    out(f"{end}; {warns} to know of" + (f"; {unknown} that it did not say" if unknown else ""))
+        end = "no problem was found that would stop a mission"
+    out(f"{end}; {many(warns, 'warning')}" + (f"; {many(unknown, 'check')} without an answer" if unknown else ""))

@@ -153,8 +153,8 @@ def give_back(state: Path, loaded: Loaded, flight: Flight, now: Now) -> str | No
     try:
         FileReplayStore(state, loaded.vehicle).give_back(loaded.bundle.mission_digest)
     except OSError as error:
-        return f"nothing was sent, but the bundle counts as flown: {error.strerror or error}"
+        return f"no command was sent, but the bundle counts as flown: {error.strerror or error}"
     late = expired(loaded, now)
     if late is not None:
-        return f"nothing was sent, and {late.text}; {late.help}"
-    return "nothing was sent: the bundle may be handed in again"
+        return f"no command was sent, and {late.text}; {late.help}"
+    return "no command was sent: the bundle can be run again"

@@ -148,8 +148,11 @@ def _by_hand(
     context = Context(flat.binding, vehicle, policy.policy.version, 0, 0, flat.phase, CONSERVATIVE_US, answers)
     case = Case(invocation, situation, context, now, subject.phases)
     shown = show_why(page, trace(invocation, situation, policy, context, now), case)
-    page.head("Taken for granted")
-    page.row("state", "as the contract wants it, the vehicle where the plan has it, but for --state; and so for long")
+    page.head("Assumed")
+    page.row(
+        "state",
+        "the contract's conditions hold, for long enough; the vehicle is where the plan has it; --state overrides",
+    )
     page.row("time", f"{utc(utc_us)}, {waited_ms} ms after the release")
     if answers:
         roles = dict.fromkeys(policy.policy.roles[each.role] for each in answers)

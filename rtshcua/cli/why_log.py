@@ -208,7 +208,12 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
     answers = [told for step, told in log.answers if isinstance(chosen, Decision) and step == chosen.step]
     _list(page, "What was answered about this step", answers, log.start_us)
     _list(page, "When the computer stood still: nothing was read, judged or sent", log.stalls, log.start_us)
-    _list(page, "How it ended: what turned it homeward, and what was then decided", log.ended[-_MOST:], log.start_us)
+    _list(
+        page,
+        "How it ended: what ended the mission early, if anything, and the decisions after it",
+        log.ended[-_MOST:],
+        log.start_us,
+    )
     return shown | {
         "record": chosen.seq,
         "cause": None if cause is None else cause._asdict(),

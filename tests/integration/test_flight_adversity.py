@@ -82,7 +82,7 @@ def test_a_low_battery_on_the_ground_is_refused_and_the_bundle_is_not_used_up(gr
     assert run.code == 5
     closed(run, "refused")
     assert run.dispatched() == []
-    assert "nothing was sent: the bundle may be handed in again" in [e.get("text") for e in run.events]
+    assert "no command was sent: the bundle can be run again" in [e.get("text") for e in run.events]
     charged = ground.run(bundle)
     charged.until("dispatched", step=0)
     charged.signal(signal.SIGINT)

@@ -265,7 +265,7 @@ def _streams(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
     if plan.shortfall is not None:
         advice = "a faster link, or longer deadlines and times to stale in the policy"
         return VehicleFinding(slug, STOP, plan.shortfall, "room for what is needed", advice)
-    asked = f"{plan.octets} octets a second asked for{of}"
+    asked = f"{plan.octets} bytes/s requested{of}"
     if requests.measured is None:
         return VehicleFinding(slug, UNKNOWN, f"{asked}; not measured in this time", "", "listen longer (`--seconds`)")
     octets, came = requests.measured
@@ -274,8 +274,8 @@ def _streams(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
         for name in requests.slow
         if name in came
     ]
-    found = f"{asked}, {octets} came in all" + (f"; {', '.join(slow)}" if slow else "")
-    return _graded(slug, found, "what is asked for", _FASTER[flavour], warns=bool(slow))
+    found = f"{asked}, {octets} bytes/s received in all" + (f"; {', '.join(slow)}" if slow else "")
+    return _graded(slug, found, "what is requested", _FASTER[flavour], warns=bool(slow))
 
 
 # ---------------------------------------------------------------- the autopilot
@@ -355,7 +355,7 @@ def _readiness(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFind
     yield _battery(vehicle, policy)
     yield from _cells(vehicle, policy)
     for text in vehicle.texts:
-        yield VehicleFinding("vehicle/said", OK, f"it said, for what that is worth: {text}")
+        yield VehicleFinding("vehicle/said", OK, f"its own message: {text}")
 
 
 def _fix(vehicle: ExaminingDriver) -> VehicleFinding:
@@ -384,9 +384,9 @@ def settling(vehicle: ExaminingDriver) -> str | None:
 def settled(what: str, seconds: int, still: str | None) -> VehicleFinding:
     """That it was waited for, and for how long."""
     if still is None:
-        found = f"it had to settle: {seconds} s were waited for {what}"
+        found = f"waited {seconds} s for {what}"
         return VehicleFinding("sensor/settled", OK, found)
-    found = f"{seconds} s were waited for {still}, which did not come"
+    found = f"waited {seconds} s for {still}, which did not come"
     return VehicleFinding("sensor/settled", WARN, found, "a settled vehicle", "give it a clear sky, and ask again")
 
 

@@ -44,7 +44,10 @@ def fence_of(policy: Policy, habits: FenceHabits) -> Fence:
     kept = [zone for zone in inside if _can_include(zone, habits, left_out)]
     if not habits.all_inclusions and len(kept) > 1:
         kept.sort(key=_size)
-        left_out += [f"`{zone.name}`: this autopilot joins inclusions instead of intersecting" for zone in kept[1:]]
+        left_out += [
+            f"`{zone.name}`, because this autopilot joins inclusion zones instead of intersecting them"
+            for zone in kept[1:]
+        ]
         del kept[1:]
     items = [item for zone in kept for item in _items(zone, policy.projection, inside=True)]
     for zone in (policy.zones[number] for number in airspace.outside):
@@ -55,21 +58,19 @@ def fence_of(policy: Policy, habits: FenceHabits) -> Fence:
 
 def _can_include(zone: Zone, habits: FenceHabits, left_out: list[str]) -> bool:
     if zone.floor > 0 or zone.ceiling < HIGHEST:
-        left_out.append(f"`{zone.name}`: its heights")
+        left_out.append(f"the heights of `{zone.name}`")
     if timed(zone):
-        left_out.append(f"`{zone.name}`: its times")
+        left_out.append(f"the times of `{zone.name}`")
     parts = sum(_is_outer(ring) for ring in _rings(zone))
     if parts > 1 and habits.all_inclusions:
-        left_out.append(
-            f"`{zone.name}`: it has {parts} parts, and this autopilot would want the vehicle in all of them"
-        )
+        left_out.append(f"`{zone.name}`, whose {parts} parts this autopilot would require all at once")
         return False
     return True
 
 
 def _can_exclude(zone: Zone, left_out: list[str]) -> bool:
     for there, what in (
-        (zone.floor > 0 or zone.ceiling < HIGHEST, "one may fly above or below it"),
+        (zone.floor > 0 or zone.ceiling < HIGHEST, "flying above or below it is allowed"),
         (timed(zone), "it is not always there"),
         (not all(map(_is_outer, _rings(zone))), "it has holes"),
     ):
@@ -301,7 +302,7 @@ class Fencing:
             return "it takes no fence: the policy's airspace is watched by this program alone"
         left_out = "; ".join(fence.left_out)
         if not fence.items:
-            return f"no fence was set, for none can say this airspace: {left_out}"
+            return f"no fence was set, because this autopilot cannot represent the airspace: {left_out}"
         many = f"{len(fence.items)} item{'' if len(fence.items) == 1 else 's'}"
         changes = [
             f"`{name}` from {before:g} to {after:g}"
@@ -311,7 +312,7 @@ class Fencing:
         text = f"its fence was set to the policy's airspace ({many}), and read back"
         if changes:
             text = f"{text}; switched on with {' and '.join(changes)}, which stays so"
-        return f"{text}; not in it: {left_out}" if left_out else text
+        return f"{text}; the fence leaves out: {left_out}" if left_out else text
 
     @property
     def _state(self) -> UploadState | None:

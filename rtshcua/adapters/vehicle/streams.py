@@ -270,7 +270,7 @@ class StreamRequests:
         capacity = self.plan.capacity
         of = "" if capacity is None else f" of {capacity} that the link carries"
         slow = f"; too seldom: {', '.join(self.slow)}" if self._slow else ""
-        return f"streams: {self.plan.octets} octets a second asked for{of}, {octets} came in all{slow}"
+        return f"streams: {self.plan.octets} bytes/s requested{of}, {octets} bytes/s received in all{slow}"
 
     def _make_room(self, octets: int) -> None:
         """Turn off what was not asked for, if it takes the room of what was."""

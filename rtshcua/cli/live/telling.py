@@ -30,7 +30,7 @@ from rtshcua.wire.untrusted import Untrusted
 #: the effect that puts another mission into force
 REPLACED = "replacement"
 #: what flies instead of a step that is not admitted before anything flew
-NOTHING_FLIES = "nothing: it has not left the ground, and nothing is sent"
+NOTHING_FLIES = "no command is sent, because the vehicle is on the ground"
 #: what the boundary makes of what was told anyway
 _UNTOLD = frozenset({BOUNDARY, PERMITTED})
 _OUTCOMES = ("allow", "deny", "defer", "fallback")

@@ -135,12 +135,12 @@ def _fact(number: str, case: Case) -> str:
         case "4":
             during = ", ".join(name for at, name in enumerate(case.phases) if flat.phases >> at & 1)
             current = case.phases[context.phase] if 0 <= context.phase < len(case.phases) else "none yet"
-            return f"in phase {current}, means something during {during}"
+            return f"in phase {current}, and the step is valid in: {during}"
         case "5":
             waited = _milliseconds(max(now.monotonic_us - context.released_us, 0))
             return (
                 f"released {waited} ago, deadline {words.duration(contract.deadline_us)}, "
-                f"at most {_milliseconds(context.remaining_us)} still needed until it is sent"
+                f"sent at most {_milliseconds(context.remaining_us)} from now"
             )
         case _:
             return ""

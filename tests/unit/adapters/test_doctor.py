@@ -88,7 +88,7 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
     assert found["autopilot/version"].verdict is MissionVerdict.OK
     assert found["link/answers"].verdict is found["link/round-trip"].verdict is MissionVerdict.OK
     assert found["link/streams"].verdict is MissionVerdict.OK
-    assert "octets a second asked for" in found["link/streams"].found
+    assert "bytes/s requested" in found["link/streams"].found
     assert found["link/round-trip"].found == "0 ms there and back; its clock is known to 3 ms"
     assert found["signal/battery"].found.startswith("`battery`: BATTERY_STATUS every ")
     assert {slug for slug in found if slug.startswith("settings/")} >= {
@@ -339,7 +339,7 @@ def test_what_settles_by_itself_is_named_until_it_has() -> None:
     examine(case.simulated("ardupilot", boot=Boot.RECORDED), prepare=watched, seconds=60)
     assert any(each is not None and "fix" in each for each in seen)
     assert seen[-1] is None
-    assert settled("a 3D fix", 12, None).found == "it had to settle: 12 s were waited for a 3D fix"
+    assert settled("a 3D fix", 12, None).found == "waited 12 s for a 3D fix"
     assert settled("a 3D fix", 60, "a 3D fix").verdict is MissionVerdict.WARN
 
 

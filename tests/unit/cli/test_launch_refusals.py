@@ -185,7 +185,7 @@ class Over:
 def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Path) -> None:
     opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
     told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
-    assert told == "nothing was sent: the bundle may be handed in again"
+    assert told == "no command was sent: the bundle can be run again"
     opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
     assert opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True)), START) is None
     assert opening.flown_before(tmp_path, loaded()) is not None
@@ -238,7 +238,7 @@ def test_a_bundle_that_expired_is_said_to_have_and_may_not_be_handed_in_again(tm
     assert "compile the mission again" in refusal.help
     opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
     told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), late(1))
-    assert told == f"nothing was sent, and {refusal.text}; {refusal.help}"
+    assert told == f"no command was sent, and {refusal.text}; {refusal.help}"
 
 
 def test_a_bundle_that_may_be_fresh_still_is_no_expired_one() -> None:
@@ -255,5 +255,5 @@ def test_a_disk_that_does_not_give_a_bundle_back_is_told(tmp_path: Path, monkeyp
 
     monkeypatch.setattr(FileReplayStore, "give_back", fails)
     told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
-    assert told == "nothing was sent, but the bundle counts as flown: read-only file system"
+    assert told == "no command was sent, but the bundle counts as flown: read-only file system"
     assert opening.flown_before(tmp_path, loaded()) is not None

@@ -90,7 +90,7 @@ def test_what_is_delivered_is_measured_and_told_once() -> None:
     octets, came = line.streams.measured
     assert abs(octets - line.plan.octets) < line.plan.octets // 20
     assert abs(came["GPS_RAW_INT"] - 50_000) < 2_000
-    assert line.streams.notes == [f"streams: 1890 octets a second asked for, {octets} came in all"]
+    assert line.streams.notes == [f"streams: 1890 bytes/s requested, {octets} bytes/s received in all"]
 
 
 def test_other_rates_that_are_needed_under_way_are_asked_for() -> None:

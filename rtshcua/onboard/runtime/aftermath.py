@@ -12,15 +12,17 @@ MAY_FLY: Final = "may-fly"
 _WHY: Mapping[Ending, str] = {
     Ending.STOOD_DOWN: "somebody else flies it, so this run sends nothing more and stops watching",
     Ending.LINK_LOST: "it is not heard or does not answer, so it can be neither watched nor told anything",
-    Ending.ABORTED: "the last link of the contingency was sent as often as it may be, and no landing was seen",
-    Ending.INTERRUPTED: "the operator ended this run, so nothing watches it any more",
 }
-_ENDS: Final = "this run is over, and nothing watches it any more"
+#: however the mission was given up: nothing is left that could be sent
+_TRIED: Final = (
+    "the last link of the contingency was sent as often as it may be, and no landing was seen; this run may send "
+    "nothing else, so it ends and stops watching"
+)
 OWN_FAILSAFE: Final = "its own failsafe flies it, so this run sends nothing more and stops watching"
 #: for nothing else shows who it was
 PAUSED: Final = (
-    "it stands far from its target as if somebody had paused it, so this run sends nothing more and stops watching; if "
-    "nobody did, nobody flies it: take it over"
+    "it stands far from its target as if somebody had paused it, who may fly it on at any time, so this run sends "
+    "nothing more and stops watching; if nobody did, nobody flies it: take it over"
 )
 RESTS: Final = "it says that it rests on the ground, and it obeyed a command and was not seen to land"
 
@@ -33,7 +35,7 @@ def may_fly(
     """
     if rests:
         return f"{RESTS}: approach it as one that may start"
-    why = _WHY.get(ending, _ENDS)
+    why = _WHY.get(ending, _TRIED)
     if ending is Ending.STOOD_DOWN and (failsafe or paused):
         why = OWN_FAILSAFE if failsafe else PAUSED
     return f"{last_seen}; the vehicle may be flying: {why}"

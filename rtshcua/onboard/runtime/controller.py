@@ -272,7 +272,7 @@ class MissionController:
 
     def _fall(self, now: Now) -> bool:
         if self.dispatcher.active is None and self.vehicle.at_rest:
-            self.down(now)
+            self._rests(now)
         elif not self._fallback.turn(now, self.monitor.state(now.monotonic_us)):
             if self.link.mute:  # nothing of it has arrived: it is tried until that is waited out
                 self._fallback.land()
@@ -297,7 +297,7 @@ class MissionController:
         came_down = self.vehicle.report(armed=event.armed, airborne=event.airborne, ours=ours)
         if self.stage is _DECIDING:
             if ours and self.vehicle.at_rest:
-                self.down(now)
+                self._rests(now)
             elif not ours and event.airborne:  # a flight that this run did not begin is the pilot's
                 self._journal.effect(now, "taken-over", detail="took off")
                 self.stand_down(now, Ending.STOOD_DOWN)
@@ -348,6 +348,16 @@ class MissionController:
             self.fall_back(FALLBACK_LINK)
         else:
             self._end(now, self._ending_on_ground)
+
+    def _rests(self, now: Now) -> None:
+        """The vehicle says that it rests on the ground. Where it was never seen in the air that is no landing: what it
+        obeyed may still lift it off.
+        """
+        if self.vehicle.flown:
+            self.down(now)
+        else:
+            self.dispatcher.end(now, "released")
+            self._end(now, self._cause or Ending.ABORTED)
 
     def down(self, now: Now) -> None:
         """The vehicle is on the ground again, told to or not: the flight is over, and the run with it. Nothing is sent

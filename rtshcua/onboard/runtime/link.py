@@ -145,8 +145,8 @@ class LinkSupervision:
         """This computer stood still from `before_us` to `now_us`: nothing that was known is current because of that.
 
         `takes_off` as for `lost`. What the vehicle said meanwhile may be read at once; where that is too old, fresh
-        state is awaited as after a silence. The time of the stall is none in which that was waited for, nor, but for
-        `stalled_us` of it, one in which the vehicle had a link.
+        state is awaited as after a silence. But for `stalled_us` of it, the time of the stall is none in which that was
+        waited for, nor one in which the vehicle had a link: a computer that does nothing but stall judges all the same.
         """
         self._awaited |= self._monitor.current(before_us)
         self._awaits_air = self._awaits_air or takes_off
@@ -154,7 +154,7 @@ class LinkSupervision:
         since_us = before_us + self._limits.stalled_us
         self._standing_us = since_us if self._standing_us is None else self._standing_us
         if self._first_back_us is not None:
-            self._first_back_us += now_us - before_us
+            self._first_back_us += now_us - since_us
         if not self.down:
             self._await(now_us)
         self._count_away(since_us)

@@ -4,18 +4,22 @@ from collections.abc import Callable
 
 import pytest
 
-from reference.flat_case import WIND, M, S
+from reference.flat_case import OBSTACLE, WIND, M, S
 from reference.world import FakeVehicle, Run, loaded
 from rtshcua.onboard.ports import (
+    PAUSED,
     AirState,
     Answering,
     Crashed,
     Ending,
+    Event,
+    EvidenceFailed,
     Failed,
     Interrupted,
     LinkLost,
     Noted,
     Obeyed,
+    Succeeded,
     TakenOver,
     Unfit,
 )
@@ -76,6 +80,49 @@ ENDS: dict[str, tuple[Way, Ending, str]] = {
     "no answers": (mute, Ending.LINK_LOST, "does not answer"),
     "no link left": (stranded, Ending.ABORTED, "no landing was seen"),
 }
+
+
+#: what gives a mission up before no link is left
+GIVEN_UP: dict[str, Callable[[Run], object]] = {
+    "interrupted": lambda run: run.tick(Interrupted(0)),
+    "no records": lambda run: run.tick(EvidenceFailed(0, "the disk is full")),
+    "left": lambda run: run.runtime.leave(),
+}
+
+
+@pytest.mark.parametrize("name", GIVEN_UP)
+def test_however_a_mission_was_given_up_the_links_that_failed_are_why_nothing_watches(name: str) -> None:
+    """That somebody had ended it before is no reason."""
+    run = flying()
+    run.vehicle.fails = {"hover", "return_home", "emergency_land"}
+    GIVEN_UP[name](run)
+    over(run)
+    assert "the vehicle may be flying: the last link of the contingency was sent as often" in run.runtime.may_fly
+    assert "so it ends and stops watching" in run.runtime.may_fly
+
+
+def test_a_standstill_says_why_it_is_watched_no_longer_and_what_to_do() -> None:
+    run = flying()
+    run.tick(TakenOver(0, PAUSED))
+    assert "who may fly it on at any time" in run.runtime.may_fly
+    assert run.runtime.may_fly.endswith("if nobody did, nobody flies it: take it over")
+
+
+@pytest.mark.parametrize("way", [Interrupted(0), EvidenceFailed(0, "the disk is full"), None])
+def test_what_obeyed_and_never_flew_is_not_said_to_have_landed(way: Event | None) -> None:
+    """It says all the while that it rests, and obeyed a takeoff: the landing that was sent failed."""
+    run = start(vehicle=FakeVehicle(deaf={"takeoff"}, fails={"emergency_land"})).until_flies("takeoff")
+    token = run.vehicle.commands[-1].token
+    run.tick(Obeyed(0, token))
+    run.tick(AirState(0, armed=False, airborne=False))
+    if way is not None:
+        run.tick(way)
+    else:  # it takes the climb for done, and then waits for its next step
+        run.vehicle.values[OBSTACLE] = None
+        run.tick(Succeeded(0, token), AirState(0, armed=False, airborne=False))
+    over(run)
+    assert "approach it as one that may start" in run.runtime.may_fly
+    assert MAY_FLY in run.events
 
 
 @pytest.mark.parametrize("name", ENDS)

@@ -143,17 +143,19 @@ def test_what_does_not_come_is_waited_for_no_longer_than_after_a_silence() -> No
     assert run.clock.now().monotonic_us - resumed_us > Limits().fresh_us + CONTRACTS[INSPECT].grace_us
 
 
-def test_one_stall_after_the_other_puts_judging_off_for_a_bounded_time_awake() -> None:
+@rows("awake_s", (0, 1))
+def test_one_stall_after_the_other_puts_judging_off_for_a_bounded_number_of_times(awake_s: int) -> None:
+    """Also where it does nothing but stall."""
     run = running()
-    run.vehicle.values[FIX] = None
-    awake_us = 0
+    run.vehicle.values[POSITION_X] = None
+    stalls = 0
     while "not-fresh" not in run.events:
-        stand_still(run, 2 * S)
-        for _ in range(1 * S // TICK):
+        stand_still(run, 4 * S)
+        stalls += 1
+        for _ in range(awake_s * S // TICK):
             run.tick()
-            awake_us += TICK
-        assert awake_us < 2 * Limits().flapping_us
-    assert awake_us >= Limits().flapping_us - S
+        assert stalls <= 1 + Limits().flapping_us // Limits().stalled_us
+    assert stalls > 1 + Limits().flapping_us // (Limits().stalled_us * (2 + awake_s))
 
 
 def test_a_stall_takes_none_of_a_skills_own_time() -> None:

@@ -241,7 +241,7 @@ def _launch(order: Launch) -> ExitCode:
             _expect_kept(signing, resumed=resumed)
             _expect_link_key(signing, root, resumed=resumed)
             _expect_all(absent, keyless, resumed=resumed)
-            inside = BoundarySession(BoundaryStore(order.state, loaded.vehicle), own_key, aloft=resumed)
+            inside = BoundarySession(BoundaryStore(_left_in(order), loaded.vehicle), own_key, aloft=resumed)
             told = trust.settle(resumed=resumed)
             run, moved = _run_folder(order, loaded, bundle, clock, resumed=resumed)
             feed = view.enter_context(Feed(order.style))
@@ -258,7 +258,7 @@ def _launch(order: Launch) -> ExitCode:
                 flight.settle()
                 raise refusal
             if not resumed:
-                mark_opened(order.state, loaded, clock, flight)
+                mark_opened(_left_in(order), loaded, clock, flight)
             unsure = _utc_notes(utc, apart, listens=order.boundary_socket is not None)
             unsigned = str(keyless) if keyless is not None else UNNAMED if own_key is None else ""
             alone = "" if absent is None else f"{_why(absent)}; it is brought down without a boundary of its own"
@@ -271,7 +271,7 @@ def _launch(order: Launch) -> ExitCode:
             code, summary = flight.fly()
             if order.sortie is not None:
                 order.sortie.after(vehicle, clock, interrupts, Ending(summary.ending), flight.final_hash)
-            if not resumed and (kept := give_back(order.state, loaded, flight, clock.now())) is not None:
+            if not resumed and (kept := give_back(_left_in(order), loaded, flight, clock.now())) is not None:
                 feed.post(Note(kept))
             if order.incidents is not None:
                 with open_regular(run.path / LOG) as log:
@@ -308,7 +308,9 @@ class _Begun(NamedTuple):
 
 
 def _left_in(order: Launch) -> Path:
-    """Where it is kept what the flight before left of this vehicle, or of the simulated one that a run starts."""
+    """Where it is kept what flew, and what the flight before left, of this vehicle or of the simulated one that a run
+    starts: neither uses up a bundle of the other.
+    """
     return order.state / SIMULATED if order.link is None else order.state
 
 
@@ -503,7 +505,7 @@ def _opened(
     the vehicle: then nothing flies, but that is put back first. Raises `Refused` where nothing is.
     """
     try:
-        resumed = broke_off(order.state, loaded, vehicle, clock, events)
+        resumed = broke_off(_left_in(order), loaded, vehicle, clock, events)
         if not resumed:
             _expect_fresh(loaded, clock)
         return resumed, None
@@ -618,7 +620,7 @@ def _broken_off(
     data = read_regular(past.broken_off / BUNDLE, MAX_BUNDLE)
     trusted, _, loaded = _trusting(replace(order, wait_s=None), data, clock, base.in_force.flight)
     landed = clock.now().utc_us > loaded.expires_us + loaded.bundle.policy.vehicle.endurance_us
-    return None if landed or not_opened(order.state, loaded) is None else (Admitted(data, loaded), trusted)
+    return None if landed or not_opened(_left_in(order), loaded) is None else (Admitted(data, loaded), trusted)
 
 
 def _admit(
@@ -644,7 +646,7 @@ def _admit(
         _expect_fresh(loaded, clock)
     except Refused as refused:
         return Refusal(refused.slug, str(refused), refused.help or "")
-    refusal = not_opened(order.state, loaded)
+    refusal = not_opened(_left_in(order), loaded)
     return refusal or (loaded if apart is None else apart.admit(data, clock.now()))
 
 
@@ -771,7 +773,7 @@ def _may_have_flown(order: Launch, loaded: Loaded) -> bool:
     if order.wait_s is not None:
         return True  # another bundle than this one, which is known once the vehicle is met (`_broken_off`)
     try:
-        return flown_before(order.state, loaded) is not None
+        return flown_before(_left_in(order), loaded) is not None
     except OSError:
         return True
 
@@ -850,7 +852,7 @@ def _expect_fresh_at_first(order: Launch, loaded: Loaded, clock: LinkClock, *, o
 def _not_begun(order: Launch, loaded: Loaded, clock: LinkClock) -> str | None:
     """Why a flight of the bundle would not begin, in words."""
     late = expired(loaded, clock.now())
-    return flown_before(order.state, loaded) or (None if late is None else f"{late.text}; {late.help}")
+    return flown_before(_left_in(order), loaded) or (None if late is None else f"{late.text}; {late.help}")
 
 
 def _expect_fresh(loaded: Loaded, clock: LinkClock) -> None:

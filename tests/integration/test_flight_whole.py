@@ -189,6 +189,9 @@ def test_bundle_flies_once(watched: Flown) -> None:
     assert (said["event"], said["slug"], said["exit_code"]) == ("refused", "replayed", 5)
     assert said["help"] == "compile the mission again, which issues it anew"
     assert len(list((watched.ground.folder / "runs").iterdir())) == 1
+    state = watched.ground.store.folder.parent / "state"
+    assert (state / "simulated" / "replay").is_dir()
+    assert not (state / "replay").exists(), "the real vehicle may still fly it"
 
 
 def test_bundle_flies_again_with_fresh_state_and_a_pipe_gets_plain_lines(watched: Flown, tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.preparation import Owed
 
 LATER = 1 << 52  # us
+START_CLOCK: Any = SimpleNamespace(now=lambda: START)
 
 
 def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
@@ -155,6 +156,23 @@ def test_a_bundle_is_marked_once_and_of_two_runs_at_a_time_one_flies(tmp_path: P
         opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", second))
     assert second.refused, "and its log is closed"
     assert opening.flown_before(tmp_path, loaded()) is not None
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_a_simulated_flight_and_a_real_one_use_up_no_bundle_of_each_other(tmp_path: Path, own: bool) -> None:
+    """Nor does the policy that flew on the one forbid an older one on the other."""
+    orders: list[Any] = [
+        SimpleNamespace(state=tmp_path, link=link, wait_s=None) for link in (None, "udpin:127.0.0.1:1")
+    ]
+    flew, other = orders if own else reversed(orders)
+    of = loaded()
+    opening.mark_opened(launch._left_in(flew), of, SystemClock(), cast("Any", Grounded()))
+    assert "a bundle flies once" in (launch._not_begun(flew, of, START_CLOCK) or "")
+    assert launch._not_begun(other, of, START_CLOCK) is None
+    assert (launch._may_have_flown(flew, of), launch._may_have_flown(other, of)) == (True, False)
+    older = FileReplayStore(launch._left_in(flew), VEHICLE)
+    older.open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
+    assert launch._not_begun(other, of, START_CLOCK) is None
 
 
 def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -> None:

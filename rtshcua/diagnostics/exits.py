@@ -41,7 +41,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = (
         130,
         "interrupted",
-        "stopped by Ctrl-C, or ended by the signal itself (-2). A flight closes its log first; "
+        "stopped by Ctrl-C, or ended by the signal itself (-2); a flight closes its log first, "
         "`witness --watch` and `--connect` end with 0",
     )
 

@@ -41,8 +41,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = (
         130,
         "interrupted",
-        "stopped by Ctrl-C, or ended by the signal itself (-2); a flight closes its log first, "
-        "`witness --watch` and `--connect` end with 0",
+        "stopped by Ctrl-C, or by the signal itself (-2); a flight closes its log first; a waiting witness ends with 0",
     )
 
     def __new__(cls, value: int, slug: str, meaning: str) -> "ExitCode":

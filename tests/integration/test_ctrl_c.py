@@ -48,7 +48,7 @@ def until(found: Callable[[], bool], process: subprocess.Popen[str]) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the moment is read from /proc")
 def test_a_command_that_starts_or_works_is_ended_by_the_signal_and_says_nothing() -> None:
-    words = [sys.executable, "-m", "rtshcua.cli.entry_point", "check", str(library.root() / "missions/short.rts")]
+    words = [sys.executable, "-m", "rtshcua", "check", str(library.root() / "missions/short.rts")]
     found: dict[float, tuple[int, str, str]] = {}
     for moment_s in MOMENTS_S:
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -103,7 +103,7 @@ def test_a_command_that_goes_on_and_on_ends_in_order_and_without_a_traceback(wor
         "RTSHCUA_DATA_DIR": str(tmp_path / "data"),
         "RTSHCUA_STATE_DIR": str(tmp_path / "state"),
     }
-    door = [sys.executable, "-m", "rtshcua.cli.entry_point"]
+    door = [sys.executable, "-m", "rtshcua"]
     subprocess.run([*door, "keys", "init"], env=environment, check=True, capture_output=True)
     names = {"MISSION": str(library.root() / "missions/short.rts"), "LOGS": str(tmp_path / "logs")}
     command = [*door, *(names.get(word, word) for word in words.split())]

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.store.laying import lay
+from rtshcua.adapters.store.laying import Taken, lay
 from rtshcua.cli.faults import fail, words_of
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.diagnostics.exits import ExitCode
@@ -77,15 +77,19 @@ def init(
     except OSError as error:  # whatever it is: what was asked for is there to be written
         return fail(ExitCode.FULL, f"cannot write to `{directory}`: {words_of(error)}")
     if taken is not None:
-        there = ", ".join(f"`{path}`" for path in taken.paths)
-        if taken.replaceable:
-            help = "--keep keeps these and makes the rest, --force replaces just these; or choose an empty folder"
-            return fail(ExitCode.INPUT, f"nothing was made, for these are there: {there}", help, slug="exists")
-        return fail(
-            ExitCode.INPUT, f"nothing was made, for a file or a folder is in the way: {there}", slug="in-the-way"
-        )
+        return _is_there(taken)
     _tell(directory, chosen, [*made], kept, None if name is not None else _renamed(directory, chosen), as_json)
     return ExitCode.OK
+
+
+def _is_there(taken: Taken) -> ExitCode:
+    """Files of the same names are there, or what is no file."""
+    there = ", ".join(f"`{path}`" for path in taken.paths)
+    if not taken.replaceable:
+        text = f"nothing was made, for a file or a folder is in the way: {there}"
+        return fail(ExitCode.INPUT, text, slug="in-the-way")
+    help = "--keep keeps these and makes the rest, --force replaces just these; or choose an empty folder"
+    return fail(ExitCode.INPUT, f"nothing was made, for these are there: {there}", help, slug="exists")
 
 
 def project(name: str) -> dict[str, bytes]:

@@ -325,11 +325,7 @@ class MissionController:
         """A command was refused, its effect did not come, or it was not sent."""
         if self.dispatcher.flying(event.token) is None:
             return
-        text = LATE if event.reason in _LATE and not event.text else event.text
-        detail = f"{event.reason}: {text}" if text else event.reason
-        if self.link.down:
-            detail += "; the link is silent: what the vehicle does is not known"
-        self.dispatcher.end(now, "failed", detail)
+        self.dispatcher.end(now, "failed", self._why_failed(event))
         if self.stage is _RUNNING and event.reason in _LATE and self.dispatcher.withdraw(now):
             self._supervisor = None
             self.retry.renew(now.monotonic_us, at_once=True)
@@ -358,6 +354,12 @@ class MissionController:
         else:
             self.dispatcher.end(now, "released")
             self._end(now, self._cause or Ending.ABORTED)
+
+    def _why_failed(self, event: Failed) -> str:
+        """As the log has it."""
+        text = LATE if event.reason in _LATE and not event.text else event.text
+        why = f"{event.reason}: {text}" if text else event.reason
+        return f"{why}; the link is silent: what the vehicle does is not known" if self.link.down else why
 
     def down(self, now: Now) -> None:
         """The vehicle is on the ground again, told to or not: the flight is over, and the run with it. Nothing is sent

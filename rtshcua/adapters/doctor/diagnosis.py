@@ -25,7 +25,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import CELL, DRAIN, Signal
 from rtshcua.model.flat.zone import project
-from rtshcua.model.quantity import Dimension
+from rtshcua.model.quantity import Dimension, display
 from rtshcua.onboard.enforcement.frames import OURS
 from rtshcua.onboard.rehearsal import needed
 from rtshcua.wire.qualification import Firmware
@@ -212,7 +212,7 @@ def _it_answers(vehicle: ExaminingDriver) -> bool:
 
 def _answers(vehicle: ExaminingDriver) -> VehicleFinding:
     answers = _it_answers(vehicle)
-    found = "it answers what it is asked" if answers else "it answers nothing that it was asked"
+    found = "it answers requests" if answers else "it answers no request"
     advice = "it may demand signed frames (`--signing-key`), or the way there may be closed"
     return _graded("link/answers", found, "answers", advice, stops=not answers)
 
@@ -230,11 +230,13 @@ def _others(vehicle: ExaminingDriver, *, named: bool) -> Iterator[VehicleFinding
         elif talker.kind == GROUND_STATION:
             stations += 1
         elif system != vehicle.system and component == AUTOPILOT and _is_vehicle(talker):
-            found, advice = f"another vehicle speaks here too, system {system}", "`--system` says which one is meant"
+            found, advice = f"another vehicle sends on this link, system {system}", "`--system` says which one is meant"
             yield VehicleFinding("link/other-vehicle", WARN if named else STOP, found, "one vehicle", advice)
             crowd = None
         elif system != vehicle.system:
-            yield VehicleFinding("link/other-system", WARN, f"system {system}, component {component} speaks here too")
+            yield VehicleFinding(
+                "link/other-system", WARN, f"system {system}, component {component} also sends on this link"
+            )
     words = "no ground station is heard on this link" if not stations else f"{stations} ground station(s) heard"
     yield VehicleFinding("link/ground-station", OK, words)
     if crowd is not None:
@@ -345,7 +347,7 @@ def _readiness(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFind
     else:
         yield VehicleFinding("vehicle/down", OK, "on the ground, disarmed")
     unready, astray = seen.unready, seen.estimator.missing(seen.now_us)
-    found = unready or "nothing that it tells of stands against arming"
+    found = unready or "it reports nothing that prevents arming"
     yield _graded("vehicle/ready", found, "ready to arm", stops=unready is not None)
     for name in seen.unwell:
         yield VehicleFinding("sensor/unwell", STOP, f"{name}: there and in use, and not healthy", "healthy")
@@ -364,9 +366,10 @@ def _fix(vehicle: ExaminingDriver) -> VehicleFinding:
         return VehicleFinding("sensor/gps", STOP, "no GPS_RAW_INT", "a 3D fix")
     if message.fix_type < 3:
         return VehicleFinding("sensor/gps", STOP, f"fix type {message.fix_type}", "a 3D fix", "wait, or move it")
-    accuracy = f", to {message.h_acc} mm" if message.h_acc else ""
+    accuracy = f", accurate to {display(message.h_acc, Dimension.LENGTH)}" if message.h_acc else ""
     found = f"fix type {message.fix_type}, {message.satellites_visible} satellites{accuracy}"
-    return _graded("sensor/gps", found, f"to {_ACCURATE_MM} mm", warns=message.h_acc > _ACCURATE_MM)
+    needed = f"accurate to {display(_ACCURATE_MM, Dimension.LENGTH)}"
+    return _graded("sensor/gps", found, needed, warns=message.h_acc > _ACCURATE_MM)
 
 
 def settling(vehicle: ExaminingDriver) -> str | None:
@@ -375,7 +378,8 @@ def settling(vehicle: ExaminingDriver) -> str | None:
     if fix is not None and fix.fix_type < 3:
         return f"a 3D fix (its receiver has fix type {fix.fix_type})"
     if fix is not None and fix.h_acc > _ACCURATE_MM:
-        return f"a fix to {_ACCURATE_MM} mm (its receiver says {fix.h_acc})"
+        least = display(_ACCURATE_MM, Dimension.LENGTH)
+        return f"a fix accurate to {least} (its receiver reports {display(fix.h_acc, Dimension.LENGTH)})"
     if fix is None:
         return None  # nothing tells that there is a receiver
     return None if vehicle.seen.estimator.missing(vehicle.seen.now_us) is None else "its estimator's place and height"
@@ -459,7 +463,7 @@ def _signal(
     if unknown and signal.name == DRAIN and not vehicle.seen.airborne:
         declared = f"{drained(policy.vehicle) / 100:.1f} % a minute"
         found = f"`{signal.name}` is measured in the air only; until it is, the declared {declared} counts"
-        return VehicleFinding(slug, UNKNOWN, found, "", "nothing waits for it")
+        return VehicleFinding(slug, UNKNOWN, found, "", "no action needed")
     if unknown and IN_THE_AIR.issuperset(sources) and not vehicle.seen.airborne:
         found = f"`{signal.name}` is known in the air only, so nothing is known of it yet"
         return VehicleFinding(slug, UNKNOWN, found, "a step that takes off does not ask for it")
@@ -568,6 +572,8 @@ def _sees_voltage(policy: Policy) -> bool:
 
 
 def _words(setting: Setting, value: float) -> str:
+    if value == 0 and setting.at_zero:
+        return setting.at_zero
     return f"{value * setting.mm / 1_000:g}{setting.unit}" if setting.mm else setting.words.get(value, f"{value:g}")
 
 
@@ -586,7 +592,7 @@ def _setting(
     `alone`: nothing else sees that the battery fails, so what it warns of stops a mission.
     """
     slug, name = f"settings/{setting.parameter.lower()}", setting.parameter
-    found = f"{setting.about}: {_words(setting, value)} ({name} = {value:g})"
+    found = f"{setting.label}: {_words(setting, value)} ({name} = {value:g})"
     if meant is not None:
         found += f"; for a flight `--set` makes it {_words(setting, meant)} ({meant:g})"
         found += ", which it is" if meant == value else f", and {value:g} again after it"
@@ -605,7 +611,7 @@ def _setting(
         return _graded(slug, found, needed, why + how, warns=True, stops=alone)
     if value == 0 and otherwise is not None:
         value = otherwise
-    if need is None or setting.mm == 0 or (value == 0 and "(0: " in setting.about):
+    if need is None or setting.mm == 0 or (value == 0 and setting.at_zero):
         return VehicleFinding(slug, OK, found)
     has = value * setting.mm
     exact = setting.mm == _METRE and "speed" in setting.about  # a number with decimals, of which they count

@@ -35,6 +35,16 @@ class Setting(NamedTuple):
     battery: bool = False  # about a low battery
 
     @property
+    def label(self) -> str:
+        """What it is about, without what 0 stands for."""
+        return self.about.partition(" (0: ")[0]
+
+    @property
+    def at_zero(self) -> str:
+        """What 0 stands for, where it is no number; else empty."""
+        return self.about.partition(" (0: ")[2].removesuffix(")")
+
+    @property
     def unit(self) -> str:
         """Of its number, for a person."""
         if not self.mm or "slope" in self.about:

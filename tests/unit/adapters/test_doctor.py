@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.doctor.diagnosis import (
     MissionVerdict,
     VehicleFinding,
+    _setting,
     diagnose,
     settings_told,
     settled,
@@ -19,6 +20,7 @@ from rtshcua.adapters.doctor.diagnosis import (
     told_apart,
 )
 from rtshcua.adapters.doctor.examination import ExaminingDriver
+from rtshcua.adapters.doctor.settings import SETTINGS
 from rtshcua.adapters.utc import TimeOfDay
 from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.codec.frames import Codec
@@ -585,3 +587,10 @@ def test_what_a_flight_would_set_is_told_and_judged(flavour: str, name: str, has
     other = "GF_ACTION" if flavour == "ardupilot" else "FENCE_TYPE"
     assert f"settings/{other.lower()}" in stops(examine(config, meant={name: bits, other: bits}))
     assert sent == [0], "nothing is set"
+
+
+def test_a_zero_that_stands_for_something_is_said_as_that() -> None:
+    fence = next(each for each in SETTINGS["px4"] if each.parameter == "GF_MAX_HOR_DIST")
+    found = {value: _setting(fence, value, None, None, None).found for value in (0.0, 300.0)}
+    assert found[0.0] == "radius of its own fence around home: no limit (GF_MAX_HOR_DIST = 0)"
+    assert found[300.0] == "radius of its own fence around home: 300 m (GF_MAX_HOR_DIST = 300)"

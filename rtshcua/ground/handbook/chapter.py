@@ -18,6 +18,7 @@ from rtshcua.ground.handbook.model import (
     SkillTold,
     Start,
 )
+from rtshcua.ground.handbook.permitted import permitted
 from rtshcua.ground.handbook.rights import asked_of, rights, rule_names
 from rtshcua.ground.handbook.subject import Subject
 from rtshcua.ground.handbook.words.places import told_vehicle
@@ -79,6 +80,7 @@ def chapter(
             for each in declaration.rules
             if not rule_applies(each, frozenset(policy.vehicle.without))
         ),
+        permitted=permitted(subject),
         airspace=told_airspace(declaration.airspace),
         contingency=told_chain(declaration.contingency, subject.names),
         evidence=told_evidence(declaration.without_evidence),

@@ -22,6 +22,7 @@ def glance(chapter: Chapter) -> Glance:
         who=tuple(_who(chapter.rights)),
         where=tuple(_where(chapter)),
         height=tuple(_height(chapter)),
+        speed=tuple(_speed(chapter)),
         person=tuple(_person(chapter)),
         wrong=tuple(_wrong(chapter)),
         beyond=tuple(_beyond(chapter)),
@@ -55,20 +56,33 @@ def _where(chapter: Chapter) -> Iterator[str]:
          + (f"; {zone.times}" if zone.times else "") for zone in zones),
         "see airspace and zones",
     )  # fmt: skip
+    yield from _permitted(chapter, "place")
 
 
 def _height(chapter: Chapter) -> Iterator[str]:
     bands = [f"{name(zone.name)}: {zone.band}" for zone in chapter.zones if zone.use == "allowed"]
     yield from _some(bands, "see airspace and zones")
-    asked = [
-        f"{name(skill.name)} may be asked for {name(parameter.name)} {parameter.limits}"
-        for skill in chapter.skills
-        for parameter in skill.parameters
-        if "altitude" in (parameter.name, parameter.what) or "height" in parameter.name
-    ]
-    yield from _some(asked, "see what the vehicle can do")
-    if not bands and not asked:
+    limits = _permitted(chapter, "altitude")
+    yield from limits
+    if not bands and not limits:
         yield "This policy sets no limit to the height."
+
+
+def _speed(chapter: Chapter) -> Iterator[str]:
+    yield from (f"The vehicle flies {fact.value}." for fact in chapter.vehicle if fact.what == "Speed")
+    yield from _permitted(chapter, "speed")
+
+
+def _permitted(chapter: Chapter, kind: str) -> list[str]:
+    """What the rules permit at most, whoever asks; not what a skill could be asked for."""
+    return [
+        f"{name(each.skill)} is permitted with {name(each.parameter)} {each.limits}"
+        + (", under conditions" if each.conditions else "")
+        if kind != "place"
+        else f"{name(each.skill)} is permitted {each.limits}" + ("; under conditions" if each.conditions else "")
+        for each in chapter.permitted
+        if each.kind == kind
+    ]
 
 
 def _person(chapter: Chapter) -> Iterator[str]:

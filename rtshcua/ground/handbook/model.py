@@ -83,6 +83,19 @@ class ParameterTold:
 
 
 @dataclass(frozen=True, slots=True)
+class Permitted:
+    """What the rules permit of a parameter of a skill, over all who may ask. `kind` is `altitude`, `speed` or `place`;
+    `conditions`: something else must hold besides for what is widest in it.
+    """
+
+    skill: str
+    parameter: str
+    kind: str
+    limits: str
+    conditions: bool
+
+
+@dataclass(frozen=True, slots=True)
 class PatternTold:
     """What a survey may fly: the pattern's name, and its spacing or radius, start and direction."""
 
@@ -242,13 +255,14 @@ class ChangeTold:
 
 @dataclass(frozen=True, slots=True)
 class Glance:
-    """A policy on one page: who may have what done, where, how high, what needs a person, what happens when something
-    goes wrong, and what the policy does not cover.
+    """A policy on one page: who may have what done, where, how high, how fast, what needs a person, what happens when
+    something goes wrong, and what the policy does not cover.
     """
 
     who: tuple[Fact, ...]
     where: tuple[str, ...]
     height: tuple[str, ...]
+    speed: tuple[str, ...]
     person: tuple[str, ...]
     wrong: tuple[Fact, ...]
     beyond: tuple[str, ...]
@@ -271,6 +285,7 @@ class Chapter:
     rights: tuple[Rights, ...]
     rules: tuple[RuleTold, ...]
     rules_left_out: tuple[str, ...]
+    permitted: tuple[Permitted, ...]
     airspace: str
     contingency: tuple[str, ...]
     evidence: str

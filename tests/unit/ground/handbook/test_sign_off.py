@@ -34,8 +34,8 @@ def test_the_page_begins_with_what_is_signed_on_one_page(everything: Handbook) -
     glance, sign, contents = (text.index(f'id="{each}"') for each in ("p1-glance", "p1-sign", "contents"))
     assert glance < sign < contents < text.index('id="p1"')
     first = words(text[glance:sign])
-    heads = ("Who may have what done", "Where", "How high", "What needs a person", "When something goes wrong",
-             "What is not covered")  # fmt: skip
+    heads = ("Who may have what done", "Where", "How high", "How fast", "What needs a person",
+             "When something goes wrong", "What is not covered")  # fmt: skip
     places = [first.index(each) for each in heads]
     assert places == sorted(places)
     box = words(text[sign:contents])
@@ -51,7 +51,12 @@ def test_the_first_page_says_what_the_chapter_says(standard: Handbook) -> None:
     assert any("after approval" in fact.value or "on conditions" in fact.value for fact in first.who)
     assert first.where[0] == chapter.airspace
     assert any(each.startswith("`city`: ") and "120 m" in each for each in first.height)
-    assert any("`takeoff` may be asked for `altitude`" in each for each in first.height)
+    assert "`takeoff` is permitted with `altitude` between 3 m and 40 m above home" in first.height, "of up to 60 m"
+    inspected = "`inspect_area` is permitted with `altitude` between 5 m and 30 m above home, under conditions"
+    assert inspected in first.height
+    assert "`goto` is permitted with `speed` between 1 m/s and 8 m/s, under conditions" in first.speed
+    flown_to = "`goto` is permitted if the `target` asked for is inside `city`"
+    assert any(each.startswith(flown_to) for each in first.where)
     assert any("approved by a person of the role `supervisor`" in each for each in first.person)
     told = {fact.what: fact.value for fact in first.wrong}
     assert told["Records cannot be kept"] == chapter.evidence
@@ -65,6 +70,7 @@ def test_what_a_policy_does_not_have_is_said(everything: Handbook) -> None:
     bare = replace(
         chapter, missions=(), cases=(), scenarios=(), zones=(), contingency=(), skills=(), signals=(),
         rules=tuple(each for each in chapter.rules if each.kind not in ("confirm", "degrade")), rules_left_out=(),
+        permitted=(),
     )  # fmt: skip
     first = glance(bare)
     assert first.person == ("Nothing: no rule asks a person to approve a step.",)

@@ -157,7 +157,7 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
         Setting(
             "GF_ACTION", "at the fence",
             {0: "nothing", 1: "warns only", 2: "hold", 3: "return", 4: "terminate", 5: "land"},
-            {0: "its fence gives no second protection", 1: "its fence gives no second protection", 4: _MOTORS_OFF},
+            {0: "its fence is no second line of defence", 1: "its fence gives no second protection", 4: _MOTORS_OFF},
             2,
         ),
         Setting("GF_MAX_HOR_DIST", "radius of its own fence around home (0: no limit)", mm=1_000, needs=_far),
@@ -282,7 +282,7 @@ SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
             "FENCE_ACTION", "at the fence",
             {0: "reports only", 1: "return or land", 2: "land", 3: "SmartRTL, return or land", 4: "brake or land",
              5: "SmartRTL or land"},
-            {0: "its fence gives no second protection"}, 1,
+            {0: "its fence is no second line of defence"}, 1,
         ),
         Setting("ARMING_CHECK", "checks before arming", {0: "none", 1: "all"}, {0: "it arms whatever is wrong"}, 1),
         Setting("ARMING_SKIPCHK", "checks left out before arming", {0: "none"}, {}),

@@ -304,10 +304,8 @@ class OperatorConsole:
         under_policy = _RECALLS.get(word)
         if under_policy is None:
             near = nearest(word, [*_RECALLS, *_QUITS]) if word else None
-            meant = f"; did you mean `{near}`?" if near else ""
-            if word:
-                self.tell("unknown", f"`{word[:_SHOWN]}` is no command{meant}")
-            self.tell("ready", _HELP)
+            meant = f", did you mean `{near}`?" if near else ""
+            self.tell("ready", f"`{word[:_SHOWN]}` is no command{meant} · {_HELP}" if word else _HELP)
         else:
             self._recall(under_policy=under_policy)
         return False

@@ -210,7 +210,9 @@ def _launch(order: Launch) -> ExitCode:
             vehicle.driver.asks_utc, vehicle.driver.asks_back = utc.vehicle_may_tell, utc.question
             hurried = not order.dry_run and _broke_off(past) and _may_have_flown(order, loaded)
             driver.hurries = hurried
-            events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
+            events = meet(
+                order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried, speed=order.speed
+            )
             stated = order.utc_error_us is not None
             listens = order.boundary_socket is not None
             events += await_utc(
@@ -563,7 +565,7 @@ def _wait(
         if driver.shortfall is not None:
             raise Refused(ExitCode.REFUSED, "link-too-slow", driver.shortfall, _TOO_SLOW)
         hurried = _broke_off(past)
-        events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried)
+        events = meet(order.link, order.system, vehicle, clock, interrupts, signing, hurried=hurried, speed=order.speed)
         broken_off = None if past is None else _broken_off(order, past, base, vehicle, clock, events)
         if broken_off is not None:
             (data, loaded), under = broken_off

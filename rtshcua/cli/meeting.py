@@ -1,24 +1,30 @@
 """The vehicle is met: its first heartbeat, that it is the only one, and what is said when it is not heard."""
 
 import time
+from collections.abc import Sequence
 from errno import ENOENT
-from typing import Final
+from typing import Any, Final
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.utc import UtcWatch, certain_from_us
+from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.cli.interrupts import Interrupts
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.signing import Signing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.ports import Event
+from rtshcua.simulation.mark import hundredths, marked_speed
 
 #: How long a heartbeat is waited for, in seconds,
 HEARTBEAT_S = 10.0
 #: and another vehicle's, which comes each second; from then on it only keeps this one from being ready
 ANOTHER_S = 1.5
+#: and so long that it says that it is simulated, where it is held to be
+SPEED_S = 10.0
 
 #: what to do where a link cannot be opened, by what carries it
 PORT_HELP: Final = {
@@ -83,14 +89,76 @@ def unmet(where: str, seconds: float, system: int | None, rejected: str | None, 
     return Refusal("no-vehicle", text, _HELP if system is None else _SYSTEM_HELP)
 
 
+class SpeedQuestion:
+    """Asks a vehicle whether it is one that this program simulates, and how fast that lives, until it is answered."""
+
+    #: s of the machine's time between two requests: how fast the vehicle lives is what is asked
+    EACH_S: Final = 0.25
+
+    def __init__(self) -> None:
+        self._asked_s: float | None = None
+        #: whether it was answered,
+        self.told = False
+        #: and its pace, times 100; None where it is not simulated by this program
+        self.speed: int | None = None
+
+    def due(self, system: int, now_us: int) -> Sequence[Message]:
+        """The request, where it is due."""
+        now_s = time.monotonic()
+        if self.told or (self._asked_s is not None and now_s - self._asked_s < self.EACH_S):
+            return ()
+        self._asked_s = now_s
+        return (messages.request(system, "AUTOPILOT_VERSION"),)
+
+    def take(self, name: str, message: Any) -> None:
+        """A message of the autopilot."""
+        if name == "AUTOPILOT_VERSION":
+            self.told, self.speed = True, marked_speed(message)
+
+
+def unlike(question: SpeedQuestion, speed: float) -> Refusal | None:
+    """Why a vehicle that answered so, or not at all, is not flown at `speed` seconds of flight in a second; None where
+    it lives so fast. What it said is enough: no pace is measured, for on a busy machine a simulated vehicle waits for
+    its run, and lives slower than it says.
+    """
+    if question.speed is None:
+        said = "says that it is something else" if question.told else f"did not say what it is within {SPEED_S:.0f} s"
+        text = (
+            f"`--speed {speed:g}` is for a vehicle that this program simulates, and this one {said}: at a real "
+            "vehicle a second is a second"
+        )
+        return Refusal("not-simulated", text, "without `--speed`; `rtshcua sim --speed N` starts a simulated vehicle")
+    if question.speed != hundredths(speed):
+        text = f"the simulated vehicle flies {question.speed / 100:g} seconds in a second, and not {speed:g}"
+        return Refusal("other-speed", text, f"`--speed {question.speed / 100:g}`")
+    return None
+
+
+def _expect_simulated(
+    vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, speed: float, events: list[Event]
+) -> None:
+    question = SpeedQuestion()
+    vehicle.driver.asks_first = question
+    until_s = time.monotonic() + SPEED_S
+    while not question.told and time.monotonic() < until_s:
+        if interrupts.wish() is not None:
+            raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    vehicle.driver.asks_first = None
+    refusal = unlike(question, speed)
+    if refusal is not None:
+        raise Refused(ExitCode.REFUSED, *refusal)
+
+
 def meet(
     link: Address | None, system: int | None, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts,
-    signing: Signing, *, hurried: bool,
+    signing: Signing, *, hurried: bool, speed: float = 1,
 ) -> list[Event]:  # fmt: skip
     """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
     nothing begins; what happened meanwhile. The vehicle is ready only afterwards. `link` None: our own simulated
     vehicle. `hurried`: a flight may have broken off in the air; then a second vehicle is not waited for, so that the
-    first is told to come down. Raises `Refused`.
+    first is told to come down. `speed` other than 1: it is held to be simulated, which it has to say itself; else its
+    times would not be checked, nor true in the log. Raises `Refused`.
     """
     events: list[Event] = []
     vehicle.driver.issued_from_us = _UNDATED_US
@@ -102,6 +170,8 @@ def meet(
             where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
             raise Refused(ExitCode.LINK, *unmet(where, HEARTBEAT_S, system, signing.rejected, vehicle.silence))
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    if link is not None and speed != 1:
+        _expect_simulated(vehicle, clock, interrupts, speed, events)
     until_s = time.monotonic() + (0 if link is None or hurried else ANOTHER_S)
     while time.monotonic() < until_s and vehicle.driver.link.crowd is None:
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))

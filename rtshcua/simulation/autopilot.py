@@ -201,6 +201,7 @@ class Autopilot:
         self.usb = config.usb
         self.release = config.release or flavour.release(keyed=config.signing_key is not None)
         self.utc_us = config.utc_us
+        self.speed = config.speed
         self.now_us = 0
         self.since_us = 0
         """How long ago the last tick was: messages come and are answered between ticks."""

@@ -37,6 +37,7 @@ from rtshcua.simulation.config import (
     SimulationConfig,
 )
 from rtshcua.simulation.faults import parse_fault
+from rtshcua.simulation.mark import hundredths
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
@@ -113,7 +114,7 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         usb=options.usb,
         release=options.release,
         utc_us=utc_us,
-        speed=max(1, round(options.speed * 100)),
+        speed=hundredths(options.speed),
     )
 
 

@@ -12,6 +12,7 @@ from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.config import Extra, Purpose
 from rtshcua.simulation.failsafe import LOW_TO_LAND
+from rtshcua.simulation.mark import marked
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
 
 _HEARTBEAT = maker(mavlink.MAVLink_heartbeat_message)
@@ -276,11 +277,12 @@ def extended_sys_state(vtol: int) -> Builder:
 def autopilot_version(capabilities: int, kind: int, numbered: int) -> Builder:
     """AUTOPILOT_VERSION; `kind` is FIRMWARE_VERSION_TYPE, `numbered` its `vendor_id` and `uid`."""
     zeros = [0] * 8
-    parts = (0, 0, numbered, zeros, zeros, zeros, 0, 0, numbered)
 
     def build(a: Autopilot) -> Message:
         major, minor = a.release
         version = major << 24 | minor << 16 | kind
+        custom = (zeros, *marked(a.speed))
+        parts = (0, 0, numbered, *custom, 0, 0, numbered)
         return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES | capabilities, version, *parts)
 
     return build

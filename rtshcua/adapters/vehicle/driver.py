@@ -145,6 +145,8 @@ class Driver:
         self.asks_back: Callable[[], int] = int
         #: what else it is asked on the ground, and told of each of its messages
         self.asks: GroundQuestions | None = None
+        #: and in the air too, where an earlier run left it: what it is, before anything else is made of it
+        self.asks_first: GroundQuestions | None = None
         self._asked_utc_us = 0
         self._lacks_utc_us: int | None = None  # since when nothing else is missing
         #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
@@ -354,6 +356,8 @@ class Driver:
             send += self.stream_requests.due(self.system, now_us)
         if self._timed and not self._was_ready:
             send += self._ask_once(now_us)
+        if self.asks_first is not None:
+            send += self.asks_first.due(self.system, now_us)
         if self.asks is not None and self.seen.down:
             send += self.asks.due(self.system, now_us)
         if not self._was_ready and self.seen.down and not self.prepares:
@@ -509,6 +513,13 @@ class Driver:
             events.append(ports.Noted(now_us, text))
         return True
 
+    def _tell(self, name: str, message: Message) -> None:
+        """A message of the autopilot, to who asks it."""
+        if self.asks_first is not None:
+            self.asks_first.take(name, message)
+        if self.asks is not None:
+            self.asks.take(name, message)
+
     def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; whether a manoeuvre may see something new in it."""
         message, name, _, component, _, _, octets = frame
@@ -531,8 +542,8 @@ class Driver:
             )
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
-        if component == AUTOPILOT and self.asks is not None:
-            self.asks.take(name, message)
+        if component == AUTOPILOT:
+            self._tell(name, message)
         if component != AUTOPILOT or name not in self._heeded:
             return False
         before = seen.mode

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from pymavlink.dialects.v20 import development
 
 from rtshcua.model.faults import MessageSilence, Mode
+from rtshcua.simulation.mark import marked_speed
 from virtual import plans as p
 
 Pilots = Callable[..., Any]
@@ -73,6 +74,8 @@ def test_what_it_says_of_itself(pilot: Pilots, flavour: str) -> None:
         assert has & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{capability}")
     for capability in ("FTP", "SET_ATTITUDE_TARGET", "FLIGHT_TERMINATION"):
         assert not has & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{capability}")
+    assert marked_speed(a.last("AUTOPILOT_VERSION")) == 100, "that it is simulated, and how fast it lives"
+    assert bytes(a.last("AUTOPILOT_VERSION").flight_custom_version) == bytes(8)
 
 
 @pytest.mark.parametrize(

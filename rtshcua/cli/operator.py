@@ -18,17 +18,21 @@ from rtshcua.cli.document_options import ApprovalKey, AsJson, FlyingBundle, Pass
 from rtshcua.cli.documents import MOST_S, subject
 from rtshcua.cli.faults import refuse, untrusted
 from rtshcua.cli.interrupts import Stopped, StopRequest
+from rtshcua.cli.live.lines import asked
+from rtshcua.cli.live.telling import REPLACED, Answering, asks
 from rtshcua.cli.recalling import GOOD_S, HELP, Recalled
 from rtshcua.cli.showing.bundle import Claimed
 from rtshcua.cli.showing.log import Names
 from rtshcua.cli.stdout import NewestLines
 from rtshcua.cli.unlock import unlock_person
+from rtshcua.cli.width import columns, fitted
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, Decision, Effect
+from rtshcua.model.outcome import Reason
 from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.untrusted import Untrusted
@@ -38,6 +42,8 @@ _HELP: Final = "recall: call this flight home · policy: all under its policy ·
 _RECALLS: Final = {"r": False, "recall": False, "p": True, "policy": True}
 _QUITS: Final = frozenset({"q", "quit", "exit"})
 _CHUNK: Final = 4_096
+#: so far ahead of ours is the clock of a flight that is sped up, us
+_AHEAD_US: Final = 5_000_000
 #: of a line that is no command
 _SHOWN: Final = 40
 
@@ -71,7 +77,7 @@ def operator(
         return refuse(untrusted(error))
     console = OperatorConsole(
         to, FlightFollower(to), flying, key, seconds, typing=None if sys.stdin is None else sys.stdin.fileno(),
-        output=sys.stdout.fileno(), as_json=as_json,
+        output=sys.stdout.fileno(), as_json=as_json, bundle=str(bundle),
     )  # fmt: skip
     try:
         with StopRequest() as stop:
@@ -107,16 +113,16 @@ _read_told = msgspec.json.Decoder(_Told).decode
 
 class OperatorConsole:
     """What a person sees at the descriptor `output` and types at `typing`. `seconds`: how long a recall that is sent is
-    good.
+    good; `bundle`: the file of what flies, for the commands that are told.
 
     Nothing in it waits for one thing alone: neither a flight nor a terminal that does not read keeps a recall back.
     """
 
     def __init__(
         self, to: Path, follower: FlightFollower, flying: Bundle, key: SigningKey, seconds: int, *, typing: int | None,
-        output: int, as_json: bool, patience: Patience = Patience(),
+        output: int, as_json: bool, bundle: str, patience: Patience = Patience(),
     ) -> None:  # fmt: skip
-        self._to = to
+        self._to, self._bundle = to, bundle
         self._flying = flying
         self._key = key
         self._seconds = seconds
@@ -129,6 +135,7 @@ class OperatorConsole:
         )
         self._typing = typing
         self._names: Names | None = None  # until the flight tells its mission
+        self._replaced = 0
         self._typed = b""
         self._code = ExitCode.OK
         #: a recall that was not answered yet: whether it is for all under the policy
@@ -215,7 +222,7 @@ class OperatorConsole:
             return
         self._heard_s = time.monotonic()
         self._told_silence = False
-        self._names = None
+        self._names, self._replaced = None, 0
         self._flight = self._follower.flight
         self._greet()
         if self._unanswered is not None:
@@ -252,11 +259,34 @@ class OperatorConsole:
             elif isinstance(record, Decision | Effect):
                 names = self._names or Names(None)
                 names.follow(record)
+                self._replaced += isinstance(record, Effect) and record.event == REPLACED
                 self.tell(record.event if isinstance(record, Effect) else record.outcome, names.tell(record))
+                if isinstance(record, Decision) and record.reason == Reason.AWAITING_APPROVAL.value:
+                    self._tell_whom(record, names)
             elif isinstance(record, Close):
                 self.tell("over", f"the flight is over: {record.ending}")
                 return True
         return False
+
+    def _tell_whom(self, record: Decision, names: Names) -> None:
+        """Whom a step waits for, how long, and what they type: as `run` tells it."""
+        ahead = record.utc_us > time.time_ns() // 1000 + _AHEAD_US
+        # an agent's mission flies under the same policy, but its bundle lies elsewhere
+        answering = Answering(self._bundle if names.whole else "BUNDLE", str(self._to), ahead)
+        released_us = record.context.released_us
+        whom = asks(
+            self._flying.policy, record.clause, record.step, record.at_us, released_us, answering, self._replaced
+        )  # fmt: skip
+        if whom is None:
+            return
+        if self._as_json:
+            left_s = max(0, -(-(whom.until_us - whom.asked_us) // 1_000_000))
+            told = {"event": "waits", "roles": whom.roles, "left_s": left_s, "commands": whom.commands}
+            self._output.tell(escaped(json.dumps(told, ensure_ascii=False)))
+            return
+        beneath = " " * 12
+        for line in asked(record.step, names.step(record.step) or "of another mission", whom, columns() - len(beneath)):
+            self._output.tell(visible(f"{beneath}{line}"))
 
     def _answered(self, answer: Answered) -> None:
         accepted = answer.slug == "accepted"
@@ -330,7 +360,9 @@ class OperatorConsole:
 
     def tell(self, event: str, text: str) -> None:
         """One event, in a line."""
-        self._output.tell(self._line(event, text))
+        line = self._line(event, text)
+        for each in [line] if self._as_json else fitted(line):
+            self._output.tell(each)
 
     def _line(self, event: str, text: str) -> str:
         if self._as_json:

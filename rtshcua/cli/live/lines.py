@@ -71,7 +71,12 @@ def _banner(what: Happening) -> list[str]:
     """What a person must not miss of a happening."""
     if what.asks is None:
         return alarm(what)
-    return waiting_for(what.step, what.subject, what.asks, what.asks.until_us - what.asks.asked_us, ())
+    return asked(what.step, what.subject, what.asks)
+
+
+def asked(step: int, subject: str, asks: Asks, width: int = _BESIDE_TIME) -> list[str]:
+    """That a step begins to wait for people, beside whom nobody agreed yet."""
+    return waiting_for(step, subject, asks, asks.until_us - asks.asked_us, (), width)
 
 
 def alarm(what: Happening, width: int = _BESIDE_TIME) -> list[str]:

@@ -174,26 +174,10 @@ class Teller:
         """Whom a step waits for, where it waits for people."""
         if record.reason != Reason.AWAITING_APPROVAL.value or record.context is None:
             return None
-        rule = next(
-            (each for each in self._policy.rules if each.kind == RuleKind.CONFIRM and each.text == record.clause), None
+        released_us = record.context.released_us
+        return asks(
+            self._policy, record.clause, record.step, record.at_us, released_us, self._answering, self._replaced
         )
-        if rule is None:
-            return None
-        roles = tuple(self._policy.roles[number] for number in (rule.approver, rule.second) if number >= 0)
-        until_us = record.context.released_us + rule.within_us
-        return Asks(roles, record.at_us, until_us, tuple(self._commands(record.step, roles)))
-
-    def _commands(self, step: int, roles: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-        """What to type as each of these roles."""
-        if self._answering is None:
-            return
-        bundle, socket, ahead = self._answering
-        for role in dict.fromkeys(roles):
-            yield (
-                "rtshcua", "approve", bundle, *("--replacement", "FILE") * self._replaced,
-                "--step", str(number_of(step)), "--role", role, *(("--for", str(_AHEAD_S)) if ahead else ()),
-                "--to", socket,
-            )  # fmt: skip
 
     def _waits(self, text: str, t_us: int) -> str:
         """What is said of a clause over time, by its text, that was not observed for as long as it looks back."""
@@ -229,6 +213,33 @@ class Teller:
             return f"fallback: {invocation.contract.fallback[record.link].text}"
         targets = {rule.target.text for rule in self._policy.rules if rule.target is not None}
         return f"fallback: {targets.pop()}" if len(targets) == 1 else "fallback: what the policy degrades to"
+
+
+def asks(
+    policy: Policy, clause: str | None, step: int, at_us: int, released_us: int, answering: Answering | None,
+    replaced: int = 0,
+) -> Asks | None:  # fmt: skip
+    """Whom a step waits for that was released then, by the `confirm` of this text; None where the policy has none such.
+
+    `replaced` is how many replacements came before.
+    """
+    rule = next((each for each in policy.rules if each.kind == RuleKind.CONFIRM and each.text == clause), None)
+    if rule is None:
+        return None
+    roles = tuple(policy.roles[number] for number in (rule.approver, rule.second) if number >= 0)
+    commands = () if answering is None else tuple(_commands(answering, step, roles, replaced))
+    return Asks(roles, at_us, released_us + rule.within_us, commands)
+
+
+def _commands(answering: Answering, step: int, roles: tuple[str, ...], replaced: int) -> Iterator[tuple[str, ...]]:
+    """What to type as each of these roles."""
+    bundle, socket, ahead = answering
+    for role in dict.fromkeys(roles):
+        yield (
+            "rtshcua", "approve", bundle, *("--replacement", "FILE") * replaced,
+            "--step", str(number_of(step)), "--role", role, *(("--for", str(_AHEAD_S)) if ahead else ()),
+            "--to", socket,
+        )  # fmt: skip
 
 
 def _agreed(detail: str) -> str:

@@ -155,6 +155,15 @@ class Names:
             with suppress(Untrusted):
                 self._bundle = self._bundle._replace(mission=replaced(record.detail, self._bundle.mission))
 
+    @property
+    def whole(self) -> bool:
+        """Whether it has the words."""
+        return self._bundle is not None
+
+    def step(self, step: int) -> str:
+        """A step as it was written; empty where that is not known."""
+        return self._text(STEP, step, -1)
+
     def tell(self, record: AnyRecord) -> str:
         """A record in one line."""
         if isinstance(record, Decision):

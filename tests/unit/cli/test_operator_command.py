@@ -1,15 +1,18 @@
 """`rtshcua operator` over real sockets: a flight that hangs up, comes again, does not read, or says that it is over."""
 
+import dataclasses
 import json
 import os
 import signal
 import socket
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from rtshcua.adapters.agent_socket import FlightFollower
@@ -22,11 +25,20 @@ from rtshcua.cli.operator import OperatorConsole, Patience
 from rtshcua.cli.stdout import MOST_LINES, NewestLines
 from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.records import Close, Effect, encode
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.policy import Rule, RuleKind
+from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.bundle import Bundle
-from rtshcua.wire.keys import SigningKey
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.request import Ref
 
 MISSION = Path(__file__).resolve().parents[3] / "missions/short.rts"
+SIGNER = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
+CONFIRM = "confirm takeoff by role supervisor within 30 s, whatever the state of the vehicle and of the weather may be"
 #: what a test waits for it shortens; the rest never comes, however busy the machine is
 CALM = Patience(again_s=0.3, lost_s=60, answer_s=60, silent_s=60, drain_s=0.3)
 
@@ -94,12 +106,12 @@ class Seat:
     def type(self, words: str) -> None:
         os.write(self.types, words.encode())
 
-    def sits(self, path: Path, **changed: float) -> ExitCode:
+    def sits(self, path: Path, *, as_json: bool = True, **changed: float) -> ExitCode:
         bundle, key = self._flying
         patience = CALM._replace(**changed)
         console = OperatorConsole(
-            path, FlightFollower(path), bundle, key, 300, typing=self.typing, output=self.output, as_json=True,
-            patience=patience,
+            path, FlightFollower(path), bundle, key, 300, typing=self.typing, output=self.output, as_json=as_json,
+            bundle="m.bundle", patience=patience,
         )  # fmt: skip
         try:
             with StopRequest() as stop:
@@ -111,11 +123,14 @@ class Seat:
         return [each["event"] for each in self.told()]
 
     def told(self) -> list[dict[str, Any]]:
+        return [json.loads(line) for line in self.lines()]
+
+    def lines(self) -> list[str]:
         if self.output >= 0:
             os.close(self.output)
             self.output = -1
             self._heard += b"".join(iter(lambda: os.read(self.reads, 1 << 16), b""))
-        return [json.loads(line) for line in self._heard.splitlines()]
+        return self._heard.decode().splitlines()
 
     def end(self) -> None:
         for each in (self.typing, self.types, self.reads, self.output):
@@ -146,6 +161,20 @@ def closes(link: socket.socket) -> None:
 
 def effect(number: int) -> bytes:
     return encode(Effect("0" * 64, 0, "", "buffered", "noted", 0, -1, number, -1, -1, "effect", 0, 0))
+
+
+def asks(flying: Bundle, utc_us: int) -> bytes:
+    """That the first step of the bundle waits for a supervisor: 30 s, of which 5 are over."""
+    recorder = Recorder(lambda _: b"", SIGNER.public, lambda: bytes(32))
+    now = Now(105_000_000, utc_us, 0)
+    recorder.genesis(now, bundle=b"", root=b"", boot=bytes(16), vehicle="quad", mission="short", mode="software")
+    clause = Clause(CONFIRM, 0, 0, 0, ())
+    mission = {"type": "mission", "digest": flying.mission_digest.hex()}
+    return json.dumps(mission).encode() + b"\n" + recorder.decision(
+        now, ref=Ref(0, 0, -1), invocation=bytes(16), state=State((), ()),
+        context=Context(bytes(32), "quad", 2, 0, 100_000_000, 1, 0, ()),
+        decided=Decision(Outcome.DEFER, Reason.AWAITING_APPROVAL, 8, clause, None, None, 130_000_000),
+    )  # fmt: skip
 
 
 def documents(link: socket.socket) -> bytes:
@@ -301,3 +330,53 @@ def test_a_word_that_is_no_command_is_said_with_the_nearest(seat: Seat, place: P
     assert flight.documents == []
     (said,) = [each["text"] for each in seat.told() if each["event"] == "ready" and "`recal`" in each["text"]]
     assert said.startswith("`recal` is no command, did you mean `recall`? · recall: ")
+
+
+@pytest.fixture
+def asked(flying: tuple[Bundle, SigningKey]) -> tuple[Bundle, SigningKey]:
+    """The same, under a policy that asks a supervisor."""
+    bundle, key = flying
+    rule = Rule(RuleKind.CONFIRM, (), (), (), None, 0, 30_000_000, None, CONFIRM, 0, 0, 0)
+    policy = msgspec.structs.replace(bundle.policy, roles=("supervisor",), rules=(rule,))
+    return dataclasses.replace(bundle, policy=policy), key
+
+
+def test_a_step_that_waits_for_a_person_says_whom_how_long_and_what_to_type(
+    asked: tuple[Bundle, SigningKey], place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    seat = Seat(asked)
+
+    def turn(link: socket.socket) -> None:
+        link.sendall(asks(asked[0], time.time_ns() // 1000))
+        closes(link)
+
+    flight = Flight(place, turn)
+    assert seat.sits(place, as_json=False) is ExitCode.OK
+    flight.end()
+    lines = seat.lines()
+    seat.end()
+    assert max(map(len, lines)) <= 80, "what was decided and what may be typed are longer"
+    text = " ".join(" ".join(lines).replace("\\", "").split())
+    assert "** WAITS FOR A PERSON: supervisor ** step 1, takeoff(altitude = 10 m)" in text
+    assert "25 s left, then it is denied. Type in another terminal:" in text
+    assert f"rtshcua approve m.bundle --step 1 --role supervisor --to {place} " in text
+    assert "recall: call this flight home · policy: all under its policy · quit: leave it flying" in text
+
+
+def test_who_is_asked_is_told_to_programs_too(asked: tuple[Bundle, SigningKey], place: Path) -> None:
+    seat = Seat(asked)
+
+    def turn(link: socket.socket) -> None:
+        link.sendall(asks(asked[0], time.time_ns() // 1000 + 3_600_000_000))
+        closes(link)
+
+    flight = Flight(place, turn)
+    assert seat.sits(place) is ExitCode.OK
+    flight.end()
+    (waits,) = [each for each in seat.told() if each["event"] == "waits"]
+    seat.end()
+    assert (waits["roles"], waits["left_s"]) == (["supervisor"], 25)
+    assert waits["commands"] == [
+        ["rtshcua", "approve", "m.bundle", "--step", "1", "--role", "supervisor", "--for", "3600", "--to", str(place)]
+    ], "the clock of a flight that is sped up is ahead"

@@ -44,8 +44,11 @@ def check(
 
     With --map the missions are drawn as one HTML page, whether or not they are refused, as far as their way is planned.
 
+    With --since some policy here must have an earlier version there, by its name and vehicle: else nothing was
+    compared, which is an error (3). An earlier policy that none here was compared with is told.
+
     Ends with 0 where there are no errors, 1 where there are, 2 where the command line is wrong, 3 where a file cannot
-    be read, 4 where --since names a bundle of a version that is not known here.
+    be read or nothing was compared, 4 where --since names a bundle of a version that is not known here.
     """
     return check_sources(
         paths or [Path()],

@@ -56,8 +56,9 @@ def check_sources(
     alone = len(files) == 1 and not with_ and files[0].suffix.lower() == SPECIFICATION
     if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
         say(" help: what a specification speaks of stands in its policy's sources: `--with FILE` names them")
+    gone = _not_here(earlier, found)
     if code is ExitCode.OK and not as_json:
-        _tell(found, since, now_us)
+        _tell(found, since, gone, now_us)
     if map_ is not None:
         imported = refusal(map_, found.sources, "a page")
         if imported is not None:
@@ -65,6 +66,8 @@ def check_sources(
         drawn = _draw(asked, map_, issued_at_us)
         if not as_json:
             out(drawn)
+    if code is ExitCode.OK and since is not None and not found.versions:
+        return findings.end(_nothing_compared(since, gone))
     return findings.finish(
         code,
         missions=[{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
@@ -77,12 +80,26 @@ def check_sources(
             }
             for each in found.versions
         ],
+        not_here=gone,
         left_out=[each._asdict() for each in found.left_out],
         issued_now=[{"code": each.code.id, "message": each.message} for each in found.now],
     )
 
 
-def _tell(found: Found, since: Path | None, now_us: int) -> None:
+def _not_here(earlier: Earlier, found: Found) -> list[str]:
+    """The names of earlier policies that no policy here was held against."""
+    compared = {each.name for each in found.versions}
+    return sorted({each.name for each in earlier.policies} - compared)
+
+
+def _nothing_compared(since: Path, gone: Sequence[str]) -> Refusal:
+    """That no policy here has an earlier version there: who asked for that relies on it."""
+    there = f"there: {', '.join(f'`{name}`' for name in gone)}" if gone else "there is no policy for a vehicle in it"
+    help = f"{there}; one of another name or for another vehicle is another policy: name a bundle of this one"
+    return Refusal("since", f"nothing in `{since}` is an earlier version of a policy here", help)
+
+
+def _tell(found: Found, since: Path | None, gone: Sequence[str], now_us: int) -> None:
     """What is said of sources in which nothing is wrong."""
     empty = [name for name, source in found.sources.items() if not source.text.strip()]
     out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
@@ -104,8 +121,8 @@ def _tell(found: Found, since: Path | None, now_us: int) -> None:
         out(f"{each.name}: version {each.version}, and {each.earlier} in {since}{same}")
         for change in each.changes:
             _tell_change(change)
-    if since is not None and not found.versions:
-        out(f"nothing in {since} is an earlier version of a policy here")
+    for name in gone if found.versions else ():
+        out(f"{name}: in {since}, and compared with no policy here")
 
 
 def _tell_change(change: ChangeTold) -> None:

@@ -96,7 +96,7 @@ def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest
     assert code == ExitCode.OK
     assert [each["file"] for each in answered["missions"]] == ["b/two.rts", "a/deep/er.rts", "a/one.rts"]
     assert {each["mission"] for each in answered["missions"]} == {"look"}
-    told = {"missions", "versions", "left_out", "issued_now"}
+    told = {"missions", "versions", "not_here", "left_out", "issued_now"}
     assert set(answered) == {"format", "version", "diagnostics", "exit", "exit_code", *told}
 
 
@@ -242,9 +242,28 @@ def test_a_person_is_told_what_was_compared(old: Path, capsys: pytest.CaptureFix
     assert (
         capsys.readouterr().out.splitlines()[-1] == "meadow_flight: version 2, and 2 in old.bundle; they mean the same"
     )
+
+
+@pytest.mark.parametrize("earlier", ["old.bundle", ".old"])
+def test_a_gate_does_not_pass_where_nothing_was_compared(
+    old: Path, earlier: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A policy that was renamed, or another project's bundle: its version was never looked at."""
     put({"policy.rts": POLICY.replace("meadow_flight", "other_flight")})
-    assert main(["check", "policy.rts", "--since", "old.bundle"]) == ExitCode.OK
-    assert "nothing in old.bundle is an earlier version" in capsys.readouterr().out
+    assert main(["check", "policy.rts", "--since", earlier]) == ExitCode.INPUT
+    said = capsys.readouterr().err
+    assert f"nothing in `{earlier}` is an earlier version of a policy here" in " ".join(said.split())
+    assert "`meadow_flight`" in said
+    code, answered = answer(capsys, "policy.rts", "--since", earlier)
+    assert (code, answered["exit"], answered["error"]["slug"]) == (ExitCode.INPUT, "input", "since")
+
+
+def test_an_earlier_policy_that_none_was_compared_with_is_told(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put({".old/second.rts": POLICY.replace("meadow_flight", "second_flight")})
+    code, answered = answer(capsys, "policy.rts", "--since", ".old")
+    assert (code, answered["not_here"]) == (ExitCode.OK, ["second_flight"])
+    assert main(["check", "policy.rts", "--since", ".old"]) == ExitCode.OK
+    assert "second_flight: in .old, and compared with no policy here" in capsys.readouterr().out
 
 
 def test_what_cannot_be_compared_with(old: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from rtshcua.adapters.files.logs import START
-from rtshcua.adapters.files.runs import LOG, logs_of
+from rtshcua.adapters.files.runs import LOG, lines_below, logs_of
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.report import Report, Verdict
@@ -38,6 +38,26 @@ def log_of(given: Path) -> Path:
 def logs_meant(given: Iterable[Path]) -> list[Path]:
     """The logs that are meant by files, folders of runs and folders of these; where there is none, the missing one."""
     return [log for path in given for log in logs_of(path) or [path / LOG]]
+
+
+def logs_and_others(given: Iterable[Path]) -> tuple[list[Path], list[Path]]:
+    """The logs that are meant, of folders all that lie there or below, whatever they are called; and what lies there
+    that has a log's suffix, and is none. What cannot be read is taken for a log: whoever opens it says why.
+    """
+    logs, others = list[Path](), list[Path]()
+    for path in given:
+        found = lines_below(path) if path.is_dir() else [path]
+        mine = [each for each in found if each.name == LOG or not path.is_dir() or _may_be_log(each)]
+        logs += mine or [path / LOG]
+        others += [each for each in found if each not in mine]
+    return logs, others
+
+
+def _may_be_log(path: Path) -> bool:
+    try:
+        return path.stat().st_size > 0 and is_log(path)
+    except OSError:
+        return True
 
 
 def is_log(path: Path) -> bool:

@@ -12,14 +12,15 @@ import typer
 from rtshcua.adapters.files.keystore import read_root
 from rtshcua.adapters.files.verification import Asked, Progress, verify_carefully, verify_quickly
 from rtshcua.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
-from rtshcua.cli.faults import distrust, fail, of_each
-from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
+from rtshcua.cli.faults import distrust, fail, of_each, say
+from rtshcua.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_and_others
 from rtshcua.cli.pin import Pin, pin
 from rtshcua.cli.recognising import no_log
 from rtshcua.cli.simulation import with_simulated
 from rtshcua.cli.stdout import out_json
 from rtshcua.cli.unconfirmed import UnconfirmedFallbacks
 from rtshcua.cli.verdict import as_object, as_text
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.records import AnyRecord
@@ -88,6 +89,9 @@ def verify_log(
     As it is: what was signed by whom, the chain of all records, and their tree. With --audit also the form of each
     record, its clocks, and every decision once more; that is the slow way, and what an investigation wants. With
     several logs the exit code is the first that is not 0.
+
+    Of a folder every log is verified that lies in it or below, also one that is not called log.jsonl. A .jsonl file
+    there that is no log is named.
     """
     if (audit or explain is not None) and fast:
         return fail(ExitCode.USAGE, "`--fast` does not go with `--audit` or `--explain`", "--fast reads no record")
@@ -106,8 +110,11 @@ def verify_log(
         return explained(logs, explain, pinned, roots, tuple(anchors or ()), derive=not no_derive, as_json=as_json)
     wanted = Wanted(audit, not no_derive, fast, jobs, require_anchor, roots)
     named = tuple(anchors or ())
+    meant, others = logs_and_others(logs)
+    for other in others:
+        say(visible(f"note: `{other}` was not looked at: it is no log of this program"))
     return of_each(
-        logs_meant(logs), lambda path, first: _verify(path, pinned, wanted, named, as_json=as_json, first=first)
+        meant, lambda path, first: _verify(path, pinned, wanted, named, as_json=as_json, first=first)
     )
 
 

@@ -29,6 +29,19 @@ def logs_of(given: Path) -> list[Path]:
     return sorted(Path(place, LOG) for place, folders, files in walk(given, every=True) if LOG in (*folders, *files))
 
 
+def lines_below(folder: Path) -> list[Path]:
+    """The files in a folder and all below it that may be logs by their suffix, whatever their names. Raises OSError for
+    a folder that cannot be read.
+    """
+    suffix = Path(LOG).suffix
+    return sorted(
+        Path(place, name)
+        for place, folders, files in walk(folder, every=True)
+        for name in (*(each for each in folders if each == LOG), *files)
+        if name.lower().endswith(suffix)
+    )
+
+
 class RunFolder:
     """A new folder that holds the bundle, and makes room for its log, its telemetry and its summary. It is gone again
     where the bundle cannot be written.

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,42 @@ def test_file_and_folder_are_the_same(run: Path, capsys: pytest.CaptureFixture[s
     assert verify(run) == verify(run / "log.jsonl") == ExitCode.OK
     out = capsys.readouterr().out
     assert out[: len(out) // 2] == out[len(out) // 2 :]
+
+
+@pytest.mark.parametrize("place", [".", "y", "y/deeper"])
+def test_of_a_folder_no_log_is_passed_over_for_its_name(
+    place: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A forged `flight-0412.jsonl` beside a good `log.jsonl`: the folder was VERIFIED, without a word of it."""
+    folder = tmp_path / "given"
+    (folder / "y/deeper").mkdir(parents=True)
+    shutil.copy(run / "log.jsonl", folder / "y/log.jsonl")
+    assert verify(folder, "--json") == verify(folder / "y", "--json") == ExitCode.OK
+    forged = (run / "log.jsonl").read_bytes().replace(b'"goto', b'"gota', 1)
+    assert forged != (run / "log.jsonl").read_bytes()
+    (folder / place / "flight-0412.jsonl").write_bytes(forged)
+    capsys.readouterr()
+    assert verify(folder, "--json") == ExitCode.EVIDENCE
+    told = map(json.loads, capsys.readouterr().out.splitlines())
+    verdicts = {Path(each["log"]).name: each["verdict"] for each in told}
+    assert verdicts == {"log.jsonl": "verified", "flight-0412.jsonl": "failed"}
+    if place != ".":
+        assert verify(folder / "y") == ExitCode.EVIDENCE, "the folder of a run is looked through too"
+
+
+def test_what_is_no_log_in_a_folder_is_named(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (run / "events.jsonl").write_text('{"event": "took off"}\n')
+    (run / "nothing.jsonl").touch()
+    assert verify(run) == ExitCode.OK
+    said = capsys.readouterr().err
+    for name in ("events", "nothing"):
+        assert f"{name}.jsonl` was not looked at: it is no log" in " ".join(said.split()), said
+
+
+def test_what_cannot_be_read_in_a_folder_is_no_success(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (run / "flight-0412.jsonl").symlink_to("nowhere")
+    assert verify(run) == ExitCode.INPUT
+    assert "flight-0412.jsonl" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("pin", ["public", "kid", "file", "hex file"])

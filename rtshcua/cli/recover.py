@@ -54,9 +54,9 @@ def recover_logs(
 ) -> ExitCode:  # fmt: skip
     """End the log of a flight that broke off: keep what is whole, sign it, and close it as `recovered`.
 
-    What a crash left behind the last whole record is moved to `log.discarded`. A log that was tampered with, or was
-    closed before and has lost its end since, is left as it is. It is safe to interrupt, and to repeat. With several
-    logs the exit code is the first that is not 0.
+    What a crash left behind the last whole record is moved to `log.discarded`. A log that was tampered with, that was
+    closed before and has lost its end since, or of which a witness saw more (`*.anchors` beside it), is left as it
+    is. It is safe to interrupt, and to repeat. With several logs the exit code is the first that is not 0.
     """
     signer = None
     if not dry_run:
@@ -118,6 +118,8 @@ def _code(found: Examined) -> ExitCode:
     slug = "" if found.reason is None else found.reason.slug
     if slug == "genesis/format":
         return ExitCode.UNTRUSTED
+    if slug.startswith("anchor/"):
+        return ExitCode.ANCHOR
     if found.state is State.UNBEGUN and slug.startswith("record/"):
         return ExitCode.INPUT  # a whole line, and none of ours
     return _CODES[found.state]

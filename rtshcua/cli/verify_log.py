@@ -113,9 +113,7 @@ def verify_log(
     meant, others = logs_and_others(logs)
     for other in others:
         say(visible(f"note: `{other}` was not looked at: it is no log of this program"))
-    return of_each(
-        meant, lambda path, first: _verify(path, pinned, wanted, named, as_json=as_json, first=first)
-    )
+    return of_each(meant, lambda path, first: _verify(path, pinned, wanted, named, as_json=as_json, first=first))
 
 
 def _verify(

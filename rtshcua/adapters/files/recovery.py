@@ -5,7 +5,8 @@
     log.recovering    the two lines, before anything is cut: whoever comes next finishes what was begun
 
 In this order, each on the disk before the next: the copy of what is discarded, the two lines, the cut, the end. Nothing
-is deleted but `log.recovering`, at last.
+is deleted but `log.recovering`, at last. A log of which a witness saw more, or another, was
+cut or rewritten by no crash: it is left as it is.
 """
 
 import errno
@@ -20,13 +21,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.files.evidence import SYSTEM, Disk, LogFile, write_all
-from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.files.logs import lines, read_anchors
 from rtshcua.adapters.store.reading import open_regular, read_regular
+from rtshcua.evidence.chain import origin_of
+from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import leaf_hash
+from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, Recover
 from rtshcua.evidence.recovery import RECOVERABLE, Examination, Examined, State, ending
+from rtshcua.evidence.witnessing.anchors import Anchors
+from rtshcua.evidence.witnessing.submission import note_of
 from rtshcua.model.flat.situation import Now
+from rtshcua.wire import cose
+from rtshcua.wire.trust import MAX_ROOT, open_root
+from rtshcua.wire.untrusted import Untrusted
 
 _LONGEST_PLAN = 1 << 16
 _CHUNK = 1 << 20
@@ -58,12 +67,37 @@ class Recovered(NamedTuple):
 
 
 def examine(path: Path, public: bytes | None) -> Examined:
-    """The log as it is, for the log key `public` or any. Raises OSError."""
-    examination = Examination(public)
+    """The log as it is, for the log key `public` or any, and for the notes of witnesses beside it. Raises OSError."""
+    anchors = read_anchors(path)  # before the log: see there
+    examination, checkpoints = Examination(public), list[str]()
     with open_regular(path) as file:
         for line in lines(file):
-            examination.take(line)
-    return examination.examined()
+            kept = examination.take(line)
+            note = note_of(line) if kept and anchors else None
+            checkpoints += [] if note is None else [note]
+    found = examination.examined()
+    return found if not anchors else _witnessed(found, checkpoints, anchors)
+
+
+def _witnessed(found: Examined, checkpoints: Iterable[str], anchors: Iterable[str]) -> Examined:
+    """The log as it was found, unless a witness of its own trust root saw another. That root is taken at its word: who
+    ends the log has the key that signed it, and whether it is to be trusted is for whoever verifies it.
+    """
+    genesis = found.genesis
+    data = None if genesis is None else octets(genesis.root)
+    if genesis is None or data is None or found.state not in (*RECOVERABLE, State.CLOSED):
+        return found
+    try:
+        root = open_root(data, pinned=cose.unverified(data, limit=MAX_ROOT).kid, now_us=genesis.utc_us)
+    except Untrusted:
+        return found
+    witnesses = root.witnesses(genesis.vehicle, genesis.utc_us)
+    seen = Anchors(origin_of(genesis.vehicle, genesis.boot), witnesses, root.witness_threshold)
+    flaws = [*map(seen.checkpoint, checkpoints), *map(seen.anchor, anchors), seen.finish(found.records)]
+    flaw = next((each for each in flaws if isinstance(each, Flaw)), None)
+    if flaw is None:
+        return found
+    return found._replace(state=State.TAMPERED, reason=flaw.at(found.records, found.kept))
 
 
 @contextmanager

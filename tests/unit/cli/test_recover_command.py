@@ -8,14 +8,18 @@ from random import Random
 import pytest
 
 from reference.crashed import LOG_KEY, unverified, writes
+from reference.forgery import flight
+from reference.marked import mark, note_of
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.last_log import LastLog
 from rtshcua.adapters.files.recovery import alone
 from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.records import is_signed
 from rtshcua.wire.key_file import dump_signing_key
 from rtshcua.wire.keys import Duty, SigningKey
+from virtual import case
 
 
 @pytest.fixture
@@ -150,3 +154,36 @@ def test_a_log_that_was_closed_is_not_ended_anew_where_its_end_was_cut_off(
     assert (said["state"], said["recovered"], said["reason"]["slug"]) == ("tampered", False, "close/missing")
     if kept > 1:
         assert recover("--state-dir", run, run) == ExitCode.OK  # nobody remembers it there
+
+
+def flown(run: Path) -> tuple[tuple[bytes, ...], list[int]]:
+    """The log of a flight whose log key is in the key store, and the numbers of its signed records."""
+    KeyStore(data_folder()).key_path(Duty.LOG).write_bytes(dump_signing_key(case.KEYS[Duty.LOG], passphrase=None))
+    whole = flight()
+    return whole, [number for number, line in enumerate(whole) if is_signed(line)]
+
+
+@pytest.mark.parametrize("words", [[], ["--dry-run"], ["--json"]])
+@pytest.mark.parametrize("end", [b"", b'{"_prev":"0'])
+def test_what_a_witness_saw_more_of_is_not_ended(
+    words: list[str], end: bytes, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A log that was cut behind a signed record looks as after a crash; its witness saw a later one."""
+    whole, signed = flown(run)
+    cut = signed[-2] + 1
+    (run / "log.jsonl").write_bytes(b"".join(whole[:cut]) + end)
+    note = mark(note_of(whole, signed[-1]))
+    (run / "log.anchors").write_text(note + "\n")
+    before = sorted((path.name, path.read_bytes()) for path in run.iterdir())
+    assert recover(run, *words) == ExitCode.ANCHOR
+    said = capsys.readouterr()
+    assert "saw a longer log: its end was cut off" in " ".join(said.err.split())
+    assert sorted((path.name, path.read_bytes()) for path in run.iterdir()) == before, "nothing was written"
+
+
+def test_what_a_witness_saw_of_what_is_kept_hinders_nothing(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole, signed = flown(run)
+    (run / "log.jsonl").write_bytes(b"".join(whole[: signed[-2] + 2]))
+    (run / "log.anchors").write_text(mark(note_of(whole, signed[-2])) + "\n" + "garbage\n\n")
+    assert recover(run) == ExitCode.OK, capsys.readouterr().err
+    assert recover(run) == ExitCode.OK, "it is closed, and ahead of its witness"

@@ -95,7 +95,11 @@ def _call(row: Row, words: list[str]) -> int:
             return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
     except typer.Exit as end:
         return end.exit_code
-    except (typer.Abort, EOFError):  # Ctrl-C, or the end of the input, at a question
+    except (typer.Abort, EOFError) as error:  # Ctrl-C, or the end of the input, at a question
+        if sys.stderr is not None and sys.stderr.isatty():
+            sys.stderr.write("\n")  # the question stands there
+        if isinstance(error, EOFError) or isinstance(error.__context__, EOFError):
+            return fail(ExitCode.INPUT, "the input ended at a question that was not answered")
         return fail(ExitCode.INTERRUPTED, "stopped at a question that was not answered")
     except typer.TyperException as error:
         return _misused(row, error, words)

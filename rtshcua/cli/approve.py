@@ -23,11 +23,11 @@ from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
 from rtshcua.cli.shown import shorten
 from rtshcua.cli.unlock import terminal, unlock_person
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.analysis.asking import may_match
 from rtshcua.ground.compiler.surveyed import Planned, planned_otherwise
-from rtshcua.model.flat.mission import Invocation
-from rtshcua.model.flat.policy import Policy
 from rtshcua.model.step_number import index_of, number_of
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
 from rtshcua.wire.untrusted import Untrusted
@@ -79,17 +79,17 @@ def approve(
     now_us = time.time_ns() // 1000
     try:
         flying = subject(bundle, replacement or [], root, now_us, stops=refused)
-        if refused:  # a yes is held to it already; a no is told in our words too, which nonsense has not
-            expect_sense(flying.policy, [flying.mission])
+        # a no is told in our words too, which nonsense has not
+        (ready,) = expect_sense(flying.policy, [flying.mission])
         steps = flying.mission.invocations
         if step > len(steps):
             return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 1 to {len(steps)}")
         about = steps[index_of(step)]
-        asked = _roles(flying.policy, about)
+        asked = _roles(ready[index_of(step)])
         if role is None and len(asked) == 1:
             role = asked[0]
         if role is None or role not in asked:
-            return _not_asked(about, role, asked)
+            return _not_asked(ready[index_of(step)], role, asked)
         name = flight_id(flight, to)
         if name is None:
             return fail(ExitCode.USAGE, "the answer is for one flight", WHOSE)
@@ -136,14 +136,25 @@ def _answer(refused: bool) -> str:
     return "it is refused" if refused else "it may be flown"
 
 
-def _roles(policy: Policy, invocation: Invocation) -> list[str]:
-    return [name for number, name in enumerate(policy.roles) if confirms(policy, invocation, number)]
+def _roles(of: PreparedInvocation) -> list[str]:
+    """Who may be asked: by a rule whose condition can hold for the step's arguments."""
+    policy = of.policy.policy
+    return [
+        name
+        for number, name in enumerate(policy.roles)
+        if any(may_match(of, rule) for rule in confirms(policy, of.invocation, number))
+    ]
 
 
-def _not_asked(invocation: Invocation, role: str | None, asked: list[str]) -> ExitCode:
-    step = number_of(invocation.step)
+def _not_asked(of: PreparedInvocation, role: str | None, asked: list[str]) -> ExitCode:
+    policy, step = of.policy.policy, number_of(of.invocation.step)
     if not asked:
-        return fail(ExitCode.USAGE, f"no `confirm` of the policy asks anybody about step {step}")
+        rules = {rule for number in range(len(policy.roles)) for rule in confirms(policy, of.invocation, number)}
+        help = None
+        if rules:
+            text = " and ".join(f"`{policy.rules[each].text}`" for each in sorted(rules))
+            help = f"{text} cannot hold for the arguments of the step"
+        return fail(ExitCode.USAGE, f"no `confirm` of the policy asks anybody about step {step}", help)
     names = ", ".join(f"`{name}`" for name in asked)
     what = f"several roles are asked about step {step}" if role is None else f"`{role}` is not asked about step {step}"
     return fail(ExitCode.USAGE, what, f"accepted: --role {names}")

@@ -17,7 +17,7 @@ from rtshcua.cli.faults import error_object, fail
 from rtshcua.cli.recognising import read_bundle
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.trusting import LAPSED, REVOKED
-from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -66,16 +66,19 @@ def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: i
     return found
 
 
-def expect_sense(policy: Policy, missions: Sequence[Mission]) -> None:
-    """What a vehicle would not take is not signed for it: whoever signed a mission may say there what does not fly.
+def expect_sense(policy: Policy, missions: Sequence[Mission]) -> list[tuple[PreparedInvocation, ...]]:
+    """The steps of missions as they are decided on. What a vehicle would not take is not signed for it: whoever signed
+    a mission may say there what does not fly.
 
     Raises `BundleError`.
     """
-    ready = prepare(policy)
+    ready, found = prepare(policy), []
     for mission in missions:
-        wrong = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
-        if isinstance(wrong, Refusal):
-            raise BundleError("malformed", f"this would be refused on board: {wrong.text}")
+        steps = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
+        if isinstance(steps, Refusal):
+            raise BundleError("malformed", f"this would be refused on board: {steps.text}")
+        found.append(steps)
+    return found
 
 
 def _of_before(data: bytes, named: TrustRoot | None, refused: Untrusted) -> Bundle:

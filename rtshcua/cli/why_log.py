@@ -69,6 +69,7 @@ class _Log:
         self.aloft = False  # something was sent before the chosen record that may have lifted it off
         self.ended: list[_Told] = []
         self.answers: list[tuple[int, _Told]] = []  # approvals, by their step
+        self.allowed: _Told | None = None  # the same step, after the chosen record did not allow it
         self.stalls: list[_Told] = []  # when the computer stood still
         self.cause: _Told | None = None  # why it ended early, if it did
         self._caused_by = ""  # the event of that
@@ -169,10 +170,12 @@ class _Log:
         held = self.chosen
         if not isinstance(held, Decision) or held.outcome == "allow" or record.outcome != "allow":
             self._hold(record)
+        elif held.step == record.step:
+            self.allowed = self._tell(record)
 
     def _hold(self, record: Decision | Effect | Close | Recover | Seal) -> None:
         self.chosen, self.subject, self.aloft = record, self._in_force, self._flown
-        self.what = self._names.tell(record)
+        self.what, self.allowed = self._names.tell(record), None
 
 
 def _for_unknown(record: Decision | Effect | Close | Recover | Seal) -> bool:
@@ -197,7 +200,8 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
     cause = log.cause if number is None else None
     if cause is not None and cause.seq != chosen.seq:
         _list(page, "The cause: why it ended early", [cause], log.start_us)
-        page.head("Before that, the last decision on a step")
+        denied = isinstance(chosen, Decision) and chosen.outcome != "allow"
+        page.head(f"Before that, the last decision on a step{' that was not `allow`' if denied else ''}")
     page.text(f"record {chosen.seq} of {path}, {utc(chosen.utc_us)} (not verified)", indent=0)
     if isinstance(chosen, Decision):
         shown = _decision(page, chosen, subject, log.aloft, log.people)
@@ -205,6 +209,8 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
         shown = _effect(page, chosen, log)
     if isinstance(shown, ExitCode):
         return shown
+    allowed = [] if log.allowed is None else [log.allowed]
+    _list(page, "After it, the same step was allowed", allowed, log.start_us)
     answers = [told for step, told in log.answers if isinstance(chosen, Decision) and step == chosen.step]
     _list(page, "What was answered about this step", answers, log.start_us)
     _list(page, "When the computer stood still: nothing was read, judged or sent", log.stalls, log.start_us)
@@ -217,6 +223,7 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
     return shown | {
         "record": chosen.seq,
         "cause": None if cause is None else cause._asdict(),
+        "allowed": None if log.allowed is None else log.allowed._asdict(),
         "answers": [told._asdict() for told in answers],
         "stalls": [told._asdict() for told in log.stalls],
         "ended": [told._asdict() for told in log.ended],

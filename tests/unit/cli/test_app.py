@@ -196,12 +196,40 @@ def test_misused_verb_names_the_verb(monkeypatch: pytest.MonkeyPatch, capsys: py
     assert capsys.readouterr().err.endswith(" help: `rtshcua keys --help` explains it\n")
 
 
+def abort_at_the_end() -> typer.Abort:
+    """What a question raises at the end of the input."""
+    try:
+        try:
+            raise EOFError
+        except EOFError:
+            raise typer.Abort from None
+    except typer.Abort as error:
+        return error
+
+
+def test_what_follows_a_question_that_was_left_begins_on_a_line_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    door = typer.Typer()
+
+    @door.command()
+    def ask() -> None:
+        sys.stderr.write("sign? [y/N]: ")
+        raise typer.Abort
+
+    monkeypatch.setattr(app, "import_module", lambda name: SimpleNamespace(app=door))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert app.main(["check"]) == ExitCode.INTERRUPTED
+    assert "[y/N]: \nerror: stopped at a question" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("error", "code", "message"),
     [
         (KeyboardInterrupt(), ExitCode.INTERRUPTED, "error: interrupted"),
         (typer.Abort(), ExitCode.INTERRUPTED, "error: stopped at a question that was not answered"),
-        (EOFError(), ExitCode.INTERRUPTED, "error: stopped at a question that was not answered"),
+        (EOFError(), ExitCode.INPUT, "error[input]: the input ended at a question that was not answered"),
+        (abort_at_the_end(), ExitCode.INPUT, "error[input]: the input ended at a question that was not answered"),
         (BrokenPipeError(errno.EPIPE, "Broken pipe"), ExitCode.FULL, ""),
         (OSError(errno.ENOSPC, "No space left on device", "x"), ExitCode.FULL, "error: no space left on device: `x`"),
         (OSError("odd"), ExitCode.FULL, "error: odd"),

@@ -163,6 +163,12 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     says(ExitCode.USAGE, "for one flight", "recall", "low.bundle", "-o", "x")
     says(ExitCode.USAGE, "there is no step 5", "approve", "low.bundle", "--step", "5", "-o", "x")
     says(ExitCode.USAGE, "no `confirm` of the policy", "approve", "low.bundle", "--step", "2", "-o", "x")
+    (here / "high.rts").write_text(LOW.replace("altitude = 9 m", "altitude = 20 m"))
+    assert main(["compile", "high.rts"]) == ExitCode.OK
+    capsys.readouterr()
+    high = ["approve", "high.bundle", "--step", "3", "-o", "x", *FLIGHT]
+    says(ExitCode.USAGE, "no `confirm` of the policy asks anybody about step 3", *high)
+    says(ExitCode.USAGE, "within 30 s` cannot hold for the arguments of the step", *high)
     says(ExitCode.USAGE, "is not asked", "approve", "low.bundle", "--step", "3", "--role", "operator", "-o", "x")
     says(ExitCode.USAGE, "for", "approve", "low.bundle", "--step", "3", "--for", "100000", "-o", "x")
     says(ExitCode.INPUT, "no such file", "approve", "nothing.bundle", "--step", "3", "-o", "x")

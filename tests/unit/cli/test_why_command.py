@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from reference.flat_case import POSITION_X, S
+from reference.flat_case import BATTERY, POSITION_X, S
 from reference.forgery import flight
 from reference.world import FakeVehicle, Run
 from rtshcua.cli import app
@@ -290,3 +290,21 @@ def test_what_ends_a_flight_long_after_a_stall_is_its_own_cause(
     cause = shown(capsys, str(log))["cause"]
     assert isinstance(cause, dict)
     assert "interrupted" in cause["what"]
+
+
+def test_a_step_that_was_deferred_and_then_allowed_is_told_with_both(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    run = Run(vehicle=FakeVehicle(silent={BATTERY}))
+    run.until(lambda run: "defer" in [each.get("outcome") for each in run.records])
+    run.vehicle.silent.clear()
+    run.until_flies("takeoff")
+    run.tick(Interrupted(0))
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(logged(run.until_over()))
+    found = shown(capsys, str(log))
+    assert (found["outcome"], found["allowed"]["what"].split()[0]) == ("defer", "allow")  # type: ignore[index]
+    assert found["allowed"]["seq"] > found["record"]  # type: ignore[index]
+    page = why(capsys, str(log))[1]
+    assert "Before that, the last decision on a step that was not `allow`" in page
+    assert "After it, the same step was allowed" in page

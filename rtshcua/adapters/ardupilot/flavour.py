@@ -16,6 +16,8 @@ from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
 
+#: mm: so much nearer to its end it flies a leg, whatever else moves it
+_NEARER = 1_000
 _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
 _GUIDED = frozenset({CopterMode.GUIDED})
@@ -79,20 +81,27 @@ def _legs(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
     first, *others = legs
     speed = messages.command(system, messages.CHANGE_SPEED, 1, command.speed / 1_000, -1)
     return [
-        first._replace(done=_sets_off(first)),
+        first._replace(done=_sets_off(first, seen)),
         Stage(speed, messages.CHANGE_SPEED, None, _GUIDED, _SPEED_US, powered=True),
         Stage(None, None, first.done, _GUIDED, powered=True, progress=first.progress),
         *others,
     ]
 
 
-def _sets_off(leg: Stage) -> Effect:
-    """The autopilot says that it flies to the leg's target; one that says nothing of it is seen to move."""
+def _sets_off(leg: Stage, begins: ObservedVehicle) -> Effect:
+    """The autopilot says that it flies to the leg's target. Of one that names none it is seen: it is nearer than where
+    the leg begins. That it moves is not enough, for at the end of its takeoff it moves still, and names no target; the
+    frame of the leg may have been lost.
+    """
+    assert leg.progress is not None
+    measure = leg.progress.measure
+    left = measure(begins)
 
     def done(seen: ObservedVehicle) -> bool:
-        if seen.target is None or leg.target is None:
-            return seen.speed is not None and not effects.still(seen)
-        return leg.target.matches(seen.target)
+        if seen.target is not None and leg.target is not None:
+            return leg.target.matches(seen.target)
+        now = measure(seen)
+        return left is not None and now is not None and left[0] - now[0] >= _NEARER
 
     return lambda seen: done(seen) or (leg.done is not None and leg.done(seen))
 

@@ -1,0 +1,39 @@
+"""When ArduCopter flies a leg, which it acknowledges with nothing: its speed goes out then, and the leg no more."""
+
+from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.vehicle.flavour import Stage
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.ports import Command
+
+PLACE = (473_987_600, 85_469_800)
+
+
+def vehicle(latitude: int, height: int, speed: int, target: tuple[int, int, int] | None = None) -> ObservedVehicle:
+    return ObservedVehicle(
+        latitude=latitude, longitude=PLACE[1], height=height, located=True, levelled=True, speed=speed, home_amsl=488_000,
+        landed_state=2, target=target,
+    )  # fmt: skip
+
+
+def leg(begins: ObservedVehicle) -> Stage:
+    """The frame of the leg itself, with what ends the wait for it."""
+    command = Command(1, "goto", MotionKind.FLY, (0, 0), PLACE, 20_000, 6_000, 0)
+    (found,) = [each for each in ARDUPILOT.stages(command, begins, 1) if each.message is not None and each.repeat_us]
+    return found
+
+
+def test_that_it_moves_still_at_the_end_of_its_takeoff_is_no_sign_of_it() -> None:
+    """It names no target before the first leg. The frame of that was lost, and was never sent again."""
+    begun = leg(vehicle(473_977_398, 19_600, 300)).done
+    assert begun is not None
+    assert not begun(vehicle(473_977_398, 19_900, 300)), "it rises on"
+    assert not begun(vehicle(473_977_310, 19_900, 900)), "it drifts away"
+    assert begun(vehicle(473_977_498, 19_900, 900)), "it is a metre nearer"
+
+
+def test_its_own_word_counts_where_it_names_a_target() -> None:
+    begun = leg(vehicle(473_977_398, 19_600, 0)).done
+    assert begun is not None
+    assert begun(vehicle(473_977_398, 19_600, 0, (*PLACE, 508_000)))
+    assert not begun(vehicle(473_977_998, 19_600, 5_000, (473_990_000, PLACE[1], 508_000))), "somebody else's"

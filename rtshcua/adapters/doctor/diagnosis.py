@@ -117,7 +117,7 @@ def _found(
     yield from _readiness(vehicle, policy)
     yield from _signals(vehicle, policy, flown, unheard)
     if flown is not None:
-        yield _place(vehicle)
+        yield _place(vehicle, policy)
         yield _clock(vehicle, time)
     yield from _settings(vehicle, flavour, policy, flown)
 
@@ -482,7 +482,7 @@ def _signal(
     return _graded(slug, found, f"twice within {stale_ms} ms", _ADVICE, warns=seldom)
 
 
-def _place(vehicle: ExaminingDriver) -> VehicleFinding:
+def _place(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
     """What stands between this vehicle and a bundle that was made for it."""
     preflight = vehicle.preflight
     unknown = preflight.unplaced or preflight.unread
@@ -490,6 +490,9 @@ def _place(vehicle: ExaminingDriver) -> VehicleFinding:
         return VehicleFinding("mission/unready", STOP, preflight.astray, "as the policy has it")
     if unknown is not None:
         return VehicleFinding("mission/place", UNKNOWN, unknown, "as the policy has it")
+    if not policy.vehicle.return_altitude:
+        found = "home is that of the policy; no return altitude was compared, for the policy declares no `return at`"
+        return VehicleFinding("mission/place", OK, found)
     return VehicleFinding("mission/place", OK, "home and return altitude are those of the policy")
 
 

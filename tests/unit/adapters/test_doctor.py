@@ -499,6 +499,16 @@ def test_what_is_not_believed_is_no_value() -> None:
     assert found["signal/link.quality"].verdict is MissionVerdict.STOP, "the radio's frames are heard, and not taken in"
 
 
+@pytest.mark.parametrize(("return_mm", "said"), [(case.LOW, "home and return altitude are"), (0, "no `return at`")])
+def test_only_what_was_compared_is_said_to_be_that_of_the_policy(return_mm: int, said: str) -> None:
+    policy = case.policy()
+    policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=return_mm))
+    found = examine(case.simulated("px4", return_mm=case.LOW), policy)["mission/place"]
+    assert found.verdict is MissionVerdict.OK
+    assert said in found.found
+    assert ("return altitude are" in found.found) == bool(return_mm)
+
+
 def test_what_was_never_learned_is_not_well() -> None:
     policy = case.policy()
     policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=47_000))

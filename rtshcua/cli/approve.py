@@ -22,7 +22,7 @@ from rtshcua.cli.documents import MOST_S, WHERE, WHOSE, deliver, expect_sense, f
 from rtshcua.cli.faults import fail, refuse, say, untrusted
 from rtshcua.cli.showing import words
 from rtshcua.cli.shown import shorten
-from rtshcua.cli.unlock import terminal, unlock_person
+from rtshcua.cli.unlock import person_key, terminal, unlock_person
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -113,10 +113,12 @@ def approve(
             say(f"who signed the mission chose another path than the planner does: {_other(planned)}")
             if not refused and not other_path:
                 return fail(ExitCode.REFUSED, "nothing was signed: the path is not the planner's", AGREE, slug=OTHER)
+        store = KeyStore(data_folder())
+        if approval_key is None:
+            person_key(store, person, role)  # nobody is asked to sign what their key may not
         question = visible(f"sign that {_answer(refused)} as {role}?")
         if not yes and terminal() and not typer.confirm(question, err=True):
             return fail(ExitCode.REFUSED, "nothing was signed", slug="not-signed")
-        store = KeyStore(data_folder())
         key = unlock_person(store, person, role, path=approval_key, passphrase_file=passphrase_file)
         document = sign_approval(said, key)
     except Untrusted as error:

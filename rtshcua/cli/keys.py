@@ -31,6 +31,7 @@ from rtshcua.cli import attesting
 from rtshcua.cli.connection import System
 from rtshcua.cli.document_options import AsJson
 from rtshcua.cli.faults import code_of, fail, misaddressed, refuse, untrusted
+from rtshcua.cli.known_roles import warn_of_unknown
 from rtshcua.cli.meeting import unopened
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.showing.keys import as_object, speaks
@@ -156,6 +157,7 @@ def approver(
         return _no_person(name)
     if not _ROLE.fullmatch(role):
         return _no_name(role, "role")
+    warn_of_unknown([role])
     return _added(
         Duty.APPROVAL,
         lambda key: key.verification(roles=(role,), sources=(HUMAN,), vehicles=tuple(vehicle or (ANY,)), person=name),
@@ -305,6 +307,7 @@ def mission(
     misnamed = _misnamed(role, policy)
     if misnamed is not None:
         return misnamed
+    warn_of_unknown(each for each in role if each != ANY)
     return _added(
         Duty.MISSION,
         lambda key: key.verification(

@@ -16,7 +16,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.bundle import BundleError, check_proposer
 from rtshcua.wire.key_file import KeyFileError
-from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -87,6 +87,15 @@ def unlock_person(
     """
     if path is not None:
         return unlock(store, Duty.APPROVAL, path=path, passphrase_file=passphrase_file)
+    key = person_key(store, person, role)
+    return unlock(store, Duty.APPROVAL, whose=whose(key), passphrase_file=passphrase_file)
+
+
+def person_key(store: KeyStore, person: str | None, role: str | None) -> VerificationKey:
+    """Which approval key of the store that is, without opening it: whoever is asked to sign should know it before.
+
+    Raises `Untrusted` (`no-approver`, `several-approvers`, ...) and OSError.
+    """
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
     keys = [
         key
@@ -95,11 +104,16 @@ def unlock_person(
     ]
     who = f"{person or 'anybody'} as {role or 'anything'}"
     if not keys:
-        raise KeyStoreError("no-approver", f"there is no approval key of {who}: `rtshcua keys approver` makes one")
+        text = f"there is no approval key of {who}: `rtshcua keys approver` makes one"
+        own = {one for key in root.keys_for(Duty.APPROVAL).values() if person == key.person for one in key.roles}
+        if person is not None and own:
+            may = ", ".join(f"`{one}`" for one in sorted(own))
+            text = f"the key of {person} may not sign as {role}, but as {may}: `rtshcua keys approver` makes another"
+        raise KeyStoreError("no-approver", text)
     if len({key.person for key in keys}) > 1:
         names = ", ".join(f"`{each}`" for each in sorted({key.person for key in keys}))
         raise KeyStoreError("several-approvers", f"there are approval keys of {names}: `--as NAME` says whose to use")
-    return unlock(store, Duty.APPROVAL, whose=whose(keys[0]), passphrase_file=passphrase_file)
+    return keys[0]
 
 
 def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mission) -> None:

@@ -363,3 +363,33 @@ def test_an_operator_follows_a_flight_and_calls_it_home(here: Path, listening: P
 def test_an_operator_of_no_flight_is_told_so(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["operator", "low.bundle", "--to", "none"]) == ExitCode.INPUT
     assert "no such file or directory: `none`" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["approver", "bob"], ["mission", "agent", "--policy", "low"]])
+def test_a_role_that_no_policy_of_the_project_knows_is_warned_of(
+    command: list[str], here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["keys", *command, "--role", "nosuch"]) == ExitCode.OK
+    said = " ".join(capsys.readouterr().err.split())
+    assert "warning: no policy here knows the role `nosuch`; its roles are" in said
+    assert "`supervisor`" in said
+    assert main(["keys", *command, "--role", "supervisor"]) == ExitCode.OK
+    assert "warning" not in capsys.readouterr().err
+    for source in here.glob("*.rts"):
+        source.unlink()
+    assert main(["keys", *command, "--role", "other"]) == ExitCode.OK
+    assert "warning" not in capsys.readouterr().err, "no policy is here: nothing is known"
+
+
+def test_whose_key_may_not_sign_for_the_role_is_told_before_they_are_asked(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["keys", "approver", "bob", "--role", "nosuch"]) == ExitCode.OK
+    monkeypatch.setattr("rtshcua.cli.approve.terminal", lambda: True)
+    monkeypatch.setattr("typer.confirm", lambda *_, **__: pytest.fail("it was asked"))
+    capsys.readouterr()
+    words = ["approve", "low.bundle", "--step", "3", "-o", "yes", "--as", "bob", *FLIGHT]
+    assert main(words) == ExitCode.USAGE
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the key of bob may not sign as supervisor, but as `nosuch`" in said
+    assert not (here / "yes").exists()

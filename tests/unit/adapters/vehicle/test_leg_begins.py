@@ -11,8 +11,8 @@ PLACE = (473_987_600, 85_469_800)
 
 def vehicle(latitude: int, height: int, speed: int, target: tuple[int, int, int] | None = None) -> ObservedVehicle:
     return ObservedVehicle(
-        latitude=latitude, longitude=PLACE[1], height=height, located=True, levelled=True, speed=speed, home_amsl=488_000,
-        landed_state=2, target=target,
+        latitude=latitude, longitude=PLACE[1], height=height, located=True, levelled=True, speed=speed,
+        home_amsl=488_000, landed_state=2, target=target,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ def missing(path: Path) -> tuple[str, str] | None:
         return f"there is no `{LOG}` in the folder `{path.parent}`", "name a file, or the folder of one run"
     try:
         with os.scandir(path.parent) as found:
-            names = [each.name for each in islice(found, MOST_NAMES)]
+            names = [each.name for each in islice(found, MOST_NAMES) if each.name != path.name]
     except OSError:
         return None
     near = max(names, key=lambda name: likeness(path.name, name), default="")

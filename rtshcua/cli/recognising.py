@@ -1,11 +1,14 @@
 """Names the kind of a file that stands where another kind was asked for."""
 
 from pathlib import Path
+from typing import Final
 
 from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, EMPTY, LOG, LOOKED_AT, Kind, recognised
 from rtshcua.wire.bundle import MAX_BUNDLE
 from rtshcua.wire.untrusted import Untrusted
+
+_BUNDLES: Final = "accepted: a bundle, as `rtshcua compile` makes it"
 
 
 class Mistaken(Untrusted):
@@ -31,7 +34,7 @@ def no_log(path: Path, name: Path, help: str) -> tuple[str, str]:
     kind = kind_of(path)
     if kind is None or kind is LOG:
         return f"`{name}` is not a log of this program", help
-    return f"`{name}` is {kind.name}, and no log", f"{kind.help}; {help}"
+    return f"`{name}` is {kind.name}, and no log", f"{kind.help}; {help}" if kind.help else help
 
 
 def no_bundle(path: Path) -> Mistaken | None:
@@ -39,7 +42,7 @@ def no_bundle(path: Path) -> Mistaken | None:
     kind = kind_of(path)
     if kind is None or kind in (BUNDLE, DOCUMENT):
         return None
-    return Mistaken(f"`{path}` is {kind.name}, and no bundle", kind.help)
+    return Mistaken(f"`{path}` is {kind.name}, and no bundle", kind.help or _BUNDLES)
 
 
 def read_bundle(path: Path) -> bytes:

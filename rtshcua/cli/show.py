@@ -56,7 +56,7 @@ def show(
         help = "sources are shown by any editor; `rtshcua check` reports on them"
         kind = kind_of(file)
         if kind is not None:
-            return fail(ExitCode.INPUT, f"`{path}` is {kind.name}, which is not shown", kind.help)
+            return fail(ExitCode.INPUT, f"`{path}` is {kind.name}, which is not shown", kind.help or None)
         return fail(ExitCode.INPUT, f"`{path}` is no bundle, document, key, trust root or log of this program", help)
     if shown["kind"] == "log" and not shown["records"]:
         return fail(ExitCode.EVIDENCE, f"`{path}`: {CUT_AT_FIRST}", slug="genesis/missing")

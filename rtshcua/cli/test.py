@@ -94,6 +94,8 @@ def run_tests(
 
 def _meant(lost: Path) -> str:
     """A source below this folder that is called almost so, or how cases are chosen by their names."""
+    if str(lost) == "-":
+        return "a source must be a file, because imports are found beside it"
     by_name = f"`-k {lost}` chooses tests by name"
     below = unfolded([Path()])
     near = None if isinstance(below, Refusal) else nearest(lost.name, {each.stem for each in below})

@@ -22,6 +22,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
+_PROOFS = "`rtshcua prove` makes one"
 _MAX_NOTE = 1 << 16  # bytes of a file with a checkpoint
 _INPUT = {"proof/malformed", "proof/extra", "proof/too-long"}
 
@@ -59,7 +60,7 @@ def _verify(path: Path, pinned: Pin, kept: str | None, *, as_json: bool, first: 
         result = _same(result, kept) or result
     kind = recognised(data, path.name)
     if isinstance(result, Flaw) and result.slug == "proof/malformed" and kind is not None and kind is not PROOF:
-        result = result._replace(text=f"it is {kind.name}, and no proof: {kind.help}")
+        result = result._replace(text=f"it is {kind.name}, and no proof: {kind.help or _PROOFS}")
     code = exit_code(result)
     if as_json:
         out_json(json.dumps(as_object(result, path, pinned, code), ensure_ascii=False))

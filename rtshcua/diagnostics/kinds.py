@@ -11,7 +11,7 @@ LOOKED_AT: Final = 1 << 13
 
 
 class Kind(NamedTuple):
-    """What a file is, in words, and what is done with one."""
+    """What a file is, in words, and what is done with one; empty where nothing of ours is."""
 
     name: str
     help: str
@@ -34,10 +34,10 @@ ED269: Final = Kind(
 )
 KML: Final = Kind("KML", 'convert it to GeoJSON, and read it from a source: `zone NAME from "FILE.geojson"`')
 ARCHIVE: Final = Kind("a ZIP archive", "take out of it what you mean")
-PDF: Final = Kind("a PDF document", "sources are plain text")
-HTML: Final = Kind("a web page", "sources are plain text that ends in `.rts`")
-MARKDOWN: Final = Kind("a page of text (Markdown)", "sources end in `.rts`")
-SCRIPT: Final = Kind("a script", "sources end in `.rts`")
+PDF: Final = Kind("a PDF document", "")
+HTML: Final = Kind("a web page", "")
+MARKDOWN: Final = Kind("a page of text (Markdown)", "")
+SCRIPT: Final = Kind("a script", "")
 EMPTY: Final = Kind("an empty file", "it was not written whole: make it again, or copy it again")
 ULOG: Final = Kind("a log of PX4 (ULog)", "a run writes `log.jsonl`: name that, or the run's folder")
 DATAFLASH: Final = Kind("a log of ArduPilot (DataFlash)", "a run writes `log.jsonl`: name that, or the run's folder")

@@ -19,6 +19,7 @@ from rtshcua.adapters.store.laying import appearing
 from rtshcua.adapters.store.reading import exposed, open_regular, read_if_there, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, write_new
 from rtshcua.adapters.store.writing import replace as write_file
+from rtshcua.diagnostics.kinds import KEY, recognised
 from rtshcua.wire import cose
 from rtshcua.wire.key_file import MAX_KEY_FILE, dump_signing_key, load_signing_key
 from rtshcua.wire.keys import ANY, Duty, SigningKey, VerificationKey
@@ -291,10 +292,14 @@ def whose(key: VerificationKey) -> str:
 def read_key(path: Path, duty: Duty, *, passphrase: bytes | None) -> SigningKey:
     """The signing key in a file. Raises `KeyStoreError` (`exposed`), `KeyFileError`, `WrongDuty` and OSError."""
     with open_regular(path) as file:
-        if why := exposed(file):
-            raise KeyStoreError("exposed", f"others may read the key `{path}`: {why}")
-        data = file.read(MAX_KEY_FILE + 1)
-    return load_signing_key(data, duty=duty, passphrase=passphrase)
+        data, why = file.read(MAX_KEY_FILE + 1), exposed(file)
+    told = KeyStoreError("exposed", f"others may read the key `{path}`: {why}")
+    if why is not None and recognised(data) is KEY:
+        raise told
+    key = load_signing_key(data, duty=duty, passphrase=passphrase)  # what is no key is told as that, not by its mode
+    if why is not None:
+        raise told
+    return key
 
 
 def read_root(path: Path) -> bytes:

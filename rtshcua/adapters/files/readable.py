@@ -5,12 +5,12 @@ An import may be a stranger's. What it names outside of these is not opened, nor
 
 import os
 from collections.abc import Iterable
-from errno import EACCES
+from errno import EACCES, ENXIO
 from pathlib import Path
 from typing import Final
 
 from rtshcua.adapters.store.checkout import Outside, checkout_of, lies_in
-from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.reading import NotRegular, read_regular
 from rtshcua.ground.language.size import MAX_SIZE
 
 #: folders that imports may lead to besides, parted as in PATH: the user's to say, and no checkout's
@@ -56,7 +56,12 @@ class Readable:
         Raises `Outside`, and OSError as `read_regular`.
         """
         real, edge = self._placed(name)
-        return read_regular(real, MAX_SIZE, edge)
+        try:
+            return read_regular(real, MAX_SIZE, edge)
+        except FileNotFoundError:
+            if edge is None and Path(name).exists():  # a pipe by `/dev/stdin`, which leads to no path
+                raise NotRegular(ENXIO, "no regular file", name) from None
+            raise
 
     def listing(self, name: str) -> list[str]:
         """The names in a folder, for suggestions. Raises OSError."""

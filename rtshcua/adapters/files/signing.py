@@ -49,26 +49,42 @@ class LinkKeyError(Exception):
 
 
 def open_link_key(path: Path) -> BinaryIO:
-    """The file of a key, which its owner alone may read. Raises LinkKeyError and OSError."""
+    """The file of a key, which its owner alone may read; it is not read here, for it may be another process that signs.
+    Raises LinkKeyError and OSError.
+    """
     file = open_regular(path)
-    if why := exposed(file):
+    wrong = no_link_key(path) if os.fstat(file.fileno()).st_size > _LONGEST else _exposed(path, file)
+    if wrong is not None:  # what is no key is told as that, not by its mode
         file.close()
-        raise LinkKeyError("exposed", f"others may read the key `{path}`: {why}", f"`chmod 600 {path}`")
+        raise wrong
     return file
+
+
+def _exposed(path: Path, file: BinaryIO) -> LinkKeyError | None:
+    why = exposed(file)
+    if why is None:
+        return None
+    return LinkKeyError("exposed", f"others may read the key `{path}`: {why}", f"`chmod 600 {path}`")
 
 
 def read_link_key(path: Path) -> bytes:
     """The key in such a file. Raises LinkKeyError and OSError."""
-    with open_link_key(path) as file:
-        data = file.read(_LONGEST)
+    with open_regular(path) as file:
+        key = _key_in(file.read(_LONGEST + 1))
+        wrong = no_link_key(path) if key is None else _exposed(path, file)
+    if key is None or wrong is not None:
+        raise wrong or no_link_key(path)
+    return key
+
+
+def _key_in(data: bytes) -> bytes | None:
+    """The key that a file holds, as it is or in hexadecimal digits."""
     if len(data) != KEY_OCTETS:
         try:
             data = bytes.fromhex(data.decode("ascii"))
         except ValueError:
-            data = b""
-    if len(data) != KEY_OCTETS or not any(data):  # zeros switch signing off (SETUP_SIGNING)
-        raise no_link_key(path)
-    return data
+            return None
+    return data if len(data) == KEY_OCTETS and any(data) else None  # zeros switch signing off (SETUP_SIGNING)
 
 
 def no_link_key(path: Path) -> LinkKeyError:

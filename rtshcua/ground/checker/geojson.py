@@ -94,7 +94,7 @@ def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
     """The polygons of the one area in a file, or of the feature with that id or name; raises `Refused`."""
     kind = recognised(data)
     if kind is not None and kind is not GEOJSON:
-        raise Refused(codes.NOT_GEOJSON, f"it is {kind.name}, and no GeoJSON", kind.help)
+        raise Refused(codes.NOT_GEOJSON, f"it is {kind.name}, and no GeoJSON", kind.help or None)
     geometry, pointer = chosen(_json(data), feature)
     return _polygons(geometry, pointer)
 

@@ -1,6 +1,7 @@
 """The findings about files that are asked for and cannot be had as they must be."""
 
 import posixpath
+from errno import ENXIO
 
 from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_A_SOURCE, NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
@@ -13,6 +14,8 @@ from rtshcua.ground.language.size import MAX_TOKENS
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import
 
+_SOURCES = "sources are plain text, in files that end in `.rts`"
+_A_FILE = "a source must be a file, because imports are found beside it: write it to one that ends in `.rts`"
 Wanted = Import | GeoJson  # what names a file: its `path` as written, and the `span` of all that it is written with
 
 
@@ -57,12 +60,19 @@ def unreadable(name: str, by: Wanted | None, error: OSError | ValueError, near: 
         meant = posixpath.join(posixpath.dirname(written), near)
         help = f"did you mean `{meant}`?" if looked is None else f"{looked}; did you mean `{meant}`?"
         fixes = () if by is None else (_fix(by, meant),)
+    elif by is None and is_no_file(name, error):
+        help = _A_FILE
     span = None if by is None else by.span
     return Diagnostic(NO_SUCH_FILE, f"cannot read `{written}`: {why}", span, help, fixes=fixes)
 
 
 def _lowered(text: str) -> str:
     return text[:1].lower() + text[1:]
+
+
+def is_no_file(name: str, error: OSError | ValueError) -> bool:
+    """Whether the standard input is meant, or what is there is a pipe, a device or a socket."""
+    return (name == "-" and is_missing(error)) or (isinstance(error, OSError) and error.errno == ENXIO)
 
 
 def is_missing(error: OSError | ValueError) -> bool:
@@ -99,7 +109,7 @@ def too_many_files(by: Import) -> Diagnostic:
 
 def not_a_source(file: str, kind: Kind) -> Diagnostic:
     """A file of another kind."""
-    return Diagnostic(NOT_A_SOURCE, f"this is {kind.name}, and no source", Span(file, 0, 0), kind.help)
+    return Diagnostic(NOT_A_SOURCE, f"this is {kind.name}, and no source", Span(file, 0, 0), kind.help or _SOURCES)
 
 
 def not_text(source: Source, data: bytes, start: int) -> Diagnostic:

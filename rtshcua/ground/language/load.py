@@ -232,6 +232,7 @@ class _Loader:
             return None
         self.suggested += 1
         try:
-            return nearest(posixpath.basename(name), self.listing(posixpath.dirname(name) or "."))
+            own = posixpath.basename(name)
+            return nearest(own, [each for each in self.listing(posixpath.dirname(name) or ".") if each != own])
         except OSError:
             return None

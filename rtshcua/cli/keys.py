@@ -36,9 +36,10 @@ from rtshcua.cli.meeting import unopened
 from rtshcua.cli.refused import Refused
 from rtshcua.cli.showing.keys import as_object, speaks
 from rtshcua.cli.shown import utc
-from rtshcua.cli.stdout import out, out_json
+from rtshcua.cli.stdout import out, out_json, out_rendered
 from rtshcua.cli.trusting import HELPS, trust
 from rtshcua.cli.unlock import read_passphrase, unlock
+from rtshcua.cli.width import columns, typed
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -635,7 +636,10 @@ def _handed(store: KeyStore, *, as_json: bool) -> ExitCode:
     if code is ExitCode.OK and not as_json:
         before = range(_root(store).version - len(store.chain()) + 1, _root(store).version)
         files = [*map(store.earlier_path, before), store.root_path]
-        out("", f"hand it to each vehicle: `rtshcua keys accept {' '.join(map(str, files))} --vehicle IDENTITY`")
+        words = ("rtshcua", "keys", "accept", *map(str, files), "--vehicle", "IDENTITY")
+        out("", "hand it to each vehicle:")
+        for line in typed(words, columns() - 2):
+            out_rendered(f"  {visible(line)}")
     return code
 
 
@@ -707,12 +711,15 @@ def _listed(store: KeyStore, *, as_json: bool) -> ExitCode:
     out(f"  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}", "")
     names = {kid: path.name for kid, path in store.paths(root).items()}
     wide = max(map(len, names.values()))
-    out(f"  {'duty':<9} {'key':<33} {'file':<{wide}}  may speak for")
-    for key in root.keys:
-        out(f"  {key.duty:<9} {key.kid.hex():<33} {names[key.kid]:<{wide}}  {speaks(key)}")
+    rows = [("duty", "key", "file", "may speak for")]
+    rows += ((key.duty, key.kid.hex(), names[key.kid], speaks(key)) for key in root.keys)
     for name in sorted(root.revocations):
         what = "the key of a link" if len(name) == LINK_ID_BYTES else "never trusted again"
-        out(f"  {'revoked':<9} {name.hex():<33} {'':<{wide}}  {what}")
+        rows.append(("revoked", name.hex(), "", what))
+    beside = 2 + 10 + 34 + wide + 2 + max(len(row[3]) for row in rows) <= columns()
+    for duty, key_name, file, last in rows:
+        first = f"  {duty:<9} {key_name:<33} {file:<{wide}}"
+        out(*([f"{first}  {last}"] if beside else [first.rstrip(), f"  {'':<9} {last}"]))
     if root.witness_threshold > 1:
         out("", f"  {root.witness_threshold} witnesses must cosign what counts as anchored")
     return ExitCode.OK

@@ -11,6 +11,8 @@ _BEFORE: Final = re.compile(r" *(?:[-+=·] +|\d+\. )?(?:(?:error|warning|note|he
 _COLUMN: Final = re.compile(r" {2,}+(?=[^ ])")
 #: a part of a word; words in backticks are one: a command or a name is not taken apart where it fits
 _PART: Final = re.compile(r"( *+)([^ `]++|`[^`]*+`|`)")
+#: a command of ours is to be typed: it is not broken, whatever room it takes
+_COMMAND: Final = "`rtshcua "
 #: what sets a colour, and takes no room
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
 
@@ -47,7 +49,7 @@ def _words(line: str, room: int) -> list[tuple[str, str]]:
         else:
             whole.append((space, part))
     for space, word in whole:
-        if " " in word and _columns(word) > room:
+        if " " in word and _columns(word) > room and not word.startswith(_COMMAND):
             head, *more = re.findall(r"( *)([^ ]+)", word)
             found += [(space, head[1]), *more]
         else:

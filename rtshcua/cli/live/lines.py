@@ -1,6 +1,5 @@
 """The view in a pipe: one plain line an event, or one JSON object."""
 
-import shlex
 import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Final
@@ -9,6 +8,7 @@ import msgspec
 
 from rtshcua.cli.live.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.cli.shown import many
+from rtshcua.cli.width import typed
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.evidence.gaps import seconds
 from rtshcua.model.step_number import number_of, step_words
@@ -103,16 +103,6 @@ def waiting_for(
         if words[words.index("--role") + 1] in (missing or asks.roles):
             told += typed(words, width)
     return told
-
-
-def typed(words: Sequence[str], width: int) -> list[str]:
-    """A command over as many lines as it takes, which can be copied into a shell as they are."""
-    lines = [""]
-    for word in map(shlex.quote, words):
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > width - 2:
-            lines.append("  ")
-        lines[-1] += f"{' ' if lines[-1].strip() else ''}{word}"
-    return [f"{line} \\" for line in lines[:-1]] + lines[-1:]
 
 
 def ending(summary: Summary) -> Iterable[str]:

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import struct
 import time
 from pathlib import Path
@@ -506,3 +507,26 @@ def test_what_is_remembered_of_a_folder_may_be_damaged(
     assert provisioned(capsys, tmp_path / "one") == (ExitCode.OK, "")
     (data_folder() / "provisioned" / "vehicle-quad-07").write_bytes(data)
     assert provisioned(capsys, tmp_path / "two") == (ExitCode.REFUSED, "provisioned-before")
+
+
+def test_the_list_fits_a_terminal_and_what_is_to_be_typed_can_be_pasted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert app.main(["keys", "init"]) == ExitCode.OK
+    said = capsys.readouterr().out
+    heading, beneath = said[said.index("  duty") :].splitlines()[:2]
+    assert heading.split() == ["duty", "key", "file"]
+    assert beneath.strip() == "may speak for"
+    assert "\n            role operator through operator, under any policy, on any vehicle\n" in said
+    assert app.main(["keys", "approver", "owner", "--role", "supervisor"]) == ExitCode.OK
+    said = capsys.readouterr().out
+    typed = said[said.index("  rtshcua keys accept") :]
+    assert [line for line in typed.splitlines()[:-1] if not line.endswith(" \\")] == []
+    words = shlex.split(typed.replace("\\\n", ""))  # as a shell joins lines
+    assert words[:3] == ["rtshcua", "keys", "accept"]
+    assert words[-2:] == ["--vehicle", "IDENTITY"]
+    assert all(Path(each).exists() for each in words[3:-2])
+    monkeypatch.setenv("COLUMNS", "400")
+    assert app.main(["keys", "list"]) == ExitCode.OK
+    assert re.search(r"  duty +key +file +may speak for\n", capsys.readouterr().out)

@@ -58,3 +58,9 @@ def test_nothing_is_lost_and_only_single_words_are_too_long(text: str, count: in
     lines = wrapped(line)
     assert "".join("".join(lines).split()) == "".join(line.split())
     assert all(len(each) <= WIDTH or " " not in each.strip() for each in lines)
+
+
+def test_a_command_of_ours_is_never_broken_and_other_words_in_backticks_are() -> None:
+    command = f"`rtshcua keys accept {'/a/long/folder/' * 6}root.trust --vehicle IDENTITY`"
+    assert command in [line.strip() for line in wrapped(f"type {command} then")]
+    assert max(map(len, wrapped(f"a `{'word ' * 40}`"))) <= WIDTH

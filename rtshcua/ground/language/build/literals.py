@@ -72,6 +72,13 @@ def whole_day(span: Span) -> tuple[TimeOfDay, TimeOfDay]:
     return TimeOfDay(span=span, value=0), TimeOfDay(span=span, value=last)
 
 
+_NUMBER = r"-?[0-9]{1,3}(?:\.[0-9]{1,12})?"
+#: two numbers without a unit, as a place is written elsewhere; and what stands around a value of its own
+_TWO_NUMBERS = re.compile(rf"(?P<latitude>{_NUMBER})\s*,\s*(?P<longitude>{_NUMBER})(?=\s*[,)])")
+_NUMBER_BEFORE = re.compile(rf"[(=]\s*(?P<pair>{_NUMBER}\s*,\s*)$")
+_BEFORE_VALUE = re.compile(r"[(=]\s*$")
+
+
 class Literals(Base):
     """Values that are written out."""
 
@@ -211,6 +218,8 @@ class Literals(Base):
             whole = CANONICAL[found.dimension]
             kept = f"a {found.dimension.value} is kept in whole {whole}" if whole else "it is a plain number"
             near = _written(found, unit) + (f" above {datum}" if datum else "")
+            if plain is not None and datum is None and self._place(written, span):
+                return
             if plain is not None and datum is None and len(plain) <= SHOWN:
                 self.report(NOT_EXACT, f"`{short(written)}` is not a whole number", span, f"{kept}; {_exactly(plain)}")
                 return
@@ -226,6 +235,33 @@ class Literals(Base):
             whole_units = 0 if unit is None else limit * UNITS[unit].denominator // UNITS[unit].numerator
             most = f"{whole_units} {unit}" if whole_units else display(limit, found.dimension)
             self.report(OUT_OF_BOUNDS, f"`{short(written)}` is too large", span, f"at most `{most}` fits")
+
+    def _place(self, written: str, span: Span) -> bool:
+        """Reports `47.4, 8.5` where a place is meant, once for both numbers; whether this is one of two such."""
+        text, last = self._source.text, self.diagnostics[-1] if self.diagnostics else None
+        told = last.span if last is not None and last.code is NOT_EXACT else None
+        if told is not None and told.start <= span.start and span.end <= told.end:
+            return True
+        before = _NUMBER_BEFORE.search(text[max(0, span.start - LOOK_BACK) : span.start])
+        start = span.start
+        if before is not None:
+            start -= len(before["pair"])
+        pair = _TWO_NUMBERS.match(text, start)
+        if (
+            pair is None
+            or pair.end() < span.end
+            or _BEFORE_VALUE.search(text[max(0, start - LOOK_BACK) : start]) is None
+        ):
+            return False
+        latitude, longitude = pair["latitude"], pair["longitude"]
+        if max(abs(Fraction(latitude)) * 2, abs(Fraction(longitude))) > 180:
+            return False
+        north, east = "S" if latitude[0] == "-" else "N", "W" if longitude[0] == "-" else "E"
+        place = f"{latitude.lstrip('-')} {north}, {longitude.lstrip('-')} {east}"
+        both = Span(span.file, start, pair.end("longitude"))
+        help, fix = f"for a place, write `{place}`", Fix(both, place, f"write `{place}`")
+        self.report(NOT_EXACT, f"`{short(written)}` is not a whole number", both, help, fixes=(fix,))
+        return True
 
     def _no_unit(self, unit: str, written: str, span: Span) -> None:
         """`-47.4 N, 8.5 E` where a value stands, and `2e3`."""

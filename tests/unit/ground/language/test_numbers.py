@@ -17,3 +17,26 @@ NUMBERS = (
 def test_number(written: str, read: bool) -> None:
     source = "skill s() {\n  require height <= " + written + "\n  maintain height <= 1 m\n}\n"
     assert (parse(Source("x", source)).diagnostics == ()) is read
+
+
+PLACES = (
+    ("47.39774, 8.54659, altitude = 10 m", ["47.39774 N, 8.54659 E"]),
+    ("-47.5, -8.54659, altitude = 10 m", ["47.5 S, 8.54659 W"]),
+    ("target = 47.39774, 8.54659", ["47.39774 N, 8.54659 E"]),
+    ("47, 8.54659, 10.5)  hover(1.5", ["47 N, 8.54659 E", "", ""]),
+    ("97.5, 8.5", ["", ""]),
+    ("altitude = 1.5", [""]),
+    ("47.39774 N, 8.54659 E", []),
+)  # fmt: skip
+
+
+@rows("given, meant", PLACES)
+def test_two_numbers_where_a_place_stands_are_told_once_as_that_place(given: str, meant: list[str]) -> None:
+    text = f"mission m under p@1 on quad {{ phase a {{ goto({given}) }} }}"
+    found = [each for each in parse(Source("x", text)).diagnostics if each.code.id == "E0302"]
+    assert [each.fixes[0].replacement if each.fixes else "" for each in found] == meant
+    for each in found:
+        if each.fixes:
+            assert each.help == f"for a place, write `{each.fixes[0].replacement}`"
+            assert each.span == each.fixes[0].span
+            assert "," in text[each.fixes[0].span.start : each.fixes[0].span.end]

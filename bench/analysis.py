@@ -14,10 +14,10 @@ from time import process_time
 from unittest.mock import patch
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.compiler.program import check_program
-from rtshcua.ground.compiler.proofs import contradiction, rules
-from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
+from rtshcua.ground.prove import contradiction, rules
+from rtshcua.ground.prove.situation import Ground
 from rtshcua.mavlink import dialect
 
 SIZES = (100, 300, 1_000)

@@ -14,10 +14,10 @@ from pathlib import Path
 from statistics import median
 from time import process_time_ns
 
-from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.generate import GRAMMAR, lark
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import mission_payload, policy_digest, policy_payload

@@ -19,7 +19,7 @@ from time import perf_counter_ns
 
 from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.store.writing import sync_data
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision
 from rtshcua.model.durability import BUFFERED, SYNCED_FIRST, WORDS, WRITTEN
 from rtshcua.model.flat.situation import Context, Now, State

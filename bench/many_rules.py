@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference.many_rules import KINDS, policy
 from rtshcua import library
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 
 FEW, MANY = 1_250, 5_000

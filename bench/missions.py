@@ -10,8 +10,8 @@ from pathlib import Path
 from statistics import median
 from time import process_time_ns
 
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 
 INTERACTIVE_MS = 300.0  # for twelve steps

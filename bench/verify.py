@@ -27,9 +27,9 @@ from rtshcua.adapters.files.verification import Asked, verify_carefully, verify_
 from rtshcua.decision.decide import decide
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.report import Verdict
-from rtshcua.ground.auditor.audit import Audit
+from rtshcua.ground.audit.audit import Audit
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.bundle import open_bundle

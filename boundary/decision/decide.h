@@ -100,7 +100,7 @@ void rt_prepare_invocation(const rt_mission *mission, uint32_t step, const rt_pr
 void rt_decide(rt_prepared_invocation *invocation, const rt_state *state, const rt_context *context, const rt_now *now,
                rt_decision *decision);
 
-/* links.c. The target of a `degrade` rule that matches: `-1 - rule`, or RT_NO_TARGET. (session.py: a link DEGRADE is asked for;
+/* fallbacks.c. The target of a `degrade` rule that matches: `-1 - rule`, or RT_NO_TARGET. (session.py: a link DEGRADE is asked for;
    the link that flies is `policy->rules[rule].target`.) */
 int64_t rt_choose_degrade(rt_prepared_invocation *invocation, const rt_state *state, const rt_now *now);
 /* Whether a link of a chain may fly now; `phase` is that of the invocation whose chain it is, RT_NO_PHASE for the contingency. */

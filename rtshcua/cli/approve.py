@@ -27,7 +27,7 @@ from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.analysis.asking import may_match
-from rtshcua.ground.compiler.surveyed import Planned, planned_otherwise
+from rtshcua.ground.lower.surveyed import Planned, planned_otherwise
 from rtshcua.model.step_number import index_of, number_of
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
 from rtshcua.wire.untrusted import Untrusted

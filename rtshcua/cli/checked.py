@@ -22,7 +22,7 @@ from rtshcua.cli.stdout import out
 from rtshcua.diagnostics.codes import UNKNOWN_NAME
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.handbook.model import ChangeTold
+from rtshcua.ground.report.model import ChangeTold
 
 
 def check_sources(
@@ -153,7 +153,7 @@ def _unfit(target: Path, files: Sequence[Path]) -> Refusal | None:
 def _draw(asked: Sequence[Asked], target: Path, issued_at_us: int) -> str:
     """Write the page of the programs that were asked for; what to say of it."""
     from rtshcua.adapters.store.writing import replace
-    from rtshcua.ground.handbook.checked import Checking, checked_page
+    from rtshcua.ground.report.checked import Checking, checked_page
 
     checked = [(each.reading.program, examine(each.reading, issued_at_us)) for each in asked]
     checkings = [Checking(program, one.planned, one.diagnostics) for program, one in checked]

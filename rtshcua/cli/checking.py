@@ -9,9 +9,9 @@ from rtshcua.cli.sources import examine
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.compiler.proofs.bounds import Bounds
-from rtshcua.ground.handbook.changes import told_changes
-from rtshcua.ground.handbook.model import ChangeTold
+from rtshcua.ground.prove.bounds import Bounds
+from rtshcua.ground.report.changes import told_changes
+from rtshcua.ground.report.model import ChangeTold
 from rtshcua.ground.versions.raised import compare
 from rtshcua.model.flat.policy import Policy
 

@@ -11,7 +11,7 @@ from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import append_all
 from rtshcua.cli.live.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending

@@ -17,8 +17,8 @@ from rtshcua.cli.sources import compile_sources, meant, no_source
 from rtshcua.cli.stdout import out
 from rtshcua.cli.unlock import another_key, check_trusted, strangers, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.ground.compiler.pins import Pins, undeclared
-from rtshcua.ground.compiler.sign import sign
+from rtshcua.ground.pipeline.pins import Pins, undeclared
+from rtshcua.ground.pipeline.sign import sign
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.step_number import index_of

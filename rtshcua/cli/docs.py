@@ -24,12 +24,12 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.compiler.program import Checked, compile_program
-from rtshcua.ground.handbook.cases import Tried
-from rtshcua.ground.handbook.handbook import Flown, Part, called, handbook
 from rtshcua.ground.language.paths import shown
+from rtshcua.ground.pipeline.program import Checked, compile_program
+from rtshcua.ground.pipeline.suite import suite
+from rtshcua.ground.report.cases import Tried
+from rtshcua.ground.report.handbook import Flown, Part, called, handbook
 from rtshcua.ground.testing.run import run_case
-from rtshcua.ground.testing.suite import suite
 from rtshcua.ground.versions.raised import compare
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.scenarios import ScenarioDecl
@@ -120,7 +120,7 @@ def docs(
         say(f"nothing in {since} is an earlier version of a policy here")
     if as_json:
         return findings.finish(ExitCode.OK, handbook=asdict(book))
-    from rtshcua.ground.handbook.page import page
+    from rtshcua.ground.report.page import page
 
     text = page(book)
     if target is None:

@@ -26,11 +26,11 @@ from rtshcua.adapters.boundary_process import (
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
+from rtshcua.adapters.doctor.standing import standing
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.owed import OwedParameters
 from rtshcua.adapters.files.signing import LinkKeyError
-from rtshcua.adapters.qualification.standing import standing
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.utc import TimeOfDay, kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address

@@ -14,7 +14,7 @@ from rtshcua.cli.showing.record import Told, show_record
 from rtshcua.cli.stdout import out_json, out_rendered
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.records import AnyRecord
-from rtshcua.ground.auditor.revoked import RevokedKeys
+from rtshcua.ground.audit.revoked import RevokedKeys
 
 
 def explained(

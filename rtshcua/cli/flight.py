@@ -34,7 +34,7 @@ from rtshcua.cli.simulation import SIMULATED
 from rtshcua.cli.tape import Tape
 from rtshcua.cli.witnessed import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded

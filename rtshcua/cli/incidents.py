@@ -18,15 +18,15 @@ from rtshcua.cli.sources import read_sources
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.ground.testing.scenarios import ScenarioFlight
-from rtshcua.ground.testing.suite import scenarios
 from rtshcua.mavlink import dialect
 from rtshcua.model.faults import AgentFault, HostFault
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Event
-from rtshcua.simulation.faults import fault_words
+from rtshcua.simulation.fault_syntax import fault_words
 from rtshcua.virtual.expectations import Met, recorded
 from rtshcua.virtual.triggers import Due, Triggers
 

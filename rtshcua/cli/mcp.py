@@ -81,9 +81,9 @@ def mcp(
 
     with _loading():  # before the host is greeted: it may call a tool at once, and that has 100 ms
         from rtshcua import library
-        from rtshcua.adapters.mcp_server.desk import Desk, Signer
         from rtshcua.adapters.mcp_server.flight import Following
         from rtshcua.adapters.mcp_server.missions import Missions
+        from rtshcua.adapters.mcp_server.tools import Desk, Signer
 
     def make() -> Desk:
         signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))

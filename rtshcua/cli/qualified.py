@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Final
 
 from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.doctor.identity import IdentityQuestions
+from rtshcua.adapters.doctor.standing import standing
 from rtshcua.adapters.files.folders import data_folder
 from rtshcua.adapters.files.qualifications import read_record
-from rtshcua.adapters.qualification.identity import IdentityQuestions
-from rtshcua.adapters.qualification.standing import standing
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.onboard.ports import Event
 from rtshcua.wire.qualification import Qualification, open_qualification

@@ -13,6 +13,7 @@ import typer
 from rtshcua import __version__
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.doctor.diagnosis import settings_told
+from rtshcua.adapters.doctor.standing import unflown
 from rtshcua.adapters.files.folders import data_folder, state_folder
 from rtshcua.adapters.files.keystore import KeyStore
 from rtshcua.adapters.files.qualifications import keep_record, read_record
@@ -20,7 +21,6 @@ from rtshcua.adapters.qualification.checks import ends_after, judge
 from rtshcua.adapters.qualification.missions import NAME, Trial, source_of, trials
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie, TakeoverKind
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
-from rtshcua.adapters.qualification.standing import unflown
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
@@ -40,8 +40,8 @@ from rtshcua.cli.sources import compile_sources, read_text
 from rtshcua.cli.stdout import out, out_json
 from rtshcua.cli.unlock import check_trusted, unlock, unlock_for
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.ground.compiler.program import Compiled, compile_program
-from rtshcua.ground.compiler.sign import sign
+from rtshcua.ground.pipeline.program import Compiled, compile_program
+from rtshcua.ground.pipeline.sign import sign
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission

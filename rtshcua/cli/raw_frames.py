@@ -7,7 +7,7 @@ from pathlib import Path
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.report import Report
-from rtshcua.ground.auditor.frames import OTHERS, Frames
+from rtshcua.ground.audit.frames import OTHERS, Frames
 from rtshcua.mavlink import tlog
 
 

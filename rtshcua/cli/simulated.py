@@ -8,7 +8,7 @@ import typer
 from rtshcua.model.faults import WindStep
 from rtshcua.model.flat.policy import Policy
 from rtshcua.simulation.config import Kind
-from rtshcua.simulation.faults import OF_VEHICLE, parse_fault
+from rtshcua.simulation.fault_syntax import OF_VEHICLE, parse_fault
 
 _BARE = re.compile(r"\d+(\.\d+)?", re.ASCII)
 _WIND = ("speed", "m/s"), ("from", "deg"), ("gust", "m/s")

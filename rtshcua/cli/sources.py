@@ -12,11 +12,11 @@ from rtshcua.diagnostics.codes import DUPLICATE_NAME
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.compiler.pins import PROPOSED, Pins, policies_of
-from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.ground.elaborate.settings import parse_settings
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.language.paths import shown
+from rtshcua.ground.pipeline.pins import PROPOSED, Pins, policies_of
+from rtshcua.ground.pipeline.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.mavlink import dialect
 from rtshcua.wire.names import BUNDLE
 

@@ -12,7 +12,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.gaps import seconds
 from rtshcua.evidence.report import Report, Verdict, cosigned
-from rtshcua.ground.auditor.audit import Audit
+from rtshcua.ground.audit.audit import Audit
 
 #: what a kind of failure means to whoever must act on it, by the first part of its slug
 MEANINGS = {

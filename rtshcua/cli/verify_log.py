@@ -25,7 +25,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.records import AnyRecord
 from rtshcua.evidence.report import Report, Verdict, cosigned
-from rtshcua.ground.auditor.revoked import RevokedKeys
+from rtshcua.ground.audit.revoked import RevokedKeys
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)

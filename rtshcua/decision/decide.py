@@ -33,7 +33,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.links import START, fallbacks
+from rtshcua.decision.fallbacks import START, fallbacks
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.situation import environment, is_situation, ranging, situation
 from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, TRUE, UNKNOWN, Sets, Span, Truth

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
+from rtshcua.decision.fallbacks import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.decision import Decision

@@ -12,9 +12,9 @@ from hashlib import sha256
 from struct import error as struct_error
 from typing import Final, NamedTuple
 
-from rtshcua.evidence.chain import BOUNDARY, BOUNDARY_LOST
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.gaps import STALLED, seconds
+from rtshcua.evidence.log_writer import BOUNDARY, BOUNDARY_LOST
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.recovery import RECOVERED

@@ -24,7 +24,7 @@ from rtshcua.evidence.merkle import EMPTY, Tree, leaf_hash, node_hash
 from rtshcua.evidence.reading import LONGEST, read
 from rtshcua.evidence.records import Close, Effect, Genesis, Recover, Seal, Signed
 from rtshcua.evidence.report import Report, claims, unsealed, with_anchors
-from rtshcua.evidence.seals import Seals, Segment
+from rtshcua.evidence.seal_verification import Seals, Segment
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 
 #: gives so many octets of a log from an offset on, fewer where it ends

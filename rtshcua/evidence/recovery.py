@@ -14,14 +14,14 @@ from enum import Enum
 from hashlib import sha256
 from typing import NamedTuple
 
-from rtshcua.evidence.chain import Recorder, origin_of
 from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.gaps import Term
 from rtshcua.evidence.heads import Head
+from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.reading import behind_close, read, shown, too_long
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal, is_signed
-from rtshcua.evidence.seals import Seals
+from rtshcua.evidence.seal_verification import Seals
 from rtshcua.model.flat.situation import Now
 
 #: the ending that the close of a recovered log names

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.gaps import Gap, told
 from rtshcua.evidence.records import Close, Genesis
-from rtshcua.evidence.seals import Recoveries
+from rtshcua.evidence.seal_verification import Recoveries
 from rtshcua.evidence.witnessing.anchors import Anchored
 
 _LAST_S = 253_402_300_799  # the end of the year 9999

@@ -9,7 +9,7 @@
 7. the end: a close, or else what is missing
 
 That is section 5 of docs/log-format.md but for its steps 2 and 3. What the caller must do: trust the genesis' log key,
-bundle and trust root, and derive the decisions again (`rtshcua.ground.auditor`).
+bundle and trust root, and derive the decisions again (`rtshcua.ground.audit`).
 """
 
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.reading import SHOWN, behind_close, may_be_torn, read, shown, too_long
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
 from rtshcua.evidence.report import Report, claims, unsealed
-from rtshcua.evidence.seals import Seals
+from rtshcua.evidence.seal_verification import Seals
 
 _LINK = slice(10, 74)  # where the value of `_prev` stands
 

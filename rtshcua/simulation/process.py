@@ -36,7 +36,7 @@ from rtshcua.simulation.config import (
     Purpose,
     SimulationConfig,
 )
-from rtshcua.simulation.faults import parse_fault
+from rtshcua.simulation.fault_syntax import parse_fault
 from rtshcua.simulation.mark import hundredths
 from rtshcua.simulation.place import Home
 from rtshcua.simulation.surroundings import Wind

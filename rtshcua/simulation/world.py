@@ -17,8 +17,8 @@ from rtshcua.simulation.answers import Inbox
 from rtshcua.simulation.ardupilot.flavour import ArduCopter
 from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour, Taker
 from rtshcua.simulation.config import Answers, Kind, SimulationConfig
-from rtshcua.simulation.effects import Affected, effects
 from rtshcua.simulation.face import Face
+from rtshcua.simulation.fault_effects import Affected, effects
 from rtshcua.simulation.link import Link
 from rtshcua.simulation.px4.flavour import Px4
 

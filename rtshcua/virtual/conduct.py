@@ -23,7 +23,7 @@ from typing import Any, Final
 
 import msgspec
 
-from rtshcua.decision.links import choose_fallback
+from rtshcua.decision.fallbacks import choose_fallback
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model import faults

@@ -11,7 +11,7 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from rtshcua.ground.compiler import sign
+from rtshcua.ground.pipeline import sign
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.virtual.flight import LATER_US

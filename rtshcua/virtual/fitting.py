@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.bounds import narrower, reach_of
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy

@@ -14,8 +14,8 @@ from rtshcua.adapters.loop import RunLoop, append_all
 from rtshcua.adapters.packs import manoeuvres, packs_of
 from rtshcua.adapters.preparation import Preparations
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.chain import Recorder
-from rtshcua.ground.auditor.audit import Audit, Auditor
+from rtshcua.evidence.log_writer import Recorder
+from rtshcua.ground.audit.audit import Audit, Auditor
 from rtshcua.model.durability import SYNCED_FIRST
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

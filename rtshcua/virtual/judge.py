@@ -32,7 +32,7 @@ import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.evidence.report import Verdict
-from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.ground.audit.audit import Auditor
 from rtshcua.model.faults import Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy, Vehicle

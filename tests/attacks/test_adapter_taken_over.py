@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.px4 import flavour as px4
 from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle import px4 as px4
 from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.evidence.report import Verdict

@@ -26,7 +26,7 @@ from reference.world import (
     sealed,
 )
 from rtshcua.decision.session import InForce
-from rtshcua.ground.auditor.audit import audit
+from rtshcua.ground.audit.audit import audit
 from rtshcua.model.decision import Decision
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load, session

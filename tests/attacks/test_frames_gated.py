@@ -11,10 +11,10 @@ from reference.forgery import read
 from reference.kept_frames import kept
 from reference.verifiers import ROOT_KEY
 from rtshcua.evidence.finding import Finding
-from rtshcua.ground.auditor.audit import Auditor
-from rtshcua.ground.auditor.frames import OURS, Frames
-from rtshcua.ground.auditor.sent import Nature, nature
-from rtshcua.ground.auditor.sent import read as read_frame
+from rtshcua.ground.audit.audit import Auditor
+from rtshcua.ground.audit.frames import OURS, Frames
+from rtshcua.ground.audit.sent import Nature, nature
+from rtshcua.ground.audit.sent import read as read_frame
 from virtual import case
 from virtual.flight import Flight
 

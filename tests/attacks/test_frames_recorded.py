@@ -14,10 +14,10 @@ from reference.forgery import ROOT_KEY, read, signed
 from reference.kept_frames import Entries, kept
 from rtshcua.codec.frames import Codec
 from rtshcua.evidence.finding import Finding
-from rtshcua.ground.auditor.audit import Auditor
-from rtshcua.ground.auditor.frames import OURS, Frames
-from rtshcua.ground.auditor.sent import Nature, nature
-from rtshcua.ground.auditor.sent import read as read_frame
+from rtshcua.ground.audit.audit import Auditor
+from rtshcua.ground.audit.frames import OURS, Frames
+from rtshcua.ground.audit.sent import Nature, nature
+from rtshcua.ground.audit.sent import read as read_frame
 from virtual import case
 from virtual.flight import Flight
 from virtual.rows import rows

@@ -21,7 +21,6 @@ from rtshcua.diagnostics.render import MOST_TEXT, render_one
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.geojson import read_area
 from rtshcua.ground.checker.refused import Refused
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.elaborate import elaborate
 from rtshcua.ground.format import attempt as attempting
 from rtshcua.ground.format.attempt import attempt
@@ -35,6 +34,7 @@ from rtshcua.ground.language.size import MAX_TOKENS
 from rtshcua.ground.language.table import PATH as TABLE
 from rtshcua.ground.lint import ignores as ignoring
 from rtshcua.ground.lint.ignores import ignores
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 
 MOST = 1_000  # instead of `MAX_TOKENS`, for speed

@@ -10,7 +10,7 @@ from reference.log_vectors import WITNESSES, anchor, close, effect, genesis, log
 from reference.verifiers import ROOT_KEY, WORDS
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.evidence.witnessing.anchors import notes
-from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.ground.audit.audit import Auditor
 from virtual.rows import rows
 
 ONE, TWO, THREE = WITNESSES

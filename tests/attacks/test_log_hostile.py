@@ -9,9 +9,9 @@ import pytest
 from reference.forgery import LOG_KEY, ROOT_KEY, edit, expect, flight, read, rewritten
 from reference.seeds import epoch_seeds
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.records import LARGEST
-from rtshcua.ground.auditor.audit import Auditor
+from rtshcua.ground.audit.audit import Auditor
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty
 from virtual.rows import rows

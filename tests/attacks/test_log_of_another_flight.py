@@ -3,7 +3,7 @@
 from base64 import b64decode
 
 from reference.forgery import ROOT_KEY, edit, expect, flight, other_flight, read, rewritten, signed, signers
-from rtshcua.ground.auditor.audit import audit
+from rtshcua.ground.audit.audit import audit
 
 LINES, OTHER = flight(), other_flight()
 

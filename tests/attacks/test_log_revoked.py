@@ -33,8 +33,8 @@ from reference.world import (
 from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.report import Report, Verdict
-from rtshcua.ground.auditor.audit import Auditor
-from rtshcua.ground.auditor.revoked import RevokedKeys
+from rtshcua.ground.audit.audit import Auditor
+from rtshcua.ground.audit.revoked import RevokedKeys
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted

@@ -11,9 +11,9 @@ from reference.forgery import edit, read, signed
 from reference.kept_frames import Entries, kept
 from rtshcua.codec.frames import Codec
 from rtshcua.evidence.records import Effect
-from rtshcua.ground.auditor.audit import Auditor
-from rtshcua.ground.auditor.frames import OURS, Frames
-from rtshcua.ground.auditor.preparations import ListedParameters
+from rtshcua.ground.audit.audit import Auditor
+from rtshcua.ground.audit.frames import OURS, Frames
+from rtshcua.ground.audit.preparations import ListedParameters
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.onboard.enforcement.preparation import SETTABLE, unsettable
 from rtshcua.wire.keys import Duty

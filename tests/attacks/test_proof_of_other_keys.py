@@ -16,8 +16,8 @@ from reference.proof_parts import (
     slug_of_receipt,
 )
 from reference.sealed_log import LOG_KEY, now, sealed_log
-from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.proofs.make import prove_inclusion
 from rtshcua.wire import cbor
 from rtshcua.wire.keys import Duty, SigningKey

@@ -28,7 +28,7 @@ from reference.world import (
 )
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.auditor.audit import audit
+from rtshcua.ground.audit.audit import audit
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.outcome import Outcome, Reason

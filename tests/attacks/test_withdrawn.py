@@ -25,10 +25,10 @@ from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.evidence.reading import read as decoded
 from rtshcua.evidence.records import Effect
-from rtshcua.ground.auditor.audit import Auditor
-from rtshcua.ground.auditor.frames import OURS, Frames
-from rtshcua.ground.auditor.sent import Nature, nature
-from rtshcua.ground.auditor.sent import read as read_frame
+from rtshcua.ground.audit.audit import Auditor
+from rtshcua.ground.audit.frames import OURS, Frames
+from rtshcua.ground.audit.sent import Nature, nature
+from rtshcua.ground.audit.sent import read as read_frame
 from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.onboard.enforcement.isolated import AHEAD, WITHDRAW
 from rtshcua.onboard.enforcement.load import Mode

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from boundary.losing import KEY, Apart, S, to_and_fro
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.mavlink.framing import message_id
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT

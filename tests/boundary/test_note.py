@@ -11,7 +11,7 @@ from boundary.shadow import begin
 from reference.flat_case import MISSION
 from reference.world import ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, sealed
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.chain import Recorder, origin_of
+from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.note import Checkpoint, parse
 from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.wire.keys import Duty

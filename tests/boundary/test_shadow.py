@@ -14,7 +14,7 @@ from reference.world import ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, sealed_
 from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.enforcement.load import Loaded, Mode
 from rtshcua.onboard.ports import Ending
-from rtshcua.simulation.faults import parse_fault
+from rtshcua.simulation.fault_syntax import parse_fault
 from rtshcua.wire.trust import TrustRoot, open_root
 from theorems import test_corollary_1_agent as agents
 from virtual.flight import Flight, Flown

@@ -16,9 +16,9 @@ from unittest.mock import patch
 from msgspec.structs import replace
 
 from rtshcua.adapters import loop
-from rtshcua.adapters.ardupilot import flavour as ardupilot
-from rtshcua.adapters.px4 import flavour as px4
+from rtshcua.adapters.vehicle import ardupilot as ardupilot
 from rtshcua.adapters.vehicle import driver, effects, flavour, manoeuvre, messages, source_time, supervision
+from rtshcua.adapters.vehicle import px4 as px4
 from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.campaign.drawing import FLAVOURS
 from rtshcua.decision import decide, prepare, situation

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import pytest
 
 from reference.bounded_flights import Drawn, bounds, compiled, draw, simulated
-from rtshcua.ground.compiler.program import Compiled
+from rtshcua.ground.pipeline.program import Compiled
 from rtshcua.onboard.ports import Ending
 from virtual import case
 from virtual.flight import Flight, Flown

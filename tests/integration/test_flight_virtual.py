@@ -12,7 +12,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.evidence.report import Verdict
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.onboard.ports import Ending, Event, Interrupted
-from rtshcua.simulation.faults import parse_fault
+from rtshcua.simulation.fault_syntax import parse_fault
 from virtual import case
 from virtual.copying import copied
 from virtual.flight import Flight, Flown

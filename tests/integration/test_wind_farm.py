@@ -12,8 +12,8 @@ from rtshcua.cli.sources import read_sources
 from rtshcua.cli.table import COMMANDS
 from rtshcua.cli.testing.running import ISSUED_AT_US
 from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.ground.testing.scenarios import ScenarioFlight
-from rtshcua.ground.testing.suite import scenarios
 from rtshcua.mavlink import dialect
 from rtshcua.virtual import development
 from rtshcua.virtual.expectations import expectations

@@ -19,7 +19,7 @@ from reference import documents, world
 from reference.flat_case import ISSUED
 from reference.seeds import epoch_seeds
 from reference.world import SESSION_KEY
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now

@@ -19,7 +19,7 @@ from typing import Any
 from msgspec import Struct
 
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.boundary import PermitIssuer, SoftwareBoundary

@@ -10,7 +10,7 @@ from typing import Any
 
 from model.small import GRACE, LIMITS, UNIT
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.load import Loaded

@@ -5,7 +5,7 @@ from pathlib import Path
 from random import Random
 
 from rtshcua.adapters.files.recovery import Signer
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify
 from rtshcua.model.decision import Decision

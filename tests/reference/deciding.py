@@ -4,9 +4,9 @@ from pathlib import Path
 
 from reference.sources import LIBRARY
 from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.case import Suite
 from rtshcua.ground.testing.run import Ran, run_case
-from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 
 IMPORT = 'import "lib:policies/bridge_inspection.rts"\n'

@@ -3,7 +3,7 @@
 from rtshcua.cli.testing.flying import Flying
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.language.load import Program
-from rtshcua.ground.testing.suite import scenarios
+from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.mavlink import dialect
 
 

@@ -17,7 +17,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from reference.resealing import resealed
 from reference.verifiers import ROOT_KEY, agree
 from rtshcua.evidence.report import Verdict
-from rtshcua.ground.auditor.audit import Audit, audit
+from rtshcua.ground.audit.audit import Audit, audit
 from rtshcua.model.faults import BatteryLevel, Fault
 from rtshcua.virtual.vehicle import TICK_US
 from rtshcua.wire.keys import Duty, SigningKey

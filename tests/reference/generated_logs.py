@@ -13,7 +13,7 @@ from random import Random
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.situation import Context, Now, State

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from rtshcua.diagnostics.codes import Severity
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import examine_program
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing import case as cases
 from rtshcua.ground.testing.boundaries.generate import Generated, generate
 from rtshcua.ground.testing.boundaries.plan import Plan
 from rtshcua.ground.testing.run import run_case
-from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[2]

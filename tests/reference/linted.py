@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.lint.lint import lint
 from rtshcua.ground.lint.sift import sift
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[2]

@@ -9,7 +9,7 @@ from msgspec.structs import astuple
 
 from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
+from rtshcua.decision.fallbacks import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, Mission

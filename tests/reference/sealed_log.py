@@ -5,8 +5,8 @@ from hashlib import sha256
 from typing import NamedTuple
 
 from reference.seeds import epoch_seeds
-from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.heads import Head
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.situation import Context, Now, State
@@ -80,7 +80,7 @@ def resumed(lines: list[bytes], draw: object) -> Recorder:
             head.begin(line, sha256(read(line)["checkpoint"].partition("\n\n")[0].encode() + b"\n").digest())
         else:
             head.take(line)
-    from rtshcua.evidence.chain import origin_of
+    from rtshcua.evidence.log_writer import origin_of
 
     genesis = read(lines[0])
     return Recorder.resumed(head, origin_of(genesis["vehicle"], genesis["boot"]), sign, LOG_KEY.public, draw)  # type: ignore[arg-type]

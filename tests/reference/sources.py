@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[2]

@@ -10,8 +10,8 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.quick import outline, quick, scan
 from rtshcua.evidence.records import Genesis
 from rtshcua.evidence.report import Verdict
-from rtshcua.ground.auditor.audit import Audit, Auditor, anchors_of
-from rtshcua.ground.auditor.trust import Basis, establish
+from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of
+from rtshcua.ground.audit.trust import Basis, establish
 from rtshcua.wire.keys import Duty
 from virtual import case
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from copy import deepcopy
 
-from rtshcua.evidence.chain import Recorder, origin_of
+from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.witnessing.cosign import cosign
 from rtshcua.evidence.witnessing.submission import Submission, anchor
 from rtshcua.evidence.witnessing.witness import Declined, Request, Seen, judge

@@ -30,8 +30,8 @@ from reference.seeds import epoch_seeds
 from reference.verifiers import agree
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.chain import Recorder
-from rtshcua.ground.auditor.audit import audit
+from rtshcua.evidence.log_writer import Recorder
+from rtshcua.ground.audit.audit import audit
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from rtshcua.diagnostics.render import render
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 from virtual.sampling import parts
 

@@ -34,10 +34,11 @@ from reference.forgery import (
     sound,
 )  # fmt: skip
 from reference.verifiers import ROOT_KEY
-from rtshcua.evidence import note, seals
+from rtshcua.evidence import note
+from rtshcua.evidence import seal_verification as seals
 from rtshcua.evidence.report import Verdict
-from rtshcua.ground.auditor import meaning
-from rtshcua.ground.auditor.audit import audit
+from rtshcua.ground.audit import meaning
+from rtshcua.ground.audit.audit import audit
 from rtshcua.wire.keys import Duty, SigningKey
 
 STRANGER = SigningKey.from_seed(b"\x77" * 32, duty=Duty.LOG, development=True)

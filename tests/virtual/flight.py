@@ -3,7 +3,7 @@
 from typing import Any
 
 from reference.verifiers import agree
-from rtshcua.ground.auditor.audit import Audit
+from rtshcua.ground.audit.audit import Audit
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.flight import FlownFlight, VirtualFlight

@@ -13,7 +13,7 @@ from rtshcua.adapters.qualification.observed import ObservedQualification, Obser
 from rtshcua.adapters.qualification.sortie import SORTIES, QualifyingDriver, Sortie
 from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.cli.sources import compile_sources, read_text
-from rtshcua.ground.compiler.program import compile_program
+from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

@@ -19,7 +19,7 @@ from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.records import AnyRecord, Effect, Genesis
 from rtshcua.evidence.report import Report, Verdict
-from rtshcua.ground.auditor.audit import Audit, Auditor
+from rtshcua.ground.audit.audit import Audit, Auditor
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

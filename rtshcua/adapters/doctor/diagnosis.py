@@ -8,9 +8,9 @@ from typing import Final
 import msgspec
 
 from rtshcua.adapters.doctor.examination import ExaminingDriver, Talker
+from rtshcua.adapters.doctor.identity import firmware_of, those_that_matter
 from rtshcua.adapters.doctor.settings import SETTINGS, Setting
-from rtshcua.adapters.qualification.identity import firmware_of, those_that_matter
-from rtshcua.adapters.qualification.standing import Standing
+from rtshcua.adapters.doctor.standing import Standing
 from rtshcua.adapters.utc import TimeOfDay
 from rtshcua.adapters.vehicle.bounds import Reach, reach_of
 from rtshcua.adapters.vehicle.drain import drained

@@ -23,8 +23,8 @@ from typing import NamedTuple
 from rtshcua.adapters.files.evidence import SYSTEM, Disk, LogFile, write_all
 from rtshcua.adapters.files.logs import lines, read_anchors
 from rtshcua.adapters.store.reading import open_regular, read_regular
-from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read

@@ -15,9 +15,9 @@ from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.quick import LONGEST_SEGMENT, Octets, Outline, Part, outline, quick, scan
 from rtshcua.evidence.records import AnyRecord
-from rtshcua.ground.auditor.audit import Audit, Auditor, anchors_of, trusted
-from rtshcua.ground.auditor.frames import Frames
-from rtshcua.ground.auditor.trust import establish
+from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of, trusted
+from rtshcua.ground.audit.frames import Frames
+from rtshcua.ground.audit.trust import establish
 
 #: octets of a log that is worth more than one process
 LONG: Final = 32 << 20

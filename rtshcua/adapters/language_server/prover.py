@@ -23,10 +23,10 @@ from rtshcua.adapters.files.project import Project, Projects
 from rtshcua.adapters.files.readable import Readable
 from rtshcua.adapters.language_server.disk import desk
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.lint.lint import lint
 from rtshcua.ground.lint.sift import sift
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.project.settings import Ignored
 from rtshcua.mavlink import dialect
 

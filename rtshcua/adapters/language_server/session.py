@@ -19,10 +19,10 @@ from rtshcua.adapters.language_server.prover import Found, Proving
 from rtshcua.adapters.language_server.searching import Searching
 from rtshcua.adapters.language_server.texts import Opened, Texts, diagnostic
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.ground.compiler.program import check_declared
 from rtshcua.ground.editor.moved import moved_finding
 from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.positions import Change, Lines, edited
+from rtshcua.ground.pipeline.program import check_declared
 from rtshcua.mavlink import dialect
 
 log = logging.getLogger("rtshcua.lsp")

@@ -13,9 +13,9 @@ from rtshcua.ground.agent.narrowed import narrowed
 from rtshcua.ground.agent.permitted import permitted
 from rtshcua.ground.agent.rejections import frame_of, rejections
 from rtshcua.ground.agent.specification import load_specification
-from rtshcua.ground.compiler.pins import Pins
-from rtshcua.ground.compiler.program import compile_program, examine_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.pins import Pins
+from rtshcua.ground.pipeline.program import compile_program, examine_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

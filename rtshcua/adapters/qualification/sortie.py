@@ -12,9 +12,7 @@ from functools import partial
 from math import hypot
 from typing import Any, Final
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
-from rtshcua.adapters.qualification.identity import IdentityQuestions
+from rtshcua.adapters.doctor.identity import IdentityQuestions
 from rtshcua.adapters.qualification.observed import (
     ObservedAnswer,
     ObservedCommand,
@@ -26,6 +24,7 @@ from rtshcua.adapters.qualification.observed import (
 )
 from rtshcua.adapters.qualification.station import GroundStation
 from rtshcua.adapters.vehicle import effects, messages
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.effects import Effect, apart
 from rtshcua.adapters.vehicle.flavour import Stage, Stages
@@ -33,6 +32,7 @@ from rtshcua.adapters.vehicle.link import Heard
 from rtshcua.adapters.vehicle.manoeuvre import AGAIN_US, LATE_US
 from rtshcua.adapters.vehicle.messages import REPOSITION, Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
 from rtshcua.codec.frames import Received, is_addressed
 from rtshcua.mavlink import enums

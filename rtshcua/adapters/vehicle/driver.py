@@ -5,9 +5,8 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
 from rtshcua.adapters.vehicle import messages, observed, others, preflight
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.drain import Consumption
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
 from rtshcua.adapters.vehicle.link import (
@@ -24,6 +23,7 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.preflight import Preflight
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.restart import arrives, flown_by, modes_of
 from rtshcua.adapters.vehicle.source_time import EACH_US, SourceTime
 from rtshcua.adapters.vehicle.streams import (

@@ -7,9 +7,9 @@ from typing import Protocol
 from rtshcua import library
 from rtshcua.cli.linting.examined import Examined, Result
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 
 

@@ -14,7 +14,7 @@ from rtshcua.cli.showing.log import detail_of
 from rtshcua.cli.showing.words import call, duration
 from rtshcua.cli.unconfirmed import is_unconfirmed
 from rtshcua.decision.outline import rings
-from rtshcua.evidence.chain import BOUNDARY
+from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission

@@ -14,9 +14,9 @@ from rtshcua.cli.showing.document import recorded
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.showing.people import NOBODY, People
 from rtshcua.cli.shown import many, true_to, utc
-from rtshcua.evidence.chain import BOUNDARY
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.gaps import STALLED
+from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal

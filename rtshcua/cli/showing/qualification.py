@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import msgspec
 
-from rtshcua.adapters.qualification.standing import unflown
+from rtshcua.adapters.doctor.standing import unflown
 from rtshcua.cli.showing.page import Page
 from rtshcua.cli.shown import utc
 from rtshcua.onboard.ports import Ending

@@ -20,11 +20,11 @@ from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.checks.tests import MAX_CASES
 from rtshcua.ground.format.format import formatted
 from rtshcua.ground.language.paths import on_a_shelf, shown
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.boundaries.generate import Generated
 from rtshcua.ground.testing.boundaries.generate import generate as generated
 from rtshcua.ground.testing.boundaries.plan import Plan
 from rtshcua.ground.testing.case import Suite, Tested
-from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.zone import MAX_COORDINATE, project
 from rtshcua.model.ir.tests import NominalDecl

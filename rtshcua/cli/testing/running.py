@@ -11,13 +11,13 @@ from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.paths import shown
+from rtshcua.ground.pipeline.suite import scenarios as scenarios_of
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.case import Case, Suite, Tested
 from rtshcua.ground.testing.coverage.tally import Covered, Tally
 from rtshcua.ground.testing.flown import Flown
 from rtshcua.ground.testing.run import Ran, run_case
 from rtshcua.ground.testing.scenarios import ScenarioFlight
-from rtshcua.ground.testing.suite import scenarios as scenarios_of
-from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 from rtshcua.virtual.flight import LATER_US
 

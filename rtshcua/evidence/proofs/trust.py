@@ -7,8 +7,8 @@ pinned key. What has expired since the time that is given was good then.
 from typing import NamedTuple
 from urllib.parse import unquote
 
-from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.note import ID_BYTES, Checkpoint, key_id, open_note, parse, read_signature, renamed, split
 from rtshcua.evidence.rooted import may_not_sign, trusted_root
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature

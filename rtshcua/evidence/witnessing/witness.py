@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 from urllib.parse import unquote
 
-from rtshcua.evidence.chain import origin_of
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.merkle import EMPTY
 from rtshcua.evidence.merkle_proofs import verify_consistency
 from rtshcua.evidence.note import Checkpoint, base64, open_note, parse, split, strict_base64

@@ -7,7 +7,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.agent.json_tree import Path, Tree
 from rtshcua.ground.agent.schema import OverridesShape, SpecificationShape, StepShape
-from rtshcua.ground.agent.values import Moved, parse_clauses, parse_quantity, parse_value
+from rtshcua.ground.checker.agent_values import Moved, parse_clauses, parse_quantity, parse_value
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import MissionDecl, Overrides, Phase, Step
 from rtshcua.model.ir.node import Name

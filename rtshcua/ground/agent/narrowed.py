@@ -12,7 +12,7 @@ from rtshcua.ground.agent.patterns import COORDINATES, name_but, quantities, uni
 from rtshcua.ground.agent.permitted import Allowed, Permitted, permitted
 from rtshcua.ground.agent.schema import DRAFT, FORMAT, VERSION, OverridesShape
 from rtshcua.ground.checker.checks.contracts import RECORDS
-from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, MotionKind
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.quantity import Dimension, display

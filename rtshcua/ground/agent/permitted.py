@@ -6,7 +6,7 @@ It may say too much, never too little: what it leaves out is never permitted. Th
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract, Parameter, SourceKind
 from rtshcua.model.flat.policy import Rule, RuleKind
 from rtshcua.model.ir.expression import Comparison, Condition, Inside, Junction, Quantity, Reference, Value, Within

@@ -21,10 +21,10 @@ from rtshcua.ground.agent.mission import mission_of
 from rtshcua.ground.agent.pointers import Places, pointer
 from rtshcua.ground.agent.schema import SpecificationShape
 from rtshcua.ground.agent.shape import shape_errors, uncounted
-from rtshcua.ground.compiler.pins import PROPOSED, Pins, claims
 from rtshcua.ground.language.faults import not_a_source
 from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
 from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
+from rtshcua.ground.pipeline.pins import PROPOSED, Pins, claims
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.program import Import, Unit
 

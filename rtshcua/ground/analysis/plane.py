@@ -5,8 +5,8 @@ from math import isqrt
 from typing import Protocol
 
 from rtshcua.decision.outline import rings as outline
-from rtshcua.ground.compiler.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.compiler.shapes import Point, Region, Ring, bounds, shape_of
+from rtshcua.ground.geometry.relations import have_nothing_in_common, lies_within
+from rtshcua.ground.geometry.shapes import Point, Region, Ring, bounds, shape_of
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE, Zone
 
 #: how finely a zone is searched for a place before shapely is asked

@@ -20,9 +20,9 @@ import msgspec
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.kinds import GEOJSON, recognised
 from rtshcua.ground.checker.features import chosen
-from rtshcua.ground.checker.polygons import Corner, contains, crossing, tangled
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.checker.unread import refuse_height
+from rtshcua.ground.geometry.polygons import Corner, contains, crossing, tangled
 from rtshcua.ground.language.size import bare_of, values_of
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.elaborate.substitute import substitute
+from rtshcua.ground.checker.substitute import substitute
 from rtshcua.model.ir.expression import Arithmetic, Quantity, Value
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.skills import SizesDecl, SkillDecl

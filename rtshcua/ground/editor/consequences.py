@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.compiler.program import Compilation
 from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.moved import parts
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
+from rtshcua.ground.pipeline.program import Compilation
 from rtshcua.ground.testing.case import Case
 from rtshcua.ground.testing.run import run_case
 from rtshcua.mavlink.dialect import Dialect

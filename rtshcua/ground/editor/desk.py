@@ -7,13 +7,13 @@ from itertools import chain
 
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.symbols import Symbols, collect
-from rtshcua.ground.compiler.closure import Imports
 from rtshcua.ground.editor.occurrences import occurrences
 from rtshcua.ground.editor.pieces import Cut, cut, cut_again
 from rtshcua.ground.editor.targets import Occurrence
 from rtshcua.ground.language.load import Listing, Program, Read, load
 from rtshcua.ground.language.parse import Parsed
 from rtshcua.ground.language.paths import SHELVES, Packs, shown
+from rtshcua.ground.pipeline.closure import Imports
 from rtshcua.model.ir.program import Unit
 
 REMEMBERED = 1_000

@@ -3,13 +3,13 @@
 from fractions import Fraction
 
 from rtshcua.ground.checker.data import DataFiles
-from rtshcua.ground.checker.polygons import doubled_area
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.compiler.ground_plan import GroundPlans
-from rtshcua.ground.compiler.projection import projection_at
-from rtshcua.ground.compiler.shapes import Disc, Shape, bounds
 from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.moved import parts
+from rtshcua.ground.geometry.polygons import doubled_area
+from rtshcua.ground.geometry.projection import projection_at
+from rtshcua.ground.geometry.shapes import Disc, Shape, bounds
+from rtshcua.ground.lower.ground_plan import GroundPlans
 from rtshcua.model.ir.expression import Coordinates, Reference
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import ZoneDecl

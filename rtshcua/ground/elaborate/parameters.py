@@ -14,10 +14,10 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context, Instance
 from rtshcua.ground.checker.scope import Argument
+from rtshcua.ground.checker.substitute import names_in, substitute
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.elaborate.settings import Settings
-from rtshcua.ground.elaborate.substitute import names_in, substitute
 from rtshcua.ground.elaborate.values import bound_value, value_of
 from rtshcua.model.ir.expression import Coordinates, Quantity, Reference, Value
 from rtshcua.model.ir.missions import MissionDecl, Phase

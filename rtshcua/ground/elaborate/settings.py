@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.agent.values import parse_value
+from rtshcua.ground.checker.agent_values import parse_value
 from rtshcua.model.ir.expression import Value
 from rtshcua.model.ir.node import Name
 

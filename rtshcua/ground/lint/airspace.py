@@ -9,10 +9,10 @@ from collections.abc import Iterator
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
-from rtshcua.ground.compiler.proofs.situation import Ground
-from rtshcua.ground.compiler.relations import have_nothing_in_common
+from rtshcua.ground.geometry.relations import have_nothing_in_common
 from rtshcua.ground.lint.reach import Reach, reach_of, region_of
 from rtshcua.ground.lint.subject import Subject
+from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.flat.zone import Zone
 from rtshcua.model.ir.node import Name
 

@@ -15,9 +15,9 @@ from rtshcua.decision.values import Span as Between
 from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.solve import Goal, No
 from rtshcua.ground.analysis.space import Space
-from rtshcua.ground.compiler.proofs.ruleset import Ruleset
-from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.lint.reach import Reach, reach_of
+from rtshcua.ground.prove.ruleset import Ruleset
+from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.flat.contract import PLACE, Contract
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
 from rtshcua.model.flat.policy import Policy, RuleKind

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
-from rtshcua.ground.compiler.proofs.ruleset import Ruleset
-from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.lint.deciding import Deciding
 from rtshcua.ground.lint.reach import is_open
 from rtshcua.ground.lint.subject import Subject
+from rtshcua.ground.prove.ruleset import Ruleset
+from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import RuleKind
 

@@ -16,9 +16,9 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.solve import No
 from rtshcua.ground.analysis.space import Space
-from rtshcua.ground.compiler.proofs.ruleset import Ruleset
-from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.lint.subject import Subject
+from rtshcua.ground.prove.ruleset import Ruleset
+from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind

@@ -17,9 +17,9 @@ from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.removal import whole_line
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.well_known import WELL_KNOWN
-from rtshcua.ground.compiler.closure import Imports
 from rtshcua.ground.lint.mentions import mentioned_by
 from rtshcua.ground.lint.subject import Subject
+from rtshcua.ground.pipeline.closure import Imports
 from rtshcua.model.ir.program import Import, Unit
 
 

@@ -4,10 +4,10 @@ from collections.abc import Collection, Iterable
 
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.lint import airspace, authority, gating, grounded, imports, landing, naming, numbers, places, unused
 from rtshcua.ground.lint.subject import Subject
+from rtshcua.ground.prove.situation import Ground
 
 RULES = (unused, naming, authority, numbers, imports, gating, airspace, places, landing, grounded)
 

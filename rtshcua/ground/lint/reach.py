@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from rtshcua.decision.times import timed
 from rtshcua.ground.analysis.plane import rings_of
-from rtshcua.ground.compiler.relations import lies_within
-from rtshcua.ground.compiler.shapes import Disc, Region, cornered
+from rtshcua.ground.geometry.relations import lies_within
+from rtshcua.ground.geometry.shapes import Disc, Region, cornered
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from rtshcua.ground.checker.symbols import Symbols, collect
-from rtshcua.ground.compiler.closure import Imports
-from rtshcua.ground.compiler.proofs.situation import Ground
 from rtshcua.ground.language.load import Program
+from rtshcua.ground.pipeline.closure import Imports
+from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule, TemplateDecl
 from rtshcua.model.ir.program import Unit
 

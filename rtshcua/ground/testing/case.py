@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link

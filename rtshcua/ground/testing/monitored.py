@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.parts import walk
-from rtshcua.ground.compiler.conditions import Conditions
-from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.lower.conditions import Conditions
+from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.model.flat.policy import MonitorKind
 from rtshcua.model.ir.expression import Condition, Edge, ForLast, Near, WithinLast
 from rtshcua.model.ir.node import Node

@@ -16,7 +16,7 @@ from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.starts import Start
-from rtshcua.ground.compiler.mission import lower_mission
+from rtshcua.ground.lower.mission import lower_mission
 from rtshcua.ground.testing.case import Tested
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.mission import Mission

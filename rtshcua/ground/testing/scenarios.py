@@ -14,9 +14,9 @@ from rtshcua.ground.checker.checks.scenarios import OBSTACLE
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.faults import fault_of
 from rtshcua.ground.checker.symbols import correction, suggestion
-from rtshcua.ground.compiler.conditions import Place
-from rtshcua.ground.compiler.files import Files, Joint, shortened
-from rtshcua.ground.compiler.trial import Lacking, Trial, knows_zone
+from rtshcua.ground.lower.conditions import Place
+from rtshcua.ground.lower.files import Files, Joint, shortened
+from rtshcua.ground.lower.trial import Lacking, Trial, knows_zone
 from rtshcua.ground.testing.case import Tested
 from rtshcua.ground.testing.clauses import clause_meant, quotes
 from rtshcua.model.faults import Approval, Disapproval, Fault, WindStep

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.compiler.policy import LoweredPolicy
+from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.versions.differences import differences
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.policies import PolicyDecl

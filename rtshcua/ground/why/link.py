@@ -1,13 +1,13 @@
 """A decision on a link, of a step's fallback or of the contingency: what it looked at, and what else might have flown.
 
-Links skip most steps of design 4.1 (`decision.links`): their own `require`, and the airspace where they move.
+Links skip most steps of design 4.1 (`decision.fallbacks`): their own `require`, and the airspace where they move.
 """
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.links import DEGRADE, choose_fallback, link_admissible
+from rtshcua.decision.fallbacks import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepare import PreparedInvocation, PreparedLink, PreparedPolicy
 from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.values import EVERYWHERE

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rtshcua.decision.contracts import longest
 from rtshcua.decision.decide import PASS, decide, steps
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.links import link_admissible
+from rtshcua.decision.fallbacks import link_admissible
 from rtshcua.decision.nearest import Nearest, nearest
 from rtshcua.decision.prepare import Guards, PreparedInvocation, PreparedPolicy
 from rtshcua.decision.situation import environment, ranging, situation

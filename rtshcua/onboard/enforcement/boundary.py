@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from msgspec.structs import replace
 
-from rtshcua.decision.links import DEGRADE
+from rtshcua.decision.fallbacks import DEGRADE
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.session import MOST_AHEAD, InForce, Session
 from rtshcua.diagnostics.refusal import Refusal

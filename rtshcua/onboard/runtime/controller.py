@@ -12,7 +12,7 @@ turn at all (`link`).
 
 from typing import Final
 
-from rtshcua.decision.links import look_ahead
+from rtshcua.decision.fallbacks import look_ahead
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence

@@ -2,7 +2,7 @@
 
 import msgspec
 
-from rtshcua.decision.links import START, Choice, choose_contingency, choose_fallback
+from rtshcua.decision.fallbacks import START, Choice, choose_contingency, choose_fallback
 from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.load import Loaded

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from fuzz import board, corpus, world
 from fuzz.mutation.sentences import mutated as mutated
 from rtshcua.diagnostics.diagnostic import has_errors
-from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program, compile_program
 from rtshcua.mavlink import dialect
 
 MAX_LENGTH = 8_000

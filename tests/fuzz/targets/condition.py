@@ -16,7 +16,7 @@ from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.language.parse import parse
 from rtshcua.model.ir.expression import Grow
-from unit.ground.compiler.test_expression_meaning import NAMES, SOURCE, declared, histories, lowered, on_board
+from unit.ground.lower.test_expression_meaning import NAMES, SOURCE, declared, histories, lowered, on_board
 
 MAX_LENGTH = 1_000
 BEFORE = "skill x() { require "

@@ -9,7 +9,6 @@ from zlib import crc32
 from fuzz import corpus, world
 from fuzz.mutation.sentences import mutated as mutated
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.compiler.program import check_declared
 from rtshcua.ground.editor.actions import actions
 from rtshcua.ground.editor.colours import colours
 from rtshcua.ground.editor.completion import complete
@@ -23,6 +22,7 @@ from rtshcua.ground.editor.positions import Change, Encoding, Lines, difference,
 from rtshcua.ground.editor.rename import renamable, rename
 from rtshcua.ground.editor.signatures import signature
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.pipeline.program import check_declared
 from rtshcua.mavlink import dialect
 
 MAX_LENGTH = 8_000

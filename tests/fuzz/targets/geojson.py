@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 from fuzz import board, corpus, world
 from fuzz.mutation.trees import mutated_json as mutated
-from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 
 MAX_LENGTH = 6_000

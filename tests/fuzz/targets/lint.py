@@ -11,13 +11,13 @@ from rtshcua.cli.linting.gathered import Gathered
 from rtshcua.diagnostics.codes import can_be_ignored
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.lint.comments import comments
 from rtshcua.ground.lint.fixes import chosen
 from rtshcua.ground.lint.lint import lint
 from rtshcua.ground.lint.sift import sift
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.node import Node
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from fuzz import board, corpus, world
 from fuzz.mutation.trees import mutated_json as mutated
 from rtshcua.ground.agent.specification import load_specification
-from rtshcua.ground.compiler.program import compile_program
+from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 
 MAX_LENGTH = 6_000

@@ -19,8 +19,8 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import render
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.agent.specification import load_specification
-from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program, compile_program
 from rtshcua.mavlink import dialect
 from virtual.sampling import parts
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters import packs
-from rtshcua.adapters.ardupilot import flavour as ardupilot
-from rtshcua.adapters.px4 import flavour as px4
+from rtshcua.adapters.vehicle import ardupilot as ardupilot
+from rtshcua.adapters.vehicle import px4 as px4
 from rtshcua.ground.language.load import load
 
 Install = Callable[[str, str, str], None]

@@ -14,8 +14,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import REGISTRY, Code
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import render
-from rtshcua.ground.compiler.program import check_program, compile_program
 from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.pipeline.program import check_program, compile_program
 from rtshcua.mavlink import dialect
 from virtual.sampling import parts
 

@@ -9,7 +9,7 @@ import pytest
 
 from reference.flat_case import LINK
 from reference.world import START, FakeVehicle, loaded
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.cli import dry_run
 from rtshcua.cli.interrupts import Wish
 from rtshcua.diagnostics.exits import ExitCode

@@ -18,7 +18,7 @@ from rtshcua.cli.closing import close_log, keep_summary
 from rtshcua.cli.live.lines import ending
 from rtshcua.cli.live.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending

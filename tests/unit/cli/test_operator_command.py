@@ -25,7 +25,7 @@ from rtshcua.cli.operator import OperatorConsole, Patience
 from rtshcua.cli.stdout import MOST_LINES, NewestLines
 from rtshcua.cli.unlock import unlock_person
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.records import Close, Effect, encode
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause

@@ -13,7 +13,7 @@ from reference.kept_frames import Entries, kept
 from rtshcua.cli import app
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.ground.auditor.frames import OURS
+from rtshcua.ground.audit.frames import OURS
 from rtshcua.mavlink import tlog
 from rtshcua.wire.keys import Duty
 from virtual import case

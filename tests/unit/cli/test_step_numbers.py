@@ -16,7 +16,7 @@ from rtshcua.cli.live.lines import as_json, plain
 from rtshcua.cli.live.story import Happened, Happening
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.records import Decision
-from rtshcua.ground.auditor.named import ref_words
+from rtshcua.ground.audit.named import ref_words
 from rtshcua.model.step_number import index_of, number_of, step_words
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
 

@@ -397,7 +397,7 @@ def test_in_a_terminal_it_is_coloured(
 
 def test_every_kind_of_failure_has_its_meaning() -> None:
     slugs = set()
-    for folder in ("evidence", "ground/auditor", "cli"):
+    for folder in ("evidence", "ground/audit", "cli"):
         for file in (Path(verdict.__file__).parents[1] / folder).glob("*.py"):
             slugs |= set(re.findall(r'\b(?:Flaw|Finding)\(\s*f?"([a-z]+)/', file.read_text()))
     of_others = {"note", "proof"}  # a note's are told as those of a `seal`, a proof's by who reads proofs

@@ -16,7 +16,7 @@ from rtshcua.adapters.files.logs import read_anchors
 from rtshcua.cli import app
 from rtshcua.cli import witness as command
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.chain import Recorder, origin_of
+from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty, SigningKey

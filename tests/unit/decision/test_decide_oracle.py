@@ -9,7 +9,7 @@ from reference import worlds
 from reference.naive_code import TooNear
 from reference.oracle import Oracle
 from rtshcua.decision.decide import decide, possible
-from rtshcua.decision.links import START, choose_contingency, choose_fallback, link_admissible
+from rtshcua.decision.fallbacks import START, choose_contingency, choose_fallback, link_admissible
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation
 from rtshcua.decision.situation import is_situation, situation
 from rtshcua.model.outcome import Outcome

@@ -10,7 +10,7 @@ from reference.asking import STEP, loaded, ready
 from reference.flat_case import BATTERY, HEIGHT, HOVER, INSPECT, NOW, WIND, M, S, apply, argument, clause, const
 from rtshcua.decision.decide import decide, possible
 from rtshcua.decision.evaluate import NO_PHASE
-from rtshcua.decision.links import choose_contingency, choose_fallback, link_admissible
+from rtshcua.decision.fallbacks import choose_contingency, choose_fallback, link_admissible
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.decision.situation import is_situation, situation

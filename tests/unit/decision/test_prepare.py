@@ -13,7 +13,7 @@ from reference import worlds
 from reference.asking import POLICY, STEP
 from reference.flat_case import GOTO, HOVER, INSPECT, M
 from rtshcua.decision.decide import decide
-from rtshcua.decision.links import choose_contingency, choose_fallback
+from rtshcua.decision.fallbacks import choose_contingency, choose_fallback
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation, prepare_mission
 from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal

@@ -25,7 +25,7 @@ from reference.flat_case import (
     S,
 )
 from rtshcua.decision.decide import decide
-from rtshcua.decision.links import DEGRADE
+from rtshcua.decision.fallbacks import DEGRADE
 from rtshcua.decision.prepare import prepare_mission
 from rtshcua.model.flat.mission import Plan
 from rtshcua.model.outcome import Outcome, Reason

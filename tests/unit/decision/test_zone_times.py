@@ -10,7 +10,7 @@ from reference.asking import STEP, ask, loaded, ready
 from reference.flat_case import MIN, H, M, S
 from reference.naive_code import between
 from rtshcua.decision.contracts import longest
-from rtshcua.decision.links import choose_fallback
+from rtshcua.decision.fallbacks import choose_fallback
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.times import Dates, LocalTime, Times

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link

@@ -7,9 +7,9 @@ from hashlib import sha256
 
 import pytest
 
-from rtshcua.evidence.chain import Recorder, origin_of
 from rtshcua.evidence.epochs import EpochKey
 from rtshcua.evidence.heads import Head
+from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.merkle import leaf_hash, root_of
 from rtshcua.evidence.note import Checkpoint, open_note
 from rtshcua.model.flat.situation import Now

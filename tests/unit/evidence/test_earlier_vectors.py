@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.evidence.verify import verify
-from rtshcua.ground.auditor.audit import audit
+from rtshcua.ground.audit.audit import audit
 
 FOLDER = Path(__file__).parents[2] / "vectors"
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from reference import flat_case as flat
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Decision, Effect, in_words
 from rtshcua.model.decision import Decision as Decided

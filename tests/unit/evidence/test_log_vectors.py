@@ -19,7 +19,7 @@ from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.rooted import rooted
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
-from rtshcua.ground.auditor.audit import audit
+from rtshcua.ground.audit.audit import audit
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.trust import TrustRoot
 from virtual.rows import rows

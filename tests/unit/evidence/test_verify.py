@@ -10,8 +10,8 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from reference.resealing import line_of, note_of, resealed
 from rtshcua.evidence import gaps
-from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.finding import Finding
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.evidence.verify import Verifier, verify

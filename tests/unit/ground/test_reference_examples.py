@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from rtshcua.diagnostics.render import render
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
 

@@ -8,8 +8,8 @@ import pytest
 from msgspec.structs import replace
 
 from reference.seeds import epoch_seeds
-from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, LONGEST_US
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Append, Command, Release

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from reference.seeds import epoch_seeds
-from rtshcua.evidence.chain import Recorder
 from rtshcua.evidence.epochs import LONGEST_US
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.recovery import Examination, State
 from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify

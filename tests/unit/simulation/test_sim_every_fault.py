@@ -9,8 +9,8 @@ from rtshcua.model import faults
 from rtshcua.model.faults import Fault, Mode
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.config import Kind, SimulationConfig
-from rtshcua.simulation.effects import Affected, effects
-from rtshcua.simulation.faults import OF_VEHICLE
+from rtshcua.simulation.fault_effects import Affected, effects
+from rtshcua.simulation.fault_syntax import OF_VEHICLE
 from rtshcua.simulation.world import FLAVOURS
 from virtual.copying import copied
 

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.campaign.drawing import Space, Tally, draw
 from rtshcua.model import faults
 from rtshcua.model.faults import Mode
-from rtshcua.simulation.faults import OF_VEHICLE, fault_words, parse_fault
+from rtshcua.simulation.fault_syntax import OF_VEHICLE, fault_words, parse_fault
 from rtshcua.simulation.surroundings import Wind
 from virtual.rows import rows
 

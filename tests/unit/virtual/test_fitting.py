@@ -3,7 +3,7 @@
 from msgspec.structs import replace
 
 from reference.deciding import program
-from rtshcua.ground.compiler.program import compile_program
+from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

@@ -583,7 +583,7 @@ def test_a_log_that_does_not_verify(good: ScenarioFlown) -> None:
 
 def test_a_decision_that_is_not_derived(good: ScenarioFlown, monkeypatch: pytest.MonkeyPatch) -> None:
     from rtshcua.evidence.finding import Flaw
-    from rtshcua.ground.auditor.meaning import Meaning
+    from rtshcua.ground.audit.meaning import Meaning
 
     flaw = Flaw("decision/differs", "it decides otherwise")
     monkeypatch.setattr(Meaning, "check", lambda self, record: flaw if record.seq == 4 else None)

@@ -4,9 +4,9 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.checks.made_of import circles, operands
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import height, on_globe, quantity
-from rtshcua.ground.checker.polygons import Corner, contained, contains, crossing, tangled
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.checker.report import Report
+from rtshcua.ground.geometry.polygons import Corner, contained, contains, crossing, tangled
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES, meridian
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import Circle, Corridor, GeoJson, Polygon, ZoneDecl

@@ -7,7 +7,7 @@ that flies is the one that it asks for.
 
 from collections.abc import Iterator
 
-from rtshcua.decision.links import DEGRADE
+from rtshcua.decision.fallbacks import DEGRADE
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE
 from rtshcua.ground.testing.coverage.universe import AIRSPACE, ENERGY, OUTCOMES, TRUTHS, Goal, Universe

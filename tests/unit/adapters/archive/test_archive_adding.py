@@ -16,7 +16,7 @@ from rtshcua.adapters.archive.asking import Asker, canned
 from rtshcua.adapters.archive.entry import AUDIT, Entry
 from rtshcua.adapters.archive.folder import TABLES, Folder
 from rtshcua.adapters.store.writing import UNFINISHED
-from rtshcua.evidence.chain import Recorder
+from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.note import split
 from rtshcua.evidence.witnessing.cosign import cosign
 from rtshcua.model.flat.situation import Now

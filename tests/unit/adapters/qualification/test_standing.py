@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from rtshcua.adapters.doctor.identity import IdentityQuestions, as_octets, those_that_matter
+from rtshcua.adapters.doctor.standing import WHOLE, standing
 from rtshcua.adapters.files.qualifications import keep_record, path_of, read_record
-from rtshcua.adapters.px4.flavour import PX4
-from rtshcua.adapters.qualification.identity import IdentityQuestions, as_octets, those_that_matter
 from rtshcua.adapters.qualification.sortie import SORTIES
-from rtshcua.adapters.qualification.standing import WHOLE, standing
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification, QualificationCheck, parameters_digest
 
 PARAMETERS = (("GF_ACTION", as_octets(2)), ("RTL_RETURN_ALT", as_octets(30)))
@@ -79,7 +79,7 @@ def test_one_that_changed_or_does_not_say_is_none(firmware: Any, parameters: Any
 
 
 def test_what_a_run_switches_itself_does_not_matter() -> None:
-    from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+    from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 
     values = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_RADIUS": 150.0, "UNHEARD_OF": 1.0}
     assert those_that_matter(ARDUPILOT, values) == {"FENCE_RADIUS": as_octets(150)}

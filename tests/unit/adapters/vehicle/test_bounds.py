@@ -3,9 +3,9 @@
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.bounds import Reach, airspace_reach, narrower, reach_of, unknown
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 from virtual import case

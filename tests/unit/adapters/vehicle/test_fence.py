@@ -6,8 +6,7 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.fence import (
     EXCLUDE_CIRCLE,
     EXCLUDE_VERTEX,
@@ -18,6 +17,7 @@ from rtshcua.adapters.vehicle.fence import (
     UploadState,
     fence_of,
 )
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone, project
 from virtual.policy import POLICY, PROJECTION

@@ -1,6 +1,6 @@
 """When ArduCopter flies a leg, which it acknowledges with nothing: its speed goes out then, and the leg no more."""
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.model.flat.contract import MotionKind

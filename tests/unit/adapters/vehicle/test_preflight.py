@@ -9,13 +9,13 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.bounds import CEILING_BIT, CIRCLE_BIT, Narrow
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour as Flavour
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.preflight import Preflight
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, POLYGON, Zone

@@ -10,7 +10,7 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Event
-from rtshcua.simulation.faults import parse_fault
+from rtshcua.simulation.fault_syntax import parse_fault
 from rtshcua.virtual.vehicle import SECOND, TICK_US
 from virtual.flight import Flight
 from virtual.flyer import Flyer

@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 
 from recorded.trace import Heard, Question, Trace
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.fence import Upload, UploadState
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage
 from rtshcua.adapters.vehicle.manoeuvre import Commander
 from rtshcua.adapters.vehicle.messages import FENCE, FenceItem
 from rtshcua.adapters.vehicle.observed import Estimator, ObservedVehicle
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.texts import StatusTexts
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 

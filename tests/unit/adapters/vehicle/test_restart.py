@@ -2,10 +2,10 @@
 
 import pytest
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.restart import arrives, flown_by, modes_of
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind

@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import pytest
 
-from rtshcua.adapters.ardupilot import flavour as ardupilot
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4 import flavour as px4
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle import ardupilot as ardupilot
 from rtshcua.adapters.vehicle import messages
+from rtshcua.adapters.vehicle import px4 as px4
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Ready

@@ -15,12 +15,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.ardupilot.flavour import ARDUPILOT
-from rtshcua.adapters.px4.flavour import PX4
+from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import ExpectedTarget
 from rtshcua.adapters.vehicle.manoeuvre import ANSWER_MOST_US, TARGET_US, UNNAMED_MOST_US
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.supervision import TargetWatch
 from rtshcua.codec.frames import Codec
 from rtshcua.model.faults import (

@@ -9,7 +9,7 @@ import pytest
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.agent.specification import load_specification
-from rtshcua.ground.compiler.program import Compiled, compile_program
+from rtshcua.ground.pipeline.program import Compiled, compile_program
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[4]

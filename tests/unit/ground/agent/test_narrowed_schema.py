@@ -16,8 +16,8 @@ from rtshcua.ground.agent.narrowed import RESERVED, narrowed
 from rtshcua.ground.agent.patterns import digits, name_but
 from rtshcua.ground.agent.schema import schema as general
 from rtshcua.ground.agent.specification import parse_specification
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
 

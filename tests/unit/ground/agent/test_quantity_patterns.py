@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.agent.narrowed import narrowed
 from rtshcua.ground.agent.patterns import quantities, unit_of, written
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Step

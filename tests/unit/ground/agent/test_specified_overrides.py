@@ -8,7 +8,7 @@ import pytest
 
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.agent.schema import schema
-from rtshcua.ground.compiler.program import Compiled
+from rtshcua.ground.pipeline.program import Compiled
 
 Compile = Callable[[str | bytes], tuple[Compiled, tuple[Diagnostic, ...]]]
 Dump = Callable[[Any], str]

@@ -7,8 +7,8 @@ import pytest
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.removal import whole_line
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 from unit.ground.analysis.test_rule_checks import HEAD, LIBRARY, POLICY
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.decision.values import MISSING, TRUE, UNKNOWN, Value, point
-from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.policy import RuleKind
 

@@ -10,8 +10,8 @@ from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.symbols import Symbols
 from rtshcua.ground.checker.values import typed
-from rtshcua.ground.compiler.program import Compiled, compile_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import Compiled, compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.expression import Value
 from rtshcua.model.quantity import Dimension

@@ -9,8 +9,8 @@ from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, has_errors
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import correction
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 from unit.ground.analysis.test_rule_checks import HEAD, LIBRARY, POLICY
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).parents[4]

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
 

@@ -8,8 +8,8 @@ import pytest
 
 from reference.sources import IMPORTS, found, policy
 from rtshcua.diagnostics.diagnostic import has_errors
-from rtshcua.ground.compiler.program import Checked, examine_program
 from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import Checked, examine_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.contract import Contract
 from virtual.rows import rows

@@ -1,7 +1,7 @@
 """The world that the tests of the editor share is one of no errors."""
 
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.editor.desk import Desk
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.compiler.program import check_declared
 from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.editor.rename import RENAMED, Renaming, renamable, rename
+from rtshcua.ground.pipeline.program import check_declared
 from rtshcua.mavlink import dialect
 
 DIALECT = dialect.load()

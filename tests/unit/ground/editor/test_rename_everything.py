@@ -10,14 +10,14 @@ import pytest
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.rename import RENAMED, rename
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.language.paths import shown
+from rtshcua.ground.pipeline.program import examine_program
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.run import run_case
-from rtshcua.ground.testing.suite import suite
 from rtshcua.library import root
 from rtshcua.mavlink import dialect
 

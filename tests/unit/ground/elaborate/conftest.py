@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.ground.compiler.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.ground.elaborate.settings import parse_settings
 from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.pipeline.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[4]

@@ -6,8 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.cli.bounds import bounds_told
-from rtshcua.ground.compiler.program import Checked, Compiled
-from rtshcua.ground.compiler.proofs.bounds import Bounds, _taken, most, rounded_energy, rounded_time
+from rtshcua.ground.pipeline.program import Checked, Compiled
+from rtshcua.ground.prove.bounds import Bounds, _taken, most, rounded_energy, rounded_time
 
 Compile = Callable[..., Compiled]
 Check = Callable[[str], Checked]

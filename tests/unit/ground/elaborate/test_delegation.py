@@ -13,9 +13,9 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import collect
-from rtshcua.ground.compiler.program import Checked, Compiled
 from rtshcua.ground.elaborate.elaborate import elaborate
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.expression import Comparison, Condition, Junction, Quantity

@@ -6,7 +6,7 @@ import pytest
 
 from rtshcua.decision.durability import durability_of
 from rtshcua.diagnostics.render import render
-from rtshcua.ground.compiler.program import Compiled
+from rtshcua.ground.pipeline.program import Compiled
 from rtshcua.model.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence

@@ -9,7 +9,7 @@ from rtshcua.decision.checks.contracts import tightens
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import render
-from rtshcua.ground.compiler.program import Checked, Compiled
+from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import policy_payload
 

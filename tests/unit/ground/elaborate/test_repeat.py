@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.compiler.program import Checked, Compiled
 from rtshcua.ground.elaborate.repeat import unrolled
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.model.flat.limits import MAX_INVOCATIONS
 from rtshcua.model.ir.missions import MissionDecl
 from virtual.rows import rows

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from rtshcua.ground.compiler.program import Checked, Compiled
+from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.model.flat.policy import Rule
 
 Compile = Callable[..., Compiled]

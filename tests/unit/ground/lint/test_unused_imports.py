@@ -6,9 +6,9 @@ import pytest
 
 from reference.linted import CHECKOUT, HEAD, POLICY, found, program
 from rtshcua.diagnostics.diagnostic import Applicability
-from rtshcua.ground.compiler.program import check_program
 from rtshcua.ground.language.load import load
 from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 
 TWINS = sorted(path.name for path in (CHECKOUT / "tests" / "accepted").glob("e0[1-8]*1_*.rts"))

@@ -12,10 +12,10 @@ from reference.flat_case import ISSUED, S
 from reference.world import loaded
 from rtshcua import library
 from rtshcua.decision.decide import decide
-from rtshcua.ground.compiler.program import compile_program
 from rtshcua.ground.language.load import Program, load, remembered
+from rtshcua.ground.pipeline.program import compile_program
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.run import run_case
-from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import POSITION

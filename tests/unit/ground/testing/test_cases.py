@@ -7,12 +7,12 @@ from msgspec.structs import replace
 
 from reference.deciding import IMPORT, NOMINAL, WHEN, made, program, ran
 from rtshcua.diagnostics.render import render
-from rtshcua.ground.compiler.program import compile_program, examine_program
 from rtshcua.ground.language.load import load
 from rtshcua.ground.lint.mentions import mentioned_by
+from rtshcua.ground.pipeline.program import compile_program, examine_program
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.cases import REMAINING_US
 from rtshcua.ground.testing.run import Ran, run_case
-from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US

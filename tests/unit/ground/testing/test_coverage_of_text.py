@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
+from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.coverage.coverage import Coverage
 from rtshcua.ground.testing.coverage.tally import Tally
 from rtshcua.ground.testing.run import run_case
-from rtshcua.ground.testing.suite import suite
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[4]

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from reference.deciding import program
 from rtshcua.ground.checker.faults import NAMED, example
-from rtshcua.ground.compiler.program import check_program, compile_program
+from rtshcua.ground.pipeline.program import check_program, compile_program
+from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.ground.testing.scenarios import ScenarioFlight, Scenarios
-from rtshcua.ground.testing.suite import scenarios
 from rtshcua.mavlink import dialect
 from rtshcua.model.faults import KINDS, GpsJump, LinkSilence, Mode, PilotMode, Way, WindStep, parameters
 from rtshcua.model.flat.code import Op

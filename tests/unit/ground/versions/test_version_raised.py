@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.ground.compiler.policy import LoweredPolicy
-from rtshcua.ground.compiler.program import examine_program
 from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.lower.policy import LoweredPolicy
+from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.versions.differences import compared as parted
 from rtshcua.ground.versions.differences import differences
 from rtshcua.ground.versions.direction import CANNOT_TELL, LOOSER, STRICTER, direction

@@ -1,0 +1,202 @@
+"""The audit of a log. The steps beyond those of `rtshcua.evidence.verify`, numbered on from there:
+
+8. trust: the root under the pinned key, the log key's duty, the bundle under that root (`trust`)
+9. the bundle is the one that the caller knows of, if there is one
+10. anchors: what witnesses cosigned is what the log holds (`rtshcua.evidence.witnessing.anchors`)
+11. what the records tell of is what the boundary made and signed for (`rtshcua.evidence.attested`)
+12. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
+    ruled out by the states that the records hold (`observed`)
+13. documents: each approval, recall, replacement and cancellation is verified again, and no decision read another
+    (`documents`)
+14. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
+    `none`
+
+Of several flaws the first of these is told: of the genesis and its trust, of the log itself, of its anchors, of the
+boundary's own evidence, of what its records mean. For a log that is not whole proves nothing, whatever its records say.
+
+What no log can prove: that the state it records is what the vehicle's sensors saw, and that the temporal monitors said
+what follows from all observations, of which the log has those at which something was decided.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from rtshcua.evidence.attested import BoundaryEvidence
+from rtshcua.evidence.finding import Claim, Finding, Flaw
+from rtshcua.evidence.log_writer import origin_of
+from rtshcua.evidence.records import AnyRecord, Decision, Effect, Genesis
+from rtshcua.evidence.report import Report, claims, with_anchors, with_boundary
+from rtshcua.evidence.verify import Verifier
+from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
+from rtshcua.ground.audit.frames import Frames
+from rtshcua.ground.audit.meaning import Meaning
+from rtshcua.ground.audit.told import of_meaning, of_trust
+from rtshcua.ground.audit.trust import Basis, establish
+
+_NOT_DERIVED = "that decisions follow from what they record, and commands from them: `--audit` without `--no-derive`"
+
+
+class Audit(NamedTuple):
+    """A report whose claims say what the pinned key proves, with what the log rests on where that was trusted."""
+
+    report: Report
+    basis: Basis | None
+    derived: int
+    dispatches: int
+
+
+class Auditor:
+    """Takes the lines of a log in order, in memory that the bundle bounds, and some hundred bytes an epoch.
+
+    `derive` says whether what the records mean is worked out again. `anchors` are notes that witnesses cosigned, from
+    wherever; those that the log itself holds are looked at too. `frames` follows the raw frames beside the log; what
+    it found, the caller asks it, once it is known that they are those of the log.
+    """
+
+    def __init__(
+        self, pinned: bytes, *, bundle: bytes | None = None, derive: bool = True, anchors: Iterable[str] = (),
+        frames: Frames | None = None,
+    ) -> None:  # fmt: skip
+        self.record: AnyRecord | None = None  # the last line's, if it is sound in itself and in its place
+        self._pinned = pinned
+        self._expected = bundle
+        self._derive = derive
+        self._given = anchors
+        self._frames = frames
+        self._verifier = Verifier()
+        self._basis: Basis | None = None
+        self._meaning: Meaning | None = None
+        self._anchors: Anchors | None = None
+        self._untrusted: Finding | None = None
+        self._contradicted: Finding | None = None
+        self._suspect: Finding | None = None
+        self._boundary: BoundaryEvidence | None = None
+        self._unattested: Finding | None = None
+
+    def take(self, line: bytes) -> bool:
+        """Takes the next line; False when no further one would change the result."""
+        verifier = self._verifier
+        record = self.record = verifier.take(line)
+        if record is None:
+            return verifier.failure is None
+        if isinstance(record, Genesis):
+            flaw = self._begin(record)
+            self._untrusted = flaw and flaw.at(0, 0)
+        if self._untrusted is not None:
+            return True  # what another root vouches for may be sound in itself: it is read on, for how long it lasted
+        if self._contradicted is None and (flaw := self._witnessed(record)):
+            self._contradicted = flaw.at(record.seq, verifier.offset - len(line))
+        if self._unattested is None and self._boundary is not None and not isinstance(record, Genesis):
+            self._unattested = self._attested(self._boundary, record, verifier.offset - len(line))
+        if self._suspect is None and self._meaning is not None and (flaw := self._meaning.check(record)):
+            self._suspect = flaw.at(record.seq, verifier.offset - len(line))
+        return True
+
+    def _begin(self, genesis: Genesis) -> Flaw | None:
+        basis = establish(genesis, self._pinned, bundle=self._expected)
+        if isinstance(basis, Flaw):
+            return basis
+        self._basis = basis
+        self._boundary = BoundaryEvidence(basis.root, genesis)
+        if self._derive:
+            self._meaning = Meaning(basis, genesis.mode, self._frames)
+        self._anchors = anchors_of(basis, genesis)
+        for note in self._given:
+            flaw = self._anchors.anchor(note)
+            if flaw is not None and self._contradicted is None:
+                self._contradicted = flaw.at(0, 0)
+        return None
+
+    def _attested(self, boundary: BoundaryEvidence, record: AnyRecord, offset: int) -> Finding | None:
+        before = boundary.last
+        found = boundary.check(record, offset)
+        said = boundary.last
+        if found is None and said is not before and said is not None and self._frames is not None:
+            assert isinstance(record, Effect)
+            self._frames.stated(said.frames, said.left, record, final=said.final)
+        return found
+
+    def _witnessed(self, record: AnyRecord) -> Flaw | None:
+        assert self._anchors is not None
+        if isinstance(record, Decision):
+            return None
+        if isinstance(record, Effect):
+            return self._anchors.anchor(record.detail) if record.event == ANCHORED else None
+        assert record.checkpoint is not None
+        return self._anchors.checkpoint(record.checkpoint)
+
+    def audit(self) -> Audit:
+        """The whole, once the lines are over."""
+        report = self._judged(self._verifier.report())
+        meaning = self._meaning
+        if meaning is None:
+            return Audit(report, self._basis, 0, 0)
+        return Audit(report, self._basis, meaning.derived, meaning.dispatches)
+
+    def _judged(self, report: Report) -> Report:
+        if self._untrusted is not None:
+            return failing(report, self._untrusted)
+        if report.failure is not None:
+            return report
+        if self._contradicted is not None:
+            return failing(report, self._contradicted)
+        assert self._anchors is not None
+        anchored = self._anchors.finish(report.records)
+        if isinstance(anchored, Flaw):
+            return failing(report, anchored.at(report.records, self._verifier.offset))
+        if self._unattested is not None:
+            return failing(report, self._unattested)
+        if self._suspect is not None:
+            return failing(report, self._suspect)
+        return self._claimed(with_anchors(report, anchored))
+
+    def _claimed(self, report: Report) -> Report:
+        assert self._basis is not None
+        assert self._boundary is not None
+        report = with_boundary(report, self._boundary.gaps)
+        seen, unseen = self._boundary.claims()
+        shortfall = report.shortfall or self._boundary.shortfall()
+        report = report._replace(
+            proven=(*report.proven, *seen), unproven=(*report.unproven, *unseen), shortfall=shortfall
+        )
+        if self._meaning is None:
+            unproven = (*report.unproven, Claim("decisions", _NOT_DERIVED))
+            return trusted(report._replace(unproven=unproven), self._basis)
+        proven, but = of_meaning(self._basis, self._meaning)
+        report = report._replace(proven=(*report.proven, *proven), unproven=(*report.unproven, *but))
+        return trusted(report, self._basis)
+
+
+def trusted(report: Report, basis: Basis) -> Report:
+    """The report with what the pinned key vouches for, of a log that was trusted."""
+    assert report.genesis is not None
+    proven, unproven = of_trust(report.genesis, basis)
+    return report._replace(proven=(*proven, *report.proven), unproven=(*report.unproven, *unproven))
+
+
+def anchors_of(basis: Basis, genesis: Genesis) -> Anchors:
+    """What the witnesses of a log's root saw is held against its checkpoints by this."""
+    root, origin = basis.root, origin_of(genesis.vehicle, genesis.boot)
+    return Anchors(origin, root.witnesses(genesis.vehicle, genesis.utc_us), root.witness_threshold)
+
+
+def failing(report: Report, failure: Finding) -> Report:
+    """The report with a failure that its log's own chain and seals do not show."""
+    proven, unproven = claims(report.records, 0, 0, report.genesis, None, failure)
+    return report._replace(failure=failure, shortfall=None, proven=proven, unproven=unproven)
+
+
+def audit(
+    lines: Iterable[bytes], pinned: bytes, *, bundle: bytes | None = None, derive: bool = True,
+    anchors: Iterable[str] = (),
+) -> Audit:  # fmt: skip
+    """Audits the lines of a log, each with its newline.
+
+    `pinned` is the trust root's public key (32 bytes) or its `kid` (16 bytes), which must come from elsewhere than the
+    log. `bundle` is what the log should be of, where the caller knows. `derive` and `anchors`: see `Auditor`.
+    """
+    auditor = Auditor(pinned, bundle=bundle, derive=derive, anchors=anchors)
+    for line in lines:
+        if not auditor.take(line):
+            break
+    return auditor.audit()

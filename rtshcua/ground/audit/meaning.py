@@ -1,0 +1,86 @@
+"""What the records of a log mean together: each decision follows from its inputs, and each command from a record."""
+
+from rtshcua.decision.session import Session
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.records import AnyRecord, Decision, Effect
+from rtshcua.ground.audit.cover import Cover
+from rtshcua.ground.audit.derive import Deriver
+from rtshcua.ground.audit.documents import Documents
+from rtshcua.ground.audit.frames import Frames
+from rtshcua.ground.audit.named import is_withdrawn, ref_words
+from rtshcua.ground.audit.preparations import ListedParameters
+from rtshcua.ground.audit.trust import Basis
+from rtshcua.ground.audit.turns import Turns
+
+UNENFORCED = "none"
+
+
+class Meaning:
+    """Takes the records of one log after its genesis, in order, in memory that the bundle bounds, not the log."""
+
+    def __init__(self, basis: Basis, mode: str, frames: Frames | None = None) -> None:
+        self.mode = mode
+        self._frames = frames
+        if frames is not None:
+            frames.begin(basis)
+        self.derived = 0
+        session = self._session = Session(basis.in_force, enforced=mode != UNENFORCED)
+        self._deriver = Deriver(basis, session)
+        self._documents = Documents(session, basis.root)
+        self._cover = Cover()
+        self.preparations = ListedParameters()
+        self._turns = Turns(basis)
+
+    @property
+    def dispatches(self) -> int:
+        """How many commands were sent."""
+        return self._cover.dispatches
+
+    @property
+    def documents(self) -> dict[str, int]:
+        """How many documents of each kind were verified."""
+        return self._documents.counts
+
+    @property
+    def people(self) -> dict[str, list[str]]:
+        """Who signed documents of each kind, by the names that the trust root has for them."""
+        return self._documents.people
+
+    def check(self, record: AnyRecord) -> Flaw | None:
+        """What is wrong with the next record, or None."""
+        if isinstance(record, Decision):
+            return self._decided(record)
+        if isinstance(record, Effect):
+            return self._happened(record)
+        return None
+
+    def _decided(self, record: Decision) -> Flaw | None:
+        if record.mode != self.mode:
+            text = "the decision was made in another mode than the log began in"
+            return Flaw("decision/mode", text, record.mode, self.mode)
+        flaw = self._deriver.check(record)
+        if flaw is None:
+            self.derived += 1
+            self._cover.decided(record)
+        return flaw
+
+    def _happened(self, record: Effect) -> Flaw | None:
+        flaw = self._documents.check(record) or self.preparations.check(record)
+        if flaw is None and self.mode != UNENFORCED:
+            self._cover.recalled = self._documents.counts["recall"] > 0
+            self._cover.cancelled = self._documents.counts["cancellation"] > 0
+            flaw = self._cover.check(record) or self._turns.check(record)
+            if flaw is None and is_withdrawn(record):
+                flaw = self._withdrawn(record)
+        if flaw is None and self._frames is not None:
+            self._frames.happened(record, self.preparations.listed)
+        return flaw
+
+    def _withdrawn(self, record: Effect) -> Flaw | None:
+        flaw = self._turns.withdrawn(record)
+        if flaw is None and not self._session.give_back(record.step):
+            text = "a step may come again that is not the one that was admitted last"
+            flaw = Flaw("dispatch/was-sent", text, ref_words(record.ref))
+        if flaw is None:
+            self._cover.withdrawn(record)
+        return flaw

@@ -1,0 +1,170 @@
+"""Skill contracts and the links of chains, from the IR to the flat form. Everything here was checked before."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from rtshcua.decision.tree import slots_read
+from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.scope import Argument
+from rtshcua.ground.checker.types import Kind
+from rtshcua.ground.lower.conditions import Conditions, Place
+from rtshcua.ground.lower.files import Files
+from rtshcua.ground.lower.lacking import applies
+from rtshcua.ground.lower.zones import ZoneTable
+from rtshcua.model.durability import WORDS
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import (
+    CHOICE,
+    PLACE,
+    QUANTITY,
+    ZONE,
+    Contract,
+    Link,
+    Motion,
+    MotionKind,
+    Parameter,
+    TimingClass,
+)
+from rtshcua.model.flat.policy import LeftOut, Vehicle
+from rtshcua.model.flat.zone import MAX_COORDINATE
+from rtshcua.model.ir.expression import Coordinates
+from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.skills import Clause as ClauseDecl
+from rtshcua.model.ir.skills import LinkDecl, SkillDecl
+
+#: how long a clause may be unknown where a skill does not say
+DEFAULT_GRACE_US = 500_000
+#: what is recorded where a skill does not say
+DEFAULT_RECORD = ("intent", "decision", "state", "authorization", "effect")
+
+
+def recorded(names: Iterable[str]) -> tuple[str, ...]:
+    """What a `record` clause means: kinds of evidence, all if it names none, and the word for how durable, if any."""
+    named = tuple(dict.fromkeys(names))
+    kinds = tuple(name for name in named if name not in WORDS) or DEFAULT_RECORD
+    words = [word for word in WORDS if word in named]
+    return (*kinds, *words[-1:])
+
+
+def cells_of(skill: SkillDecl) -> dict[str, int]:
+    """The first argument cell of each parameter; a place has two."""
+    cells: dict[str, int] = {}
+    cell = 0
+    for parameter in skill.parameters:
+        cells[parameter.name.text] = cell
+        cell += 2 if parameter.type.text == "position" else 1
+    return cells
+
+
+class Contracts:
+    """Lowers the skills of one policy; `numbers` are their indexes, `left_out` the clauses left out."""
+
+    def __init__(
+        self,
+        context: Context,
+        numbers: Mapping[str, int],
+        conditions: Conditions,
+        zones: ZoneTable,
+        files: Files,
+        vehicle: Vehicle,
+    ) -> None:
+        self._context = context
+        self._numbers = numbers
+        self._conditions = conditions
+        self._zones = zones
+        self._files = files
+        self._vehicle = vehicle
+        self.left_out: list[LeftOut] = []
+
+    def contract(self, skill: SkillDecl) -> Contract:
+        """One skill's contract, its defaults filled in."""
+        assert skill.motion is not None
+        assert skill.timing_class is not None
+        assert skill.deadline is not None
+        assert skill.validity is not None
+        assert skill.energy is not None
+        cells = cells_of(skill)
+        place = Place(self._context.scope_of(skill), cells, strict=True)
+        require, assume, maintain = (
+            self._clauses(part, clauses, place, skill)
+            for part, clauses in (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
+        )
+        motion = skill.motion
+        return Contract(
+            name=skill.name.text,
+            parameters=tuple(
+                self._parameter(argument, cells[name]) for name, argument in self._context.arguments(skill).items()
+            ),
+            motion=Motion(
+                kind=int(MotionKind[motion.kind.upper()]),
+                altitude=-1 if motion.altitude is None else cells[motion.altitude.text],
+                speed=-1 if motion.speed is None else cells[motion.speed.text],
+                time=-1 if motion.time is None else cells[motion.time.text],
+            ),
+            timing_class=int(TimingClass[skill.timing_class.text.upper()]),
+            deadline_us=skill.deadline.value,
+            validity_us=skill.validity.value,
+            phases=tuple(name.text for name in skill.phases),
+            duration_us=0 if skill.duration is None else skill.duration.value,
+            grace_us=DEFAULT_GRACE_US if skill.grace is None else skill.grace.value,
+            require=require,
+            assume=assume,
+            maintain=maintain,
+            fallback=self.chain(skill.fallback),
+            energy=skill.energy.value,
+            record=recorded(name.text for name in skill.record),
+            reads=slots_read((*require, *assume, *maintain), self._vehicle, tuple(self._conditions.monitors.all)),
+        )
+
+    def chain(self, links: Sequence[LinkDecl]) -> tuple[Link, ...]:
+        """The links of a chain, in order."""
+        return tuple(self.link(link) for link in links)
+
+    def link(self, link: LinkDecl) -> Link:
+        """One link, its arguments complete."""
+        text, source, start, end = self._files.place(link.span)
+        return Link(
+            skill=self._numbers[link.skill.text],
+            arguments=self.cells(self._context.bound(link)),
+            limit_us=0 if link.limit is None else link.limit.value,
+            text=text,
+            source=source,
+            start=start,
+            end=end,
+        )
+
+    def cells(self, bound: Sequence[Bound]) -> tuple[int, ...]:
+        """Arguments as integers: a zone by its index, a place by its local x and y in mm."""
+        cells: list[int] = []
+        for argument in bound:
+            if isinstance(argument, ZoneDecl):
+                cells.append(self._zones.index[argument.name.text])
+            elif isinstance(argument, Coordinates):
+                cells += self._zones.place(argument) or (0, 0)
+            else:
+                cells.append(argument)
+        return tuple(cells)
+
+    def _clauses(self, part: str, clauses: Sequence[ClauseDecl], place: Place, skill: SkillDecl) -> tuple[Clause, ...]:
+        """The clauses that apply to the vehicle; the others are noted."""
+        without = frozenset(self._vehicle.without)
+        for clause in clauses:
+            if not applies(clause, without):
+                of_skill = self._numbers[skill.name.text]
+                self.left_out.append(LeftOut(of_skill, part, *self._files.place(clause.span)))
+        return tuple(self._conditions.clause(clause.condition, place) for clause in clauses if applies(clause, without))
+
+    def _parameter(self, argument: Argument, cell: int) -> Parameter:
+        declared, type = argument.declaration, argument.type
+        labels = tuple(choice.text for choice in declared.choices)
+        if type.kind is Kind.NUMBER:
+            assert type.dimension is not None
+            assert argument.low is not None
+            assert argument.high is not None
+            kind, dimension, low, high = QUANTITY, type.dimension.value, argument.low, argument.high
+        elif type.kind is Kind.ENUMERATION:
+            kind, dimension, low, high = CHOICE, "choice", 0, len(labels) - 1
+        elif type.kind is Kind.ZONE:
+            kind, dimension, low, high = ZONE, "zone", 0, len(self._zones.regions) - 1
+        else:
+            kind, dimension, low, high = PLACE, "position", -MAX_COORDINATE, MAX_COORDINATE
+        return Parameter(declared.name.text, kind, dimension, cell, low, high, labels)

@@ -1,0 +1,74 @@
+"""Whether a survey path that somebody signed is the one that the planner works out.
+
+On board a path is held to lie in its zone, and no more: who signs a mission may choose it freely there. What is asked
+for is skill, zone and arguments, and from these the planner always makes the same path. It has no say in where the path
+begins, for a bundle does not carry the zone's entry: flown from its other end it is the same path.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from rtshcua.decision.contracts import first_cell
+from rtshcua.ground.geometry.shapes import Point, shape_of
+from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, PATTERNS, survey
+from rtshcua.ground.geometry.ways import path_length
+from rtshcua.model.flat.contract import CHOICE, ZONE, MotionKind
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+
+
+class Planned(NamedTuple):
+    """What the planner works out in the place of a signed path.
+
+    `points` are how many corners it has (0: it finds no path), `length` is in mm; `apart` is how far a corner of either
+    lies from the other, at most, in mm.
+    """
+
+    points: int
+    length: int
+    apart: int
+
+
+def planned_otherwise(policy: Policy, one: Invocation) -> Planned | None:
+    """What the planner works out for a step of a well-formed mission, where that is not the path that was signed."""
+    if one.plan.kind != MotionKind.COVER:
+        return None
+    signed = tuple(zip(one.plan.path[::2], one.plan.path[1::2], strict=True))
+    found: tuple[Point, ...] | None = None
+    for pattern in _patterns(policy, one):
+        found = _survey(policy, one, pattern)
+        if found is not None and signed in (found, found[::-1]):
+            return None
+    return Planned(0, 0, 0) if found is None else Planned(len(found), path_length(found), _apart(signed, found))
+
+
+def _patterns(policy: Policy, one: Invocation) -> Iterator[str]:
+    """What the arguments may call the pattern by: a choice among nothing but patterns. The flat form names no such
+    parameter; without one, it is the default.
+    """
+    choices = [
+        parameter
+        for parameter in policy.contracts[one.skill].parameters
+        if parameter.kind == CHOICE and set(parameter.labels) <= PATTERNS.keys()
+    ]
+    if not choices:
+        yield DEFAULT_PATTERN
+    for parameter in choices:
+        value = one.arguments[parameter.cell]
+        if parameter.low <= value <= parameter.high:
+            yield parameter.labels[value]
+
+
+def _survey(policy: Policy, one: Invocation, pattern: str) -> tuple[Point, ...] | None:
+    number = one.arguments[first_cell(one.contract, ZONE)]
+    shape = shape_of(policy.zones[number]) if 0 <= number < policy.declared else None
+    if shape is None:
+        return None
+    return survey(shape, pattern, one.plan.altitude, policy.vehicle.position_error, None)
+
+
+def _apart(one: tuple[Point, ...], other: tuple[Point, ...]) -> int:
+    import shapely  # noqa: PLC0415  it is slow to import
+
+    lines = [shapely.LineString(points) if len(points) > 1 else shapely.Point(points[0]) for points in (one, other)]
+    return round(float(shapely.hausdorff_distance(*lines)))

@@ -1,0 +1,135 @@
+"""Conditions that are lowered under a policy that is signed as it is, so that they may add nothing to its tables.
+
+They may read the signals that the policy reads, and zones, sets and monitors that it has.
+"""
+
+from collections.abc import Iterator
+from copy import deepcopy
+from typing import Any, NamedTuple
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed
+from rtshcua.ground.checker.conditions import references
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.lower.conditions import Conditions, Place
+from rtshcua.ground.lower.files import Files
+from rtshcua.ground.lower.policy import LoweredPolicy
+from rtshcua.ground.lower.slots import Slots
+from rtshcua.ground.lower.zones import ZoneTable
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
+from rtshcua.model.ir.expression import Condition
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.places import ENTRY
+from rtshcua.model.quantity import Dimension, display
+
+
+class Lacking(NamedTuple):
+    """What a condition needs that the policy has not, where it is written, and what the policy has of that kind."""
+
+    span: Span
+    what: str
+    has: str
+
+
+class Trial:
+    """Lowers conditions under one policy; places are those of `files`."""
+
+    def __init__(self, context: Context, under: LoweredPolicy, files: Files) -> None:
+        self._context = context
+        self._under = under
+        self._files = files
+        self._copy: _Copy | None = None
+
+    def clause(self, condition: Condition, place: Place, span: Span) -> Clause | list[Lacking] | None:
+        """The condition lowered, or what the policy has not of what it needs; None after a finding."""
+        unread, sound = self._unread(condition)
+        if unread or not sound:
+            return unread or None
+        if self._copy is None:
+            self._copy = _copy(self._context, self._under, self._files)
+        before = len(self._context.report.found)
+        lowered = self._copy.conditions.clause(condition, place)
+        lacking = next(_lacking(self._copy, self._under.policy), None)
+        if lacking is not None:
+            self._copy = None  # what it gained is not the policy's
+        if len(self._context.report.found) > before:
+            return None
+        return lowered if lacking is None else [Lacking(span, *lacking)]
+
+    def _unread(self, condition: Condition) -> tuple[list[Lacking], bool]:
+        """The signals of a condition that the policy does not read; and whether it has all its zones, which is reported
+        where it has not.
+        """
+        context, under = self._context, self._under
+        signals = {signal.name for signal in under.policy.signals}
+        unread, sound = list[Lacking](), True
+        for reference in references(condition):
+            zone = reference.name.removesuffix(ENTRY)
+            if reference.name in context.symbols.signals and reference.name not in signals:
+                what = f"reads the signal `{reference.name}`, which the policy does not"
+                unread.append(Lacking(reference.span, what, _signals(under.policy)))
+            elif zone in context.symbols.zones:
+                sound &= knows_zone(context, under, Name(span=reference.span, text=zone))
+        return unread, sound
+
+
+def knows_zone(context: Context, under: LoweredPolicy, zone: Name) -> bool:
+    """Whether a policy has a zone that is declared; reports it where it has not."""
+    if zone.text in under.zones.index:
+        return True
+    context.report.add(
+        codes.NOT_IN_POLICY,
+        zone.span,
+        f"the zone `{zone.text}` is not one that the policy `{under.policy.name}` imports",
+        help="its zones are " + ", ".join(f"`{name}`" for name in under.zones.index),
+        labels=[(context.symbols.zones[zone.text].name.span, "declared here")],
+    )
+    return False
+
+
+class _Copy(NamedTuple):
+    """What the policy was lowered into, copied: what conditions add to it is seen, and thrown away."""
+
+    conditions: Conditions
+    slots: Slots
+    zones: ZoneTable
+
+
+def _copy(context: Context, under: LoweredPolicy, files: Files) -> _Copy:
+    # `deepcopy` asks by identity what to leave as it is
+    memo: dict[int, Any] = {id(each): each for each in (context, context.report, context.symbols)}
+    memo[id(under.files)] = files
+    return _Copy(deepcopy(under.conditions, memo), deepcopy(under.slots, memo), deepcopy(under.zones, memo))
+
+
+def _lacking(copy: _Copy, policy: Policy) -> Iterator[tuple[str, str]]:
+    """What a lowering has added to the tables of a policy, and what these have of its kind."""
+    if copy.slots.count > policy.slots:
+        yield "reads a signal that the policy does not", _signals(policy)
+    if len(copy.zones.flat()) > len(policy.zones) or len(copy.zones.tables) > len(policy.tables):
+        grown = listed(dict.fromkeys(zone.name for zone in policy.zones[len(copy.zones.index) :]))
+        yield "needs a grown zone that the policy does not have", f"it has {grown or 'none'}"
+    if len(copy.conditions.sets.phases) > len(policy.phases):
+        yield "names a phase that no condition of the policy does", f"they name {listed(policy.phases) or 'none'}"
+    if len(copy.conditions.sets.all) > len(policy.sets):
+        yield "needs a set of values that no condition of the policy has", "a single value is compared with `==`"
+    if len(copy.conditions.monitors.all) > len(policy.monitors):
+        watched = listed(dict.fromkeys(_window(monitor) for monitor in policy.monitors))
+        yield "needs a temporal condition that the policy does not observe", f"it observes {watched or 'none'}"
+
+
+def _signals(policy: Policy) -> str:
+    return f"it reads {listed(signal.name for signal in policy.signals)}"
+
+
+def _window(monitor: Monitor) -> str:
+    """A temporal condition as it is written."""
+    words = {
+        MonitorKind.FOR_LAST: "for the last",
+        MonitorKind.WITHIN_LAST: "within the last",
+    }.get(MonitorKind(monitor.kind))
+    if words is None:
+        return f"{MonitorKind(monitor.kind).name.lower()} {monitor.when.text}"
+    return f"{monitor.when.text} {words} {display(monitor.window_us, Dimension.DURATION)}"

@@ -1,0 +1,235 @@
+"""The zones of a policy: declared ones in the local plane, and those derived from them for its conditions.
+
+`grow(zone, margin)` works on the ground plan; floor, ceiling and times stay. Where a condition permits or must hold,
+the derived zone is never too large; where it forbids, never too small. A band above sea is converted by the elevation
+of home. Where that is known to within an error only, the zone that a condition asks for is derived too: its band is
+narrower by the error, or wider.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import msgspec
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.checks.zones import entry_outside
+from rtshcua.ground.checker.data import DataFiles
+from rtshcua.ground.checker.report import Report
+from rtshcua.ground.geometry.offset import Unshapely, inner, outer
+from rtshcua.ground.geometry.relations import have_nothing_in_common, lies_within
+from rtshcua.ground.geometry.shapes import Disc, Point, Region, Shape, bounds, contains
+from rtshcua.ground.geometry.vectors import square
+from rtshcua.ground.lower.clock import week
+from rtshcua.ground.lower.ground_plan import GroundPlans
+from rtshcua.ground.lower.heights import Heights
+from rtshcua.ground.lower.sets import Sets
+from rtshcua.model.flat.code import Op
+from rtshcua.model.flat.limits import DAY, WEEK
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Projection, Zone
+from rtshcua.model.ir.expression import Coordinates
+from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
+from rtshcua.model.quantity import Dimension, display
+
+#: a zone that nothing is inside of, for it has no height, and one that everything is inside of
+NOWHERE = Zone("nowhere", CIRCLE, LOWEST, LOWEST, (0, 0, 1))
+EVERYWHERE = Zone("everywhere", CIRCLE, LOWEST, HIGHEST, (0, 0, MAX_COORDINATE * MAX_COORDINATE))
+#: stands for a zone that has no ground plan, after a finding
+_UNKNOWN = Disc((0, 0), 1)
+
+
+class ZoneTable:
+    """Zones by name and index; asking for a derived one makes it."""
+
+    def __init__(
+        self,
+        projection: Projection,
+        declared: Sequence[ZoneDecl],
+        report: Report,
+        vehicle: VehicleDecl | None = None,
+        data: DataFiles | None = None,
+    ) -> None:
+        self.projection = projection
+        self._report = report
+        self._declarations = tuple(declared)
+        self.index: Mapping[str, int] = {zone.name.text: number for number, zone in enumerate(declared)}
+        by_name = {zone.name.text: zone for zone in declared}
+        self._plans = GroundPlans(projection, by_name, data or DataFiles(), report)
+        self._heights = Heights(vehicle, report)
+        self._broken: set[int] = set()
+        self.regions = [self._region(number, zone) for number, zone in enumerate(declared)]
+        self.derived: list[Zone] = []
+        self.tables: list[tuple[int, ...]] = []
+        self._derived: dict[tuple[int, int, bool], int] = {}
+        self._tables: dict[tuple[int, bool], int] = {}
+        self._dated: dict[tuple[int, ...], int] = {}
+
+    def flat(self) -> tuple[Zone, ...]:
+        """All zones, the declared ones first."""
+        names = (zone.name.text for zone in self._declarations)
+        return (*(region.flat(name) for name, region in zip(names, self.regions, strict=True)), *self.derived)
+
+    def place(self, coordinates: Coordinates) -> Point | None:
+        """A place in the local plane; None, and reported, where it is too far from home."""
+        return self._plans.place(coordinates)
+
+    def zone(self, name: str, margin: int, *, smaller: bool, span: Span) -> int:
+        """The index of a declared zone grown by `margin` mm, or shrunk; `smaller` says which side is the safe one."""
+        number = self.index[name]
+        if margin == 0 and self.regions[number].sure():
+            return number
+        key = (number, margin, smaller)
+        found = self._derived.get(key)
+        if found is None:
+            found = self._derived[key] = self._add(self._derive(number, margin, smaller=smaller, span=span))
+        return found
+
+    def table(self, margin: int, *, smaller: bool) -> int:
+        """The index of a table from each declared zone to the one derived from it."""
+        key = (margin, smaller)
+        found = self._tables.get(key)
+        if found is None:
+            entries = [self._entry(number, margin, smaller=smaller) for number in range(len(self.regions))]
+            found = self._tables[key] = len(self.tables)
+            self.tables.append(tuple(entries))
+        return found
+
+    def within(self, name: str, margin: int, *, smaller: bool, span: Span) -> tuple[int, ...]:
+        """The declared zones that lie within a zone grown by `margin` while it exists: where `smaller`, those that
+        surely do, else those that may.
+        """
+        outside = self.region(name, margin, smaller=smaller, span=span)
+        if outside is None:
+            return ()
+        return self._which(lambda region: lies_within(region, outside, surely=smaller))
+
+    def disjoint(self, name: str, margin: int, *, smaller: bool, span: Span) -> tuple[int, ...]:
+        """The declared zones that have no point in common with a zone grown by `margin`, even while it exists: where
+        `smaller`, those that may have none, else those that surely have none.
+        """
+        other = self.region(name, margin, smaller=smaller, span=span)
+        if other is None:
+            return tuple(range(len(self.regions)))
+        return self._which(lambda region: have_nothing_in_common(region, other, surely=not smaller))
+
+    def region(self, name: str, margin: int, *, smaller: bool, span: Span) -> Region | None:
+        """A declared zone grown by `margin`, as a region of the plane; None, and reported, where nothing is left."""
+        number = self.index[name]
+        if number in self._broken:
+            return None
+        try:
+            return _grown(self.regions[number], margin, smaller=smaller)
+        except Unshapely as unshapely:
+            self._unshapely(unshapely, number, margin, span)
+            return None
+
+    def times(self, name: str, sets: Sets) -> Iterator[tuple[Op, int, int]]:
+        """Instructions that are true while a declared zone exists; none for one that always does."""
+        region = self.regions[self.index[name]]
+        if region.daily:
+            start, end = region.daily
+            yield Op.TIME_IN, start, end
+        if region.weekly:
+            yield Op.WEEK_IN, sets.of(region.weekly), 0
+        if region.dates:
+            found = self._dated.get(region.dates)
+            if found is None:
+                zone = msgspec.structs.replace(EVERYWHERE, dates=region.dates)
+                found = self._dated[region.dates] = self._add(zone)
+            yield Op.POSITION_IN, found, 0
+
+    def _which(self, holds: Callable[[Region], bool]) -> tuple[int, ...]:
+        return tuple(number for number, region in enumerate(self.regions) if holds(region))
+
+    def _region(self, number: int, zone: ZoneDecl) -> Region:
+        shape = self._plans.of(zone)
+        if shape is None:
+            self._broken.add(number)
+            shape = _UNKNOWN
+        elif zone.entry is not None:
+            entry = self.place(zone.entry)
+            if entry is not None and not _contains(shape, entry):
+                entry_outside(self._report, zone)
+        daily, weekly = _hours(zone)
+        dates = () if zone.dates is None else (zone.dates.start_us, zone.dates.end_us)
+        return Region(shape, *self._heights.band(zone), daily=daily, dates=dates, weekly=weekly)
+
+    def _derive(self, number: int, margin: int, *, smaller: bool, span: Span) -> Zone:
+        name = self._declarations[number].name.text
+        region = self.region(name, margin, smaller=smaller, span=span)
+        sure = None if region is None else region.banded(smaller=smaller)
+        return NOWHERE if sure is None else sure.flat(derived_name(name, margin, smaller=smaller))
+
+    def _entry(self, number: int, margin: int, *, smaller: bool) -> int:
+        """Where a zone cannot be derived, the one that fails what asks for it."""
+        if margin == 0 and self.regions[number].sure():
+            return number
+        key = (number, margin, smaller)
+        found = self._derived.get(key)
+        if found is None:
+            try:
+                region = _grown(self.regions[number], margin, smaller=smaller).banded(smaller=smaller)
+                name = derived_name(self._declarations[number].name.text, margin, smaller=smaller)
+                zone = NOWHERE if region is None else region.flat(name)
+            except Unshapely as unshapely:
+                zone = NOWHERE if smaller or unshapely.reason == "nothing" else EVERYWHERE
+            found = self._derived[key] = self._add(zone)
+        return found
+
+    def _add(self, zone: Zone) -> int:
+        self.derived.append(zone)
+        return len(self.regions) + len(self.derived) - 1
+
+    def _unshapely(self, unshapely: Unshapely, number: int, margin: int, span: Span) -> None:
+        zone = self._declarations[number]
+        done = f"{'grown' if margin > 0 else 'shrunk'} by {display(abs(margin), Dimension.LENGTH)}"
+        labels = [(zone.name.span, "the zone is declared here")]
+        if unshapely.reason == "nothing":
+            self._report.add(
+                codes.ZONE_VANISHES, span, f"nothing is left of `{zone.name.text}` when it is {done}", labels=labels
+            )
+            return
+        words = {
+            "far": "it reaches further than 500 km from home",
+            "corners": "its outline has more corners than fit on board",
+            "unproved": "its outline cannot be proved in whole millimetres",
+        }[unshapely.reason]
+        self._report.add(
+            codes.ZONE_SHAPE,
+            span,
+            f"when `{zone.name.text}` is {done}, {words}",
+            help="declare a zone of the shape that you mean",
+            labels=labels,
+        )
+
+
+def derived_name(name: str, margin: int, *, smaller: bool) -> str:
+    """How a derived zone is called; one that is derived for the band's error alone is `surely` or `possibly` there."""
+    if margin == 0:
+        return f"{'surely' if smaller else 'possibly'}({name})"
+    return f"grow({name}, {display(margin, Dimension.LENGTH)})"
+
+
+def _hours(zone: ZoneDecl) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Its times of the day, or those of the week."""
+    hours = zone.daily
+    if hours is None:
+        return (), ()
+    if not hours.days:
+        return (hours.start.value % DAY, hours.end.value), ()
+    windows = week(hours.start.value, hours.end.value, hours.days)
+    return (), () if windows == (0, WEEK) else windows
+
+
+def _contains(shape: Shape, point: Point) -> bool:
+    if isinstance(shape, Disc):
+        return square(point, shape.center) < shape.radius * shape.radius
+    return contains(shape, point)
+
+
+def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
+    """A region grown by `margin` on the safe side, as long as it stays within the local plane."""
+    shape = inner(region.shape, margin) if smaller else outer(region.shape, margin)
+    if max(map(abs, bounds(shape))) > MAX_COORDINATE:
+        raise Unshapely("far")
+    return replace(region, shape=shape)

@@ -1,0 +1,324 @@
+"""A whole program: check every declaration, lower every policy and mission, and hand out the one that was asked for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from rtshcua.decision.prepare import prepare
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.checker.check import check_declarations
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.data import DataFiles
+from rtshcua.ground.checker.lookup import find_mission
+from rtshcua.ground.checker.report import Report
+from rtshcua.ground.checker.symbols import collect
+from rtshcua.ground.checker.uses import with_uses
+from rtshcua.ground.elaborate.elaborate import elaborate
+from rtshcua.ground.elaborate.settings import Settings
+from rtshcua.ground.language.load import Program
+from rtshcua.ground.lower.mission import lower_mission
+from rtshcua.ground.lower.policy import LoweredPolicy, lower_policy
+from rtshcua.ground.pipeline.closure import Imports, beside
+from rtshcua.ground.pipeline.pins import Pins, claims
+from rtshcua.ground.prove.bounds import Bounds, bounds_of, most
+from rtshcua.ground.prove.prove import prove_mission, prove_policy, refused
+from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.testing.case import Case, Tested
+from rtshcua.ground.testing.cases import cases_of
+from rtshcua.ground.testing.scenarios import ScenarioFlight, UnderScenario, scenarios_of
+from rtshcua.mavlink.dialect import Dialect
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.places import VehicleDecl
+from rtshcua.model.ir.policies import PolicyDecl
+
+#: findings that leave out a whole file
+FILE_CODES = frozenset({codes.NO_SUCH_FILE, codes.NOT_TEXT, codes.TOO_LARGE, codes.IMPORT_PATH})
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """A flat policy and mission, both None where there are errors; the mission is not yet bound to the policy.
+
+    `bounds` is what the mission takes at most; `sources` are the texts that findings speak of, the program's and what
+    was given for the mission's parameters; `declared` are all policies of the program, by name and version.
+    """
+
+    policy: Policy | None
+    mission: Mission | None
+    diagnostics: tuple[Diagnostic, ...]
+    bounds: Bounds | None = None
+    sources: Mapping[str, Source] = field(default_factory=dict)
+    declared: frozenset[tuple[str, int]] = frozenset()
+
+
+class Planned(NamedTuple):
+    """A mission whose way is planned, whatever else is wrong with it, and the policy that it is under."""
+
+    under: LoweredPolicy
+    mission: Mission
+    declaration: MissionDecl
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """All findings on a program, and by name what each mission takes at most, with any values of its parameters;
+    without errors also its policies, for each vehicle that it has missions for. `planned` are the missions as they were
+    first lowered, with the defaults of their parameters, with errors too.
+    """
+
+    diagnostics: tuple[Diagnostic, ...]
+    bounds: Mapping[str, Bounds]
+    policies: tuple[LoweredPolicy, ...] = ()
+    grounds: tuple[Ground, ...] = ()  # the same, prepared as on board, with what was asked about them
+    planned: tuple[Planned, ...] = ()
+
+
+def compile_program(
+    program: Program,
+    dialect: Dialect,
+    *,
+    mission: str | None,
+    issued_at_us: int,
+    settings: Settings | None = None,
+    pins: Pins | None = None,
+) -> Compiled:
+    """Compile one mission (None: the only one of the file that was asked for) and the policy that it is under.
+
+    `settings` are values for that mission's parameters; what it claims beyond `pins` is a finding. All declarations are
+    checked, and all missions. Never raises for what the sources say.
+    """
+    settings = settings or Settings()
+    candidates = _candidates(program)
+    name = mission if mission is not None or len(candidates) != 1 else candidates[0].name.text
+    run = Compilation(program, dialect, issued_at_us, name, settings)
+    run.check()
+    chosen = run.choose(mission)
+    if chosen is not None and pins is not None:
+        run.report.found += claims(chosen, pins)
+    compiled = run.lowered(chosen)
+    found = run.diagnostics()
+    declared = frozenset((each.name.text, each.version) for unit in program.units for each in unit.policies)
+    if compiled is None or run.report.failed() or chosen is None:
+        return Compiled(None, None, found, None, run.report.sources, declared)
+    return Compiled(*compiled, found, run.bounds.get(chosen.name.text), run.report.sources, declared)
+
+
+def check_program(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:
+    """All findings on a program, which need not have a mission."""
+    return examine_program(program, dialect).diagnostics
+
+
+def check_declared(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:
+    """The findings on declarations alone, without lowering or proofs: for an editor, which asks at every keystroke."""
+    run = Compilation(program, dialect, 0)
+    run.check()
+    return run.diagnostics()
+
+
+def examine_program(program: Program, dialect: Dialect, issued_at_us: int = 0) -> Checked:
+    """All findings on a program, and the bounds of its missions; as if they were issued at a time, if one is given."""
+    run = Compilation(program, dialect, issued_at_us)
+    run.check()
+    run.lowered(None)
+    run.cases()
+    run.scenarios()
+    if run.report.failed():
+        return Checked(run.diagnostics(), {}, planned=tuple(run.planned.values()))
+    grounds = tuple(run.grounds())
+    lowered = tuple(each.lowered for each in grounds)
+    return Checked(run.diagnostics(), run.bounds, lowered, grounds, tuple(run.planned.values()))
+
+
+def _candidates(program: Program) -> list[MissionDecl]:
+    """The missions of which one is meant where none is named: those of the first file, or else all."""
+    first = list(program.units[0].missions) if program.units else []
+    return first or [mission for unit in program.units for mission in unit.missions]
+
+
+class Compilation:
+    """One compilation: `check` first, then what is asked of it, then `diagnostics`. `issues` has, of missions by their
+    names, other times of issue than that of all.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        dialect: Dialect,
+        issued_at_us: int,
+        chosen: str | None = None,
+        settings: Settings | None = None,
+        issues: Mapping[str, int] | None = None,
+    ) -> None:
+        self.program = program
+        self.issued_at_us = issued_at_us
+        self.issues = issues or {}
+        given = settings or Settings()
+        options = {given.source.file: given.source} if given.source.text else {}
+        self.report = Report({**program.sources, **options}, program.data)
+        self.report.found += program.diagnostics
+        self.bounds: dict[str, Bounds] = {}
+        self.planned: dict[str, Planned] = {}
+        self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
+        self._imports = Imports(program.units, program.stable)
+        self._policies: dict[tuple[str, str], Ground | None] = {}
+        self._tested: dict[tuple[str, str], Tested | None] = {}
+        self._flown: dict[str, UnderScenario] = {}
+        data = DataFiles(program.data, program.data_names)
+        self.context = Context(collect(program.units, program.broken), self.report, dialect, data=data)
+        if self.whole:
+            plain = elaborate(self.context, program.units, self._imports.closure, chosen, given)
+            symbols = collect(plain.units, program.broken)
+            instances, samples = plain.instances, plain.samples
+            self.context = Context(symbols, self.report, dialect, instances=instances, samples=samples, data=data)
+
+    def check(self) -> None:
+        """Check all declarations; where a file is missing or an import unread, half of all names would be unknown."""
+        if self.whole:
+            check_declarations(self.context)
+
+    def choose(self, name: str | None) -> MissionDecl | None:
+        """The mission that was asked for; None, and reported, where there is not exactly one."""
+        if not self.whole:
+            return None
+        if name is not None:
+            return find_mission(self.context, name)
+        candidates = _candidates(self.program)
+        if len(candidates) == 1:
+            return self.context.symbols.missions.get(candidates[0].name.text)
+        if not self.context.symbols.broken and not (self.report.failed() and not candidates):
+            names = ", ".join(f"`{each.name.text}`" for each in candidates)
+            self.report.add(
+                codes.NO_MISSION,
+                candidates[1].name.span if candidates else None,
+                f"there are {len(candidates)} missions" if candidates else "the sources declare no mission",
+                help=f"say which one to compile: {names}" if candidates else "add a mission, or name the file of one",
+            )
+        return None
+
+    def lowered(self, chosen: MissionDecl | None) -> tuple[Policy, Mission] | None:
+        """Lower every mission and every policy, if nothing is wrong with the declarations."""
+        if self.report.failed():
+            return None
+        found: tuple[Policy, Mission] | None = None
+        symbols = self.context.symbols
+        for mission in symbols.missions.values():  # first, so that no finding on a policy is one on a mission's values
+            self._policy(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
+        for mission in self.context.missions():
+            flat = self._mission(mission)
+            if mission is chosen:
+                found = flat
+        for policy in self.context.symbols.policies.values():
+            self._unused(policy)
+        return found
+
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """The findings by file, in the order in which the files were reached, and by place."""
+        order = {unit.file: number for number, unit in enumerate(self.program.units)}
+
+        def place(found: Diagnostic) -> tuple[int, Span]:
+            span = found.span
+            return (-1, Span("", 0, 0)) if span is None else (order.get(span.file, len(order)), span)
+
+        merged = [with_uses(found, self.context.symbols) for found in self.report.merged()]
+        return tuple(dict.fromkeys(sorted(merged, key=place)))
+
+    def grounds(self) -> list[Ground]:
+        """The policies that were lowered."""
+        return [ground for ground in self._policies.values() if ground is not None]
+
+    def _mission(self, mission: MissionDecl) -> tuple[Policy, Mission] | None:
+        symbols = self.context.symbols
+        under = self._policy(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
+        if under is None:
+            return None
+        lowered = lower_mission(self.context, mission, under.lowered, self.program.stable, self._issued(mission))
+        if lowered is None:
+            return None
+        under = replace(under, lowered=replace(under.lowered, files=lowered.files))
+        flat = lowered.mission
+        self.planned.setdefault(mission.name.text, Planned(under.lowered, flat, mission))
+        bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat))
+        self.bounds[mission.name.text] = most(bounds, self.bounds.get(mission.name.text))
+        tested = Tested(under.lowered, under.prepared)
+        self._flown.setdefault(mission.name.text, UnderScenario(tested, flat, mission))  # the first has the defaults
+        return under.lowered.policy, flat
+
+    def _issued(self, mission: MissionDecl) -> int:
+        return self.issues.get(mission.name.text, self.issued_at_us)
+
+    def _unused(self, policy: PolicyDecl) -> None:
+        """Lower a policy that no mission is under, for the first vehicle that it imports."""
+        if any(name == policy.name.text for name, _ in self._policies):
+            return
+        vehicle = self._imported_vehicle(policy)
+        if vehicle is not None:
+            self._policy(policy, vehicle)
+
+    def _imported_vehicle(self, policy: PolicyDecl) -> VehicleDecl | None:
+        files = self._imports.closure(policy.span.file)
+        return next((each for each in self.context.symbols.vehicles.values() if each.span.file in files), None)
+
+    def _policy(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Ground | None:
+        key = (policy.name.text, vehicle.name.text)
+        if key not in self._policies:
+            lowered = self._unproved(policy, vehicle)
+            self._policies[key] = None if lowered is None else prove_policy(self.context, lowered)
+        return self._policies[key]
+
+    def unproved(self) -> None:
+        """Lower every mission and every policy, and prove nothing: what is found without waiting for proofs."""
+        if self.report.failed():
+            return
+        symbols = self.context.symbols
+        for mission in self.context.missions():
+            under = self._under_test(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
+            if under is not None:
+                lower_mission(self.context, mission, under.lowered, self.program.stable, self._issued(mission))
+        for policy in symbols.policies.values():
+            vehicle = self._imported_vehicle(policy)
+            if vehicle is not None and all(name != policy.name.text for name, _ in self._tested):
+                self._under_test(policy, vehicle)
+
+    def cases(self) -> tuple[Case, ...]:
+        """What the tests of the file that was asked for come to, if nothing is wrong with the declarations."""
+        if self.report.failed() or not self.context.symbols.tests:
+            return ()
+        return tuple(cases_of(self.context, self._under_test, self.program.stable))
+
+    def scenarios(self) -> tuple[ScenarioFlight, ...]:
+        """The scenarios of the file that was asked for, if nothing is wrong with what was lowered before."""
+        if self.report.failed() or not self.context.symbols.scenarios:
+            return ()
+        return tuple(scenarios_of(self.context, self._flown, self.program.stable))
+
+    def _under_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Tested | None:
+        """A policy as tests need it; None where it has errors. It is not proved for them."""
+        key = (policy.name.text, vehicle.name.text)
+        if key not in self._tested:
+            proved = self._policies.get(key)
+            self._tested[key] = (
+                self._unproved_test(policy, vehicle) if proved is None else Tested(proved.lowered, proved.prepared)
+            )
+        return self._tested[key]
+
+    def _unproved_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Tested | None:
+        lowered = self._unproved(policy, vehicle)
+        prepared = None if lowered is None else prepare(lowered.policy)
+        if lowered is None or prepared is None:
+            return None
+        if isinstance(prepared, Refusal):
+            refused(self.context, lowered, prepared)
+            return None
+        return Tested(lowered, prepared)
+
+    def _unproved(self, policy: PolicyDecl, vehicle: VehicleDecl) -> LoweredPolicy | None:
+        files = self._imports.closure(policy.span.file)
+        stable = self.program.stable
+        own = stable.get(policy.span.file, policy.span.file)
+        names = {file: beside(stable.get(file, file), own) for file in (*files, *self.program.data)}
+        return lower_policy(self.context, policy, vehicle, files, names)

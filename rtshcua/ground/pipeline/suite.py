@@ -1,0 +1,72 @@
+"""The cases of a program, prepared as real requests are, and its scenarios with what they fly."""
+
+from collections.abc import Mapping
+
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.language.load import Program
+from rtshcua.ground.pipeline.program import Compilation
+from rtshcua.ground.testing.case import Suite
+from rtshcua.ground.testing.scenarios import ScenarioFlight, Scenarios
+from rtshcua.mavlink.dialect import Dialect
+from rtshcua.model.ir.scenarios import Begins, ScenarioDecl
+
+
+def suite(program: Program, dialect: Dialect) -> Suite:
+    """The cases of the first file of a program; findings on the declarations and the tests.
+
+    What is proved of policies and missions is not asked here: that is `check_program`'s business.
+    """
+    run = Compilation(program, dialect, 0)
+    run.check()
+    cases = run.cases()
+    found = run.diagnostics()
+    if run.report.failed():
+        return Suite((), found, (), run.report.sources)
+    policies = tuple(dict.fromkeys(case.policy for case in cases))
+    return Suite(cases, found, policies, run.report.sources)
+
+
+def scenarios(program: Program, dialect: Dialect, issued_at_us: int, later_us: int = 0) -> Scenarios:
+    """The scenarios of the first file of a program; all findings on the program, its proofs included.
+
+    Their missions are issued at a UTC time in us; that of a scenario which says when it begins, `later_us` before. What
+    no scenario flies is proved for any time, as `check` does.
+    """
+    found: dict[Diagnostic, None] = {}
+    flights: list[ScenarioFlight] = []
+    sources: Mapping[str, Source] = program.sources
+    starts = _starts(program, issued_at_us, later_us)
+    for number in range(max(map(len, starts.values()), default=1)):
+        issues = {name: times[min(number, len(times) - 1)] for name, times in starts.items()}
+        run = Compilation(program, dialect, 0, issues=issues)
+        run.check()
+        run.lowered(None)
+        made = run.scenarios()
+        found |= dict.fromkeys(run.diagnostics())
+        sources = run.report.sources
+        if run.report.failed():
+            return Scenarios((), tuple(found), sources)
+        flights += [
+            each
+            for each in made
+            if number < len(starts[each.mission.name])
+            and _issued(each.declaration, issued_at_us, later_us) == starts[each.mission.name][number]
+        ]
+    flights.sort(key=lambda each: each.declaration.span)
+    return Scenarios(tuple(flights), tuple(found), sources)
+
+
+def _starts(program: Program, issued_at_us: int, later_us: int) -> dict[str, list[int]]:
+    """When the missions that scenarios fly are issued, each time once, by the names of the missions."""
+    starts: dict[str, list[int]] = {}
+    for scenario in program.units[0].scenarios if program.units else ():
+        times = starts.setdefault(scenario.mission.text, [])
+        issued = _issued(scenario, issued_at_us, later_us)
+        if issued not in times:
+            times.append(issued)
+    return starts
+
+
+def _issued(scenario: ScenarioDecl, issued_at_us: int, later_us: int) -> int:
+    return next((each.utc_us - later_us for each in scenario.start if isinstance(each, Begins)), issued_at_us)

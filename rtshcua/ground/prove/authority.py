@@ -1,0 +1,200 @@
+"""E0702 to E0704, E0706, E0719: the policy permits each step with the arguments that it has, and lets it fly.
+
+A permit's clauses over arguments and zones must be true; those over signals, the time and the vehicle's position are
+left for on board.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from rtshcua.decision.decide import PASS, authority
+from rtshcua.decision.evaluate import Environment, build
+from rtshcua.decision.nearest import Changes, Offer, offer
+from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
+from rtshcua.decision.values import FALSE, TRUE
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.conditions import references
+from rtshcua.ground.lower.mission import argument_span
+from rtshcua.ground.prove.best import hopeful
+from rtshcua.ground.prove.conjuncts import conjuncts
+from rtshcua.ground.prove.situation import Ground
+from rtshcua.model.flat.contract import SourceKind, TimingClass
+from rtshcua.model.flat.policy import Rule, RuleKind
+from rtshcua.model.ir.expression import Condition
+from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.outcome import Reason
+from rtshcua.model.quantity import Dimension, display
+
+
+class Unmet(NamedTuple):
+    """A clause of a permit that is not true: where it is written, the parameters it reads, what would do."""
+
+    span: Span
+    parameters: tuple[str, ...]
+    accepted: tuple[Offer, ...]
+
+
+def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
+    """Whether in some state of the vehicle a step is permitted and flown; reports it where in none it is."""
+    at = ground.around(invocation)
+    found = authority(invocation, at)
+    if PASS in found or not found:
+        return not _degraded(ground, step, invocation, at)
+    # a forbid that some state makes false does not decide in the best case; what permits, or does not, comes last
+    forbids = (each.rule for each in invocation.candidates.forbids if not each.condition(at) & FALSE)
+    forbid = None if found[0].reason is Reason.CLASS_NOT_PERMITTED else next(forbids, None)
+    if forbid is not None:
+        ground.context.report.add(
+            codes.FORBIDDEN,
+            step.span,
+            f"the policy `{ground.prepared.policy.name}` forbids this step",
+            help=_otherwise(ground, invocation, at, forbid),
+            labels=[(ground.span(forbid), "by this rule")],
+        )
+        return False
+    match found[-1].reason:
+        case Reason.CLASS_NOT_PERMITTED:
+            _class(ground, mission, step, invocation)
+        case Reason.NOT_PERMITTED:
+            _not_permitted(ground, mission, step, invocation)
+        case _:
+            _out_of_scope(ground, step, invocation, at)
+    return False
+
+
+def _degraded(ground: Ground, step: Step, invocation: PreparedInvocation, at: Environment) -> bool:
+    """Whether a degrade holds, or is unknown, in every state; reports it."""
+    always = (each.rule for each in invocation.candidates.degrades if not each.condition(at) & FALSE)
+    rule = next(always, None)
+    if rule is None or rule.target is None:
+        return False
+    policy = ground.prepared.policy
+    ground.context.report.add(
+        codes.DEGRADED,
+        step.span,
+        f"the policy `{policy.name}` flies `{policy.contracts[rule.target.skill].name}` in place of this step, "
+        "whatever the state",
+        help=_otherwise(ground, invocation, at, rule),
+        labels=[(ground.span(rule), "by this rule")],
+    )
+    return True
+
+
+def _otherwise(ground: Ground, invocation: PreparedInvocation, at: Environment, rule: Rule) -> str:
+    """The nearest arguments for which a rule does not hold; where there are none, what else to change."""
+    node = ground.prepared.compiler.when(rule)
+    changes = Changes(at, ground.prepared.tables)
+    wanted = None if node is None else changes.find(hopeful(node, False), False)
+    contract, policy = invocation.invocation.contract, ground.prepared.policy
+    offers = [offer(change, contract, policy, at) for change in wanted or ()]
+    if not offers or not all(each.change.argument and each.options for each in offers):
+        return "narrow the condition of the rule, or leave the step out"
+    return _accepted({each.subject: "` or `".join(_words(each)) for each in offers})
+
+
+def _accepted(values: Mapping[str, str]) -> str:
+    return "nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in values.items())
+
+
+def _class(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
+    skill = ground.context.symbols.skills[step.skill.text]
+    assert mission.source is not None
+    assert skill.timing_class is not None
+    timing = TimingClass(invocation.invocation.contract.timing_class).name.lower()
+    ground.context.report.add(
+        codes.SOURCE_CLASS,
+        step.skill.span,
+        f"`{mission.source.text}` may not ask for a skill of the class `{timing}`",
+        help="an agent and an operator may ask for `semantic` and `tactical` skills",
+        labels=[
+            (skill.timing_class.span, "the class is declared here"),
+            (mission.source.span, "proposed by this source"),
+        ],
+    )
+
+
+def _not_permitted(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
+    policy, flat = ground.prepared.policy, invocation.invocation
+    assert mission.role is not None
+    may: list[str] = []
+    for rule in policy.rules:
+        if rule.kind == RuleKind.PERMIT and flat.skill in rule.skills:
+            roles = " or ".join(f"`{policy.roles[role]}`" for role in rule.roles) or "any role"
+            through = " or ".join(f"`{SourceKind(source).name.lower()}`" for source in rule.sources) or "any source"
+            may.append(f"{roles} through {through}")
+    source = SourceKind(flat.source).name.lower()
+    ground.context.report.add(
+        codes.NOT_PERMITTED,
+        step.skill.span,
+        f"no rule permits `{step.skill.text}` to the role `{mission.role.text}` through `{source}`",
+        help="it is permitted to " + "; to ".join(dict.fromkeys(may)) if may else "it is permitted to nobody",
+        labels=[(ground.lowered.declaration.name.span, "the policy is declared here")],
+    )
+
+
+def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, at: Environment) -> None:
+    """Explain by the permit that is nearest to permitting."""
+    permits = [_unmet(ground, permit, invocation, at) for permit in invocation.candidates.permits]
+    nearest = min(permits, key=len)
+    report, flat = ground.context.report, invocation.invocation
+    names = list(dict.fromkeys(name for unmet in nearest for name in unmet.parameters))
+    span = argument_span(ground.context, step, names[0]) if names else step.span
+    default = _default(ground, step, names[0]) if names and span == step.span else None
+    written = (
+        f" = {report.text(span if default is None else default)}" if names and (default or span != step.span) else ""
+    )
+    subject = f"`{names[0]}{written}`" if names else f"`{flat.contract.name}`"
+    accepted = {each.subject: "` or `".join(_words(each)) for unmet in nearest for each in unmet.accepted}
+    fix = None
+    if names and len(nearest) == 1 and names[0] in accepted and span != step.span:
+        replacement = _words(nearest[0].accepted[0])[0]
+        fix = (span, replacement, f"write `{replacement}`")
+    report.add(
+        codes.OUT_OF_SCOPE,
+        span,
+        f"{subject} is outside of what `{ground.prepared.policy.name}` permits for `{flat.contract.name}`",
+        help=_accepted(accepted) if accepted else None,
+        labels=[
+            *((unmet.span, "this does not hold") for unmet in nearest),
+            *(() if default is None else ((default, "the step says nothing, so this default holds"),)),
+        ],
+        fix=fix,
+    )
+
+
+def _default(ground: Ground, step: Step, parameter: str) -> Span | None:
+    """Where the default of a parameter is written."""
+    skill = ground.context.symbols.skills[step.skill.text]
+    return next((p.default.span for p in skill.parameters if p.name.text == parameter and p.default is not None), None)
+
+
+def _words(offer: Offer) -> list[str]:
+    """The values that would do, as a source writes them."""
+    return [name or display(value, Dimension(offer.dimension)) for value, name in offer.options]
+
+
+def _unmet(ground: Ground, permit: PreparedRule, invocation: PreparedInvocation, at: Environment) -> list[Unmet]:
+    """The clauses of a permit that cannot be true, in source order."""
+    rule = permit.rule
+    declared = _declaration(ground, rule)
+    node = ground.prepared.compiler.when(rule)
+    if declared is None or node is None:
+        return []
+    contract, policy = invocation.invocation.contract, ground.prepared.policy
+    changes = Changes(at, ground.prepared.tables)
+    parameters = {parameter.name for parameter in contract.parameters}
+    found: list[Unmet] = []
+    for clause, part in conjuncts(declared, node):
+        if build(part, ground.prepared.tables)(at) & TRUE:
+            continue
+        wanted = changes.find(part, True) or ()
+        offers = [offer(change, contract, policy, at) for change in wanted if change.argument]
+        reads = dict.fromkeys(each.name for each in references(clause) if each.name in parameters)
+        found.append(Unmet(clause.span, tuple(reads), tuple(each for each in offers if each.options)))
+    return found
+
+
+def _declaration(ground: Ground, rule: Rule) -> Condition | None:
+    """The condition of the rule that was lowered to this one."""
+    return ground.lowered.written[rule].when

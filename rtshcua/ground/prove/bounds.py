@@ -1,0 +1,231 @@
+"""E0809 to E0812: what a mission takes at most, in steps, time and energy, and whether that is within what it says.
+
+Time runs from the issue to the end: the start window, each step's approval, deadline and duration, and the longest
+chain that may follow one of them. Energy is what the contracts of the steps may take up to one that is given up, and of
+the chain that is then flown, whichever step that is; a return takes no less than the way home from the farthest planned
+place. A mission whose bound exceeds a full charge is refused: no battery that is put in would be enough.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from math import isqrt
+from typing import NamedTuple
+
+from rtshcua.decision.contracts import longest
+from rtshcua.decision.flying import charge, home_us
+from rtshcua.decision.prepare import prepare_invocation
+from rtshcua.decision.values import TRUE
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.span import Span
+from rtshcua.ground.prove.durations import StepBound
+from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.timing import START_WINDOW_US
+from rtshcua.model.flat.contract import Contract, Link, MotionKind
+from rtshcua.model.flat.limits import FULL
+from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.quantity import Dimension, display
+
+SECOND_US = 1_000_000
+
+#: what brings the vehicle down is not given up for the contingency: only its own chain follows
+_HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
+#: what leads to a height
+_ALOFT = (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)
+
+#: so many of the largest contributions are shown
+SHOWN = 3
+
+
+class Bounds(NamedTuple):
+    """At most so many invocations, so long from the issue to the end (us), and so much energy (1/10000); and what each
+    step is proved to take of its own.
+    """
+
+    invocations: int
+    time_us: int
+    energy: int
+    steps: tuple[StepBound, ...] = ()
+
+
+def most(one: Bounds, other: Bounds | None) -> Bounds:
+    """What is within both."""
+    if other is None:
+        return one
+    steps = one.steps
+    if [each.skill for each in one.steps] == [each.skill for each in other.steps]:
+        pairs = zip(one.steps, other.steps, strict=True)
+        steps = tuple(StepBound(a.skill, max(a.time_us, b.time_us), max(a.energy, b.energy)) for a, b in pairs)
+    return Bounds(
+        max(one.invocations, other.invocations), max(one.time_us, other.time_us), max(one.energy, other.energy), steps
+    )
+
+
+def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission, flown: tuple[StepBound, ...] = ()) -> Bounds:
+    """The bounds of a mission, of which `flown` is what each step is proved to take; reports where they exceed what it
+    says.
+    """
+    policy = ground.prepared.policy
+    steps = [step for phase in declared.phases for step in phase.steps]
+    times = [_time(ground, mission, invocation) for invocation in mission.invocations]
+    energies = [invocation.contract.energy for invocation in mission.invocations]
+    chains = {policy.contingency, *(each.contract.fallback for each in mission.invocations)}
+    found = Bounds(
+        len(mission.invocations),
+        START_WINDOW_US + sum(times) + max(_chain_time(chain, policy) for chain in chains),
+        _energy(ground, mission),
+        flown,
+    )
+    _count(ground, declared, found.invocations)
+    _within(ground, declared, found, steps, times, energies)
+    return found
+
+
+def _time(ground: Ground, mission: Mission, invocation: Invocation) -> int:
+    """How long a step takes from its turn to its end, in us."""
+    contract, vehicle = invocation.contract, ground.prepared.policy.vehicle
+    return _approval(ground, mission, invocation) + contract.deadline_us + longest(contract, vehicle)
+
+
+def _approval(ground: Ground, mission: Mission, invocation: Invocation) -> int:
+    """How long a step may wait for an approval."""
+    rules = ground.prepared.rules.candidates(invocation.skill, invocation.role, invocation.source)
+    if not rules.confirms:
+        return 0
+    prepared = prepare_invocation(invocation, ground.prepared, mission.phases)
+    if isinstance(prepared, Refusal):
+        return 0  # reported by the proofs
+    at = ground.around(prepared)
+    return max((each.rule.within_us for each in rules.confirms if each.condition(at) & TRUE), default=0)
+
+
+def _chain_time(chain: Iterable[Link], policy: Policy) -> int:
+    return sum(longest(policy.contracts[link.skill], policy.vehicle, link.limit_us) for link in chain)
+
+
+def _taken(contract: Contract, way_home: int) -> int:
+    """What a contract takes; one that flies home no less than the way there."""
+    return max(contract.energy, way_home) if contract.motion.kind == MotionKind.HOME else contract.energy
+
+
+def _energy(ground: Ground, mission: Mission) -> int:
+    """What the steps take up to the one that a chain follows, and that chain: after it no step is flown."""
+    policy = ground.prepared.policy
+    way_home = _way_home(ground, mission)
+
+    def chain_energy(chain: Iterable[Link]) -> int:
+        return sum(_taken(policy.contracts[link.skill], way_home) for link in chain)
+
+    contingency = chain_energy(policy.contingency)
+    spent = largest = 0
+    for invocation in mission.invocations:
+        denied = spent + contingency
+        spent += _taken(invocation.contract, way_home)
+        own = chain_energy(invocation.contract.fallback)
+        given_up = own if invocation.contract.motion.kind in _HOMEWARD else max(own, contingency)
+        largest = max(largest, denied, spent + given_up)
+    return largest
+
+
+def _way_home(ground: Ground, mission: Mission) -> int:
+    """The energy of the way home from the farthest and highest planned place, rounded up; low it is only near home."""
+    vehicle, plans = ground.prepared.policy.vehicle, [invocation.plan for invocation in mission.invocations]
+    speeds = vehicle.speeds
+    assert speeds is not None  # the compiler writes them
+    squares = (x * x + y * y for plan in plans for x, y in zip(plan.path[::2], plan.path[1::2], strict=True))
+    distance = isqrt(max(squares, default=0)) + 1 + vehicle.position_error
+    slowest = min((plan.speed for plan in plans if plan.speed), default=0)
+    heights = [plan.altitude for plan in plans if plan.kind in _ALOFT] or [0]
+    near = home_us(vehicle, speeds, vehicle.position_error, (0, max(heights)), slowest)
+    far = home_us(vehicle, speeds, distance, (min(heights), max(heights)), slowest)
+    return charge(speeds, max(near, far))
+
+
+def _count(ground: Ground, declared: MissionDecl, steps: int) -> None:
+    if declared.most_steps is None or steps <= declared.most_steps:
+        return
+    ground.context.report.add(
+        codes.MISSION_STEPS,
+        declared.name.span,
+        f"the mission `{declared.name.text}` has {steps} steps, and says that it has at most {declared.most_steps}",
+        help=f"leave steps out, or write `steps at most {steps}`",
+        labels=[(phase.name.span, f"these are {len(phase.steps)}") for phase in declared.phases if phase.steps][:SHOWN],
+    )
+
+
+def _within(
+    ground: Ground,
+    declared: MissionDecl,
+    found: Bounds,
+    steps: Sequence[Step],
+    times: Sequence[int],
+    energies: Sequence[int],
+) -> None:
+    report = ground.context.report
+    start = display(START_WINDOW_US, Dimension.DURATION)
+    if declared.most_time is not None and found.time_us > declared.most_time.value:
+        report.add(
+            codes.MISSION_TIME,
+            declared.most_time.span,
+            f"the mission may last {rounded_time(found.time_us)} from its issue, and says that it lasts at most "
+            f"{display(declared.most_time.value, Dimension.DURATION)}",
+            help=f"{start} to the start, {rounded_time(sum(times))} for the approvals, deadlines and durations of all "
+            f"steps, and {rounded_time(found.time_us - START_WINDOW_US - sum(times))} for the longest chain; give "
+            "steps shorter times of their own, or the mission more",
+            labels=_largest(steps, times, rounded_time),
+        )
+    limit = declared.most_energy
+    over = found.energy > FULL and not _told(ground, steps)
+    if not over and (limit is None or found.energy <= limit.value):
+        return
+    needs = f"the mission may need {rounded_energy(found.energy)} of a full charge"
+    rest = found.energy - sum(energies)
+    split = f"{rounded_energy(sum(energies))} for all steps, as their contracts allow"
+    if over:
+        report.add(
+            codes.OVER_CHARGE,
+            declared.name.span,
+            f"{needs}, and a battery has 100 %",
+            help=f"{split}, and {rounded_energy(rest)} more where one of them is given up and a chain flies; "
+            "leave steps out, or make two missions of it",
+            labels=_largest(steps, energies, rounded_energy),
+        )
+    else:
+        assert limit is not None
+        report.add(
+            codes.MISSION_ENERGY,
+            limit.span,
+            f"{needs}, and says that it needs at most {display(limit.value, Dimension.RATIO)}",
+            help=f"{split}, and {rounded_energy(rest)} more where one of them is given up and a chain flies",
+            labels=_largest(steps, energies, rounded_energy),
+        )
+
+
+def _told(ground: Ground, steps: Sequence[Step]) -> bool:
+    """Whether one of the steps was found to lack charge: that says more."""
+    spans = {step.span for step in steps}
+    return any(each.code is codes.SHORT_OF_ENERGY and each.span in spans for each in ground.context.report.found)
+
+
+def _largest(steps: Sequence[Step], amounts: Sequence[int], words: Callable[[int], str]) -> list[tuple[Span, str]]:
+    """The places that contribute most, those of a repeated step together."""
+    sums: dict[Span, list[int]] = {}
+    for step, amount in zip(steps, amounts, strict=True):
+        sums.setdefault(step.span, []).append(amount)
+    largest = sorted(sums.items(), key=lambda item: (-sum(item[1]), item[0]))[:SHOWN]
+    return [
+        (span, f"up to {words(sum(parts))}" + (f", {len(parts)} times {words(parts[0])}" if len(parts) > 1 else ""))
+        for span, parts in largest
+    ]
+
+
+def rounded_time(us: int) -> str:
+    """A time for a person, rounded up to the second."""
+    minutes, seconds = divmod(-(-us // SECOND_US), 60)
+    return (f"{minutes} min" + (f" {seconds} s" if seconds else "")) if minutes else f"{seconds} s"
+
+
+def rounded_energy(energy: int) -> str:
+    """A part of a full charge for a person, rounded up to the percent."""
+    return f"{-(-energy // (FULL // 100))} %"

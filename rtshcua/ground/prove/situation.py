@@ -1,0 +1,102 @@
+"""What is known before the flight: all of a step's arguments, and nothing of the vehicle's state."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+from rtshcua.decision.evaluate import Condition, Environment, build
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
+from rtshcua.decision.situation import environment
+from rtshcua.decision.tree import Node, where
+from rtshcua.decision.values import MISSING, Sets, Value
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.span import Span as Where
+from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.lower.policy import LoweredPolicy
+from rtshcua.ground.prove.best import ALWAYS as ALWAYS
+from rtshcua.ground.prove.best import hopeful
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Contract, Link
+from rtshcua.model.flat.limits import WEEK
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Airspace, Rule
+
+#: us since the epoch: later than any flight
+EVER = 1 << 53
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """A lowered policy, prepared as on board, and any state that its vehicle may be in; `questions` are asked of it.
+
+    `kept` are the ways that were found to keep its airspace (`ways`): the missions of one policy share many.
+    `steps` are those that were prepared, `hopes` the conditions of rules as `hopeful` has them: the choices of a
+    mission's parameters share many.
+    `nodes` and `conditions` are those of its rules, by their code.
+    `bests` are the clauses of contracts in the best of all states.
+    `impossible` are the skills whose contracts were reported to contradict themselves: no step of one is looked at.
+    """
+
+    context: Context
+    lowered: LoweredPolicy
+    prepared: PreparedPolicy
+    anything: tuple[Value, ...]
+    questions: Questions
+    kept: set[tuple[object, ...]] = field(default_factory=set)
+    steps: dict[tuple[Invocation, tuple[str, ...]], PreparedInvocation | Refusal] = field(default_factory=dict)
+    hopes: dict[Hashable, Node | None] = field(default_factory=dict)
+    bests: dict[tuple[int, ...], Condition] = field(default_factory=dict)
+    impossible: set[int] = field(default_factory=set)
+    nodes: dict[tuple[int, ...], Node] = field(default_factory=dict)
+    conditions: dict[tuple[int, ...], Condition] = field(default_factory=dict)
+
+    def node(self, rule: Rule) -> Node:
+        """The condition of a rule as a tree; rules share those that are alike."""
+        code = () if rule.when is None else rule.when.code
+        found = self.nodes.get(code)
+        if found is None:
+            when = self.prepared.compiler.when(rule)
+            found = self.nodes[code] = ALWAYS if when is None else when
+        return found
+
+    def condition(self, rule: Rule) -> Condition:
+        """The condition of a rule, to be evaluated; rules share those that are alike."""
+        code = () if rule.when is None else rule.when.code
+        found = self.conditions.get(code)
+        if found is None:
+            found = self.conditions[code] = build(self.node(rule), self.prepared.tables)
+        return found
+
+    def best(self, clause: Clause, contract: Contract) -> Condition:
+        """A clause, in the best of all states that the place, the height, the time and the arguments leave open."""
+        found = self.bests.get(clause.code)
+        if found is None:
+            fixed = frozenset(where(self.prepared.policy.vehicle))
+            node = hopeful(self.prepared.compiler.node(clause, contract), True, fixed)
+            found = self.bests[clause.code] = build(node, self.prepared.tables)
+        return found
+
+    def sets(self, at_us: int = 0) -> Sets:
+        """Any state, at any time within a week from a UTC time; at any time at all where that is not known (0)."""
+        return Sets(self.anything, (0, 0), ((at_us, at_us + WEEK - 1 if at_us else EVER),), (0, 0))
+
+    def prepare(self, invocation: Invocation, phases: tuple[str, ...]) -> PreparedInvocation | Refusal:
+        """A step of a mission with these phases, prepared as on board, or what is wrong with it."""
+        found = self.steps.get((invocation, phases))
+        if found is None:
+            found = self.steps[invocation, phases] = prepare_invocation(invocation, self.prepared, phases)
+        return found
+
+    def around(self, invocation: PreparedInvocation) -> Environment:
+        """Any state around a step, for a condition."""
+        sets = self.sets(invocation.invocation.issued_at_us)
+        return environment(sets, self.prepared, invocation.arguments, invocation.phase)
+
+    def environment(self, arguments: tuple[Value, ...], phase: int) -> Environment:
+        """Arguments in any state, in a phase by its number among the policy's names, for a condition."""
+        sets = self.sets()
+        return Environment((*sets.values, MISSING), arguments, sets.utc_us, sets.utc_error_us, phase=phase)
+
+    def span(self, part: Clause | Rule | Link | Airspace) -> Where:
+        """Where a part of the policy is written."""
+        return self.lowered.files.span(part.source, part.start, part.end)

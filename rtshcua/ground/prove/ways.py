@@ -1,0 +1,374 @@
+"""E0514, E0515: wherever a step is broken off, the straight way home, and to where its links fly, keeps the airspace;
+and E0508, so does a step that is the way home.
+
+The way may begin at every place of the planned path and of the leg to it, not at its ends alone, and it is as wide as
+the vehicle's position error. The way home climbs there first, goes across at the height that the vehicle returns at
+(`decision.volume.across`), and ends with a descent at any place where home may really be. On board a link that would
+leave the airspace is not flown, and the vehicle lands where it is: better than nothing, but not what the chain says.
+"""
+
+from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from rtshcua.decision.contracts import first_cell, longest
+from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation, PreparedLink
+from rtshcua.decision.values import FALSE, TRUE
+from rtshcua.decision.volume import SHORT, across, near_home
+from rtshcua.decision.zones import Place as Places
+from rtshcua.decision.zones import PreparedZone, Sweep
+from rtshcua.diagnostics import codes
+from rtshcua.ground.prove.fan import Fan, Landmarks, Point, disc
+from rtshcua.ground.prove.leaving import Leg, breach, path_legs
+from rtshcua.ground.prove.period import Period, keeps, zone_span
+from rtshcua.ground.prove.places import Place, from_home, planned
+from rtshcua.ground.prove.situation import Ground
+from rtshcua.model.flat.contract import PLACE, MotionKind
+from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.zone import HIGHEST
+from rtshcua.model.ir.missions import Step
+from rtshcua.model.quantity import Dimension, display
+
+_HOME = (0, 0)
+_METRE = 1_000  # mm
+#: mm: a leg of which a part is near home is looked at in parts down to this length
+_SHORTEST = 1_000
+
+
+class Flown(NamedTuple):
+    """The places from which a link may begin, in the order of the path, and their heights in mm; the last one may be
+    where a link ends, `after` is that one's skill.
+    """
+
+    points: tuple[Point, ...]
+    low: int
+    high: int
+    after: str = ""
+
+
+class Stretch(NamedTuple):
+    """A part of a way: what is done there, the places that it leads between, in any order, and its heights in mm."""
+
+    what: str
+    points: tuple[Point, ...]
+    low: int
+    high: int
+
+
+class Leaves(NamedTuple):
+    """Where a way begins that leaves the airspace, and the part of it that does."""
+
+    place: Point
+    stretch: Stretch
+
+
+@dataclass(frozen=True, slots=True)
+class Then:
+    """When a link may fly: until `further` us after the latest begin of a step. The airspace, and what of it may be
+    present then.
+    """
+
+    period: Period
+    further: int
+    airspace: PreparedAirspace
+    present: PreparedAirspace = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "present", self.period.present(self.airspace, self.further))
+
+
+class Ways:
+    """The ways that lead from the steps of one mission."""
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._vehicle = ground.prepared.policy.vehicle
+        reach = self._vehicle.position_error + 1  # the middle of a leg is rounded by less than 1 mm
+        self._box = (-reach, -reach, reach, reach)
+        self._landmarks = Landmarks(ground.prepared.policy)
+        self._homes = disc(self._vehicle.home_within)
+        self._told: set[Point] = set()
+        self._nowhere: set[PreparedLink] = set()
+
+    def prove(self, step: Step, invocation: PreparedInvocation, period: Period, starts: Sequence[Place]) -> None:
+        """Report the first way from a step that leaves the airspace; the step itself was found to keep it, if home is
+        where it is declared.
+        """
+        airspace = self._ground.prepared.airspace
+        if airspace is None or invocation.invocation.plan.kind == MotionKind.LAND:
+            return  # it leads nowhere
+        if invocation.invocation.plan.kind == MotionKind.HOME:
+            there = Then(period, invocation.lasts_us, airspace)
+            for start in starts:
+                if not self._link(step, None, Flown(((start.x, start.y),), start.height, start.height), there):
+                    return
+            return
+        links = list(self._links(invocation))
+        for start in starts:
+            _, volume = planned(self._ground, invocation, start)
+            path = invocation.invocation.plan.path
+            points = ((start.x, start.y), *zip(path[::2], path[1::2], strict=True))
+            flown = Flown(points, *volume.height[:2])
+            for link, lasts in links:
+                if link in self._nowhere:
+                    continue
+                there = Then(period, invocation.lasts_us + lasts, airspace)
+                if not self._link(step, link, flown, there):
+                    return
+                if link.motion == MotionKind.FLY:
+                    flown = self._beyond(link, flown)
+
+    def _links(self, invocation: PreparedInvocation) -> Iterator[tuple[PreparedLink, int]]:
+        """What may be flown instead of a step, or in the midst of it, and when it has ended, us after the step; holding
+        and landing lead nowhere.
+        """
+        degrades = [[rule.target] for rule in invocation.candidates.degrades]
+        before = 0  # the contingency flies when the step's own chain has failed
+        for chain in (*degrades, invocation.chain, self._ground.prepared.contingency):
+            lasts = before if chain is self._ground.prepared.contingency else 0
+            for link in chain:
+                lasts += self._lasts(link)
+                if link.motion in (MotionKind.HOME, MotionKind.FLY, MotionKind.CLIMB):
+                    yield link, lasts
+            before = max(before, lasts)
+
+    def _lasts(self, link: PreparedLink) -> int:
+        policy = self._ground.prepared.policy
+        return longest(policy.contracts[link.link.skill], policy.vehicle, link.link.limit_us)
+
+    def _link(self, step: Step, link: PreparedLink | None, flown: Flown, then: Then) -> bool:
+        """Whether a link, or a step that is the way home (None), keeps the airspace; reports the place from where it
+        does not.
+        """
+        home = link is None or link.motion == MotionKind.HOME
+        if link is None or home:
+            to: Sequence[Point] = self._homes
+        else:
+            to = [self._target(link)] if link.motion == MotionKind.FLY else []
+            altitude = self._altitude(link)
+            flown = flown._replace(low=min(flown.low, altitude), high=max(flown.high, altitude))
+            if to and not self._keeps(Stretch("", tuple(to), altitude, altitude), then.present):
+                self._nowhere.add(link)  # said once: it is the same from everywhere
+                self._report(step, link, flown, Leaves(to[0], Stretch("", (to[0],), altitude, altitude)), to, then)
+                return False
+        leaves = self._leaving(flown, to, home, then.present, self._vehicle, self._told)
+        if leaves is not None:
+            self._told.add(leaves.place)
+            self._report(step, link, flown, leaves, to, then)
+            return False
+        missing = then.period.missing(then.airspace, then.further)
+        if missing is not None:
+            self._missing(step, link, missing, then)
+            return False
+        for zone in then.period.avoidable(then.airspace, then.further):
+            alone = then.airspace._replace(inside=(), outside=(zone,))
+            if self._leaving(flown, to, home, alone, self._vehicle) is not None:
+                then.period.avoid(zone, then.further)
+        for zone in then.airspace.inside:
+            then.period.stay(zone, then.further)
+        return True
+
+    def _leaving(
+        self,
+        flown: Flown,
+        to: Sequence[Point],
+        home: bool,
+        airspace: PreparedAirspace,
+        vehicle: Vehicle,
+        told: AbstractSet[Point] = frozenset(),
+    ) -> Leaves | None:
+        """A place of the path from where the straight way leaves the airspace, but not of a leg from one that was
+        `told`; `to` is all that it may lead to, and empty where the link leads up and nowhere else.
+        """
+        zones = tuple(tuple(zone.number for zone in each) for each in (airspace.inside, airspace.outside))
+        key = (flown.points, flown.low, flown.high, tuple(to), home and vehicle.return_altitude, zones)
+        if key in self._ground.kept:
+            return None
+        legs = path_legs(flown.points)
+        near = home and any(_comes_near(leg, near_home(vehicle)) for leg in legs)
+        # nearly always all of it lies in one hull that keeps the airspace
+        whole = _stretches(flown.points, flown, to, vehicle if home else None, near=near)
+        if not all(self._keeps(each, airspace) for each in whole):
+            for leg in legs:
+                found = None if leg[0] in told else self._leg(leg, flown, to, vehicle if home else None, airspace)
+                if found is not None:
+                    return Leaves(leg[1], found)
+        self._ground.kept.add(key)
+        return None
+
+    def _leg(
+        self, leg: Leg, flown: Flown, to: Sequence[Point], returns: Vehicle | None, airspace: PreparedAirspace
+    ) -> Stretch | None:
+        """The part of the way from somewhere on a leg that leaves the airspace; `returns` is who flies home on it."""
+        limit = 0 if returns is None else near_home(returns)
+        near = returns is not None and returns.return_altitude > 0 and _comes_near(leg, limit)
+        stretches = _stretches(leg, flown, to, returns, near=near)
+        found = next((each for each in stretches if not self._keeps(each, airspace)), None)
+        (ax, ay), (bx, by) = leg
+        if found is None or not near or (ax - bx) ** 2 + (ay - by) ** 2 <= _SHORTEST**2:
+            return found
+        if _comes_near((leg[0], leg[0]), limit) and _comes_near((leg[1], leg[1]), limit):
+            return found
+        # the way is low from a part of the leg only
+        middle = ((ax + bx) // 2, (ay + by) // 2)
+        halves = ((leg[0], middle), (middle, leg[1]))
+        parts = (self._leg(half, flown, to, returns, airspace) for half in halves)
+        return next((part for part in parts if part is not None), None)
+
+    def _keeps(self, stretch: Stretch, airspace: PreparedAirspace) -> bool:
+        """Whether the hull of a part of a way keeps the airspace."""
+        return keeps(self._space(stretch), airspace) == TRUE
+
+    def _space(self, stretch: Stretch) -> Places:
+        sweep: Sweep = Fan(stretch.points, self._box, self._landmarks)
+        return Places(((sweep, stretch.low, stretch.high),), 0)
+
+    def _beyond(self, link: PreparedLink, flown: Flown) -> Flown:
+        """Where later links may begin: the place that this one flies to too."""
+        altitude = self._altitude(link)
+        name = self._ground.prepared.policy.contracts[link.link.skill].name
+        low, high = min(flown.low, altitude), max(flown.high, altitude)
+        return Flown((*flown.points, self._target(link)), low, high, name)
+
+    def _altitude(self, link: PreparedLink) -> int:
+        return link.link.arguments[self._ground.prepared.policy.contracts[link.link.skill].motion.altitude]
+
+    def _target(self, link: PreparedLink) -> Point:
+        cell = first_cell(self._ground.prepared.policy.contracts[link.link.skill], PLACE)
+        x, y = link.link.arguments[cell : cell + 2]
+        return x, y
+
+    def _missing(self, step: Step, link: PreparedLink | None, zone: PreparedZone, then: Then) -> None:
+        if link is None:
+            return  # of a step that is found where its own path is looked at
+        ground, policy = self._ground, self._ground.prepared.policy
+        name = policy.contracts[link.link.skill].name
+        ground.context.report.add(
+            codes.RETURN_OUTSIDE if link.motion == MotionKind.HOME else codes.LOITER_OUTSIDE,
+            step.span,
+            f"the way of the link `{name}` from this step would be in `{policy.zones[zone.number].name}`, which does "
+            f"not exist at all times {then.period.from_to(then.further)}: it may be flown then",
+            help="issue the mission at another time, or let its steps take less",
+            labels=[
+                (ground.span(then.airspace.airspace), "the airspace"),
+                (ground.span(link.link), "this link would fly there"),
+                (zone_span(ground, zone), "declared here"),
+            ],
+        )
+
+    def _report(
+        self,
+        step: Step,
+        link: PreparedLink | None,
+        flown: Flown,
+        leaves: Leaves,
+        to: Sequence[Point],
+        then: Then,
+    ) -> None:
+        airspace, (place, stretch) = then.present, leaves
+        ground, policy = self._ground, self._ground.prepared.policy
+        home = link is None or link.motion == MotionKind.HOME
+        name = "" if link is None else policy.contracts[link.link.skill].name
+        if stretch.what == _ACROSS:
+            legs = [(place, each) for each in ([_HOME, *to] if home else to or [place])]
+        else:
+            legs = path_legs(stretch.points)
+        from_ = "this step"
+        if flown.after and place == flown.points[-1]:
+            from_ = f"where the link `{flown.after}` ends"
+        subject = f"{stretch.what} {'home' if home else f'of the link `{name}`'} from {from_}, which begins "
+        subject += f"{from_home(*place)},"
+        if link is not None and place in to:
+            subject = f"`{name}`, a link of this step's chains,"
+        labels = [(ground.span(airspace.airspace), "the airspace")]
+        if link is not None:
+            labels.append((ground.span(link.link), "this link would fly there"))
+        labels += then.period.labels(airspace, self._space(stretch), then.further)
+        within = self._vehicle.home_within
+        if home and within and self._keeps(stretch._replace(points=_of_home(stretch, to)), airspace):
+            labels.append((ground.lowered.vehicle.within.span, "home may lie so far from where it is declared"))
+        help = "move the step, or lead the mission around by further steps"
+        raised = self._raised(flown, to, stretch, airspace) if home else None
+        if raised is not None:
+            help = f"{_above(raised)}; or {help}"
+            declared = ground.lowered.vehicle.return_altitude
+            if declared is not None:
+                labels.append((declared.span, "the vehicle returns at this height"))
+        if link is not None:
+            help = f"on board the link would not be flown then, but the one after it; {help}"
+        code = codes.PATH_OUTSIDE if link is None else codes.RETURN_OUTSIDE if home else codes.LOITER_OUTSIDE
+        ground.context.report.add(
+            code,
+            step.span,
+            f"{subject} would {breach(policy, airspace, legs, stretch.low, stretch.high)}",
+            help=help,
+            labels=labels,
+        )
+
+    def raised(self, start: Place, airspace: PreparedAirspace) -> str:
+        """Which return altitude would lead a way home from a place above what stands in it, in words; or nothing."""
+        flown = Flown(((start.x, start.y),), start.height, start.height)
+        leaves = self._leaving(flown, self._homes, True, airspace, self._vehicle)
+        height = None if leaves is None else self._raised(flown, self._homes, leaves.stretch, airspace)
+        return "" if height is None else _above(height)
+
+    def _raised(self, flown: Flown, to: Sequence[Point], stretch: Stretch, airspace: PreparedAirspace) -> int | None:
+        """The least return altitude, in whole metres, with which all ways home from a step keep the airspace; None if
+        there is none above what stands in the way.
+        """
+        vehicle = self._vehicle
+        while stretch.what == _ACROSS:
+            space = self._space(stretch)
+            above = [zone.ceiling for zone in airspace.outside if space.inside(zone) != FALSE]
+            height = -(-(max(above, default=HIGHEST) + SHORT) // _METRE) * _METRE
+            if height >= HIGHEST or height <= vehicle.return_altitude:
+                return None
+            vehicle = replace(vehicle, return_altitude=height)
+            leaves = self._leaving(flown, to, True, airspace, vehicle)
+            if leaves is None:
+                return height
+            stretch = leaves.stretch
+        return None
+
+
+_ACROSS = "the straight way"
+
+
+def _above(height: int) -> str:
+    return (
+        f"with `return at {display(height, Dimension.ALTITUDE)}` the way home leads above it: write that, and set the "
+        "autopilot so"
+    )
+
+
+def _stretches(
+    points: Sequence[Point], flown: Flown, to: Sequence[Point], returns: Vehicle | None, *, near: bool
+) -> list[Stretch]:
+    """The parts of the way from some places to where it leads; `near`: some of these are near home."""
+    if returns is None:
+        return [Stretch(_ACROSS, (*points, *to), flown.low, flown.high)]
+    top = max(flown.high, returns.return_altitude)
+    least = across(flown.low, returns.return_altitude, near=near)
+    climb = [Stretch("the climb before the way", tuple(points), flown.low, top)] if least > flown.low else []
+    way = Stretch(_ACROSS, (*points, *to), least, top)
+    return [*climb, way, Stretch("the descent at the end of the way", tuple(to), min(flown.low, 0), top)]
+
+
+def _of_home(stretch: Stretch, to: Sequence[Point]) -> tuple[Point, ...]:
+    """The places of a part of the way, if home is where it is declared."""
+    return (*(each for each in stretch.points if each not in to), *([_HOME] if set(to) & set(stretch.points) else []))
+
+
+def _comes_near(leg: Leg, limit: int) -> bool:
+    """Whether some place of a leg is no further from home than `limit` mm."""
+    (ax, ay), (bx, by) = leg
+    ux, uy = bx - ax, by - ay
+    along, square = -ax * ux - ay * uy, ux * ux + uy * uy
+    if along <= 0:
+        return ax * ax + ay * ay <= limit * limit
+    if along >= square:
+        return bx * bx + by * by <= limit * limit
+    return (ax * uy - ay * ux) ** 2 <= limit * limit * square

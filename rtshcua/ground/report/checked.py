@@ -1,0 +1,182 @@
+"""What was checked as one HTML page: of each mission the zones, its planned way, and where that fails.
+
+It is made of missions that are refused too, as far as their way is planned.
+"""
+
+from base64 import b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from itertools import pairwise
+
+from markupsafe import Markup
+
+from rtshcua.decision.values import AND, FALSE, TRUE, Truth
+from rtshcua.decision.zones import PreparedZone
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.language.load import Program
+from rtshcua.ground.pipeline.program import Planned
+from rtshcua.ground.report.chapter import chapter
+from rtshcua.ground.report.drawing.plan import Plan, mission_plan
+from rtshcua.ground.report.missions import mission_told
+from rtshcua.ground.report.model import Chapter
+from rtshcua.ground.report.page import templates, visibly
+from rtshcua.ground.report.subject import Subject
+from rtshcua.model.flat import mission as flat
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.ir.node import Node
+
+#: a leg is looked at in so many places
+_PLACES = 400
+
+Point = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """What of a map is refused: legs in mm, y to the south, as SVG paths; and marks on the page."""
+
+    legs: tuple[str, ...]
+    marks: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A step in words, and what was found of it."""
+
+    told: str
+    found: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A mission with its map."""
+
+    name: str
+    intent: str
+    refused: bool
+    chapter: Chapter
+    plan: Plan
+    failed: Failed
+    steps: tuple[Step, ...]
+
+
+class Checking:
+    """A program, the missions in it whose way is planned, and all that was found."""
+
+    def __init__(self, program: Program, planned: Sequence[Planned], found: Sequence[Diagnostic]) -> None:
+        self._program, self._planned, self._found = program, planned, found
+        self._sources: Mapping[str, Source] = program.sources
+
+    def drawings(self) -> Iterator[Drawing]:
+        """One a mission."""
+        for under, mission, declaration in self._planned:
+            subject = Subject(self._program, under)
+            told, about = mission_told(mission, under.policy, None, {}), chapter(subject)
+            plan = mission_plan(about, told)
+            written = [step for phase in declaration.phases for step in phase.steps]
+            of = [[each for each in self._found if _within(each, step)] for step in written]
+            errors = [any(map(_errs, some)) for some in of]
+            failed = _failed(under.policy, [each.plan for each in mission.invocations], errors, plan)
+            yield Drawing(
+                name=mission.name,
+                intent=mission.intent,
+                refused=any(errors) or any(_errs(each) for each in self._found),
+                chapter=about,
+                plan=plan,
+                failed=failed,
+                steps=tuple(
+                    Step(step.told, tuple(map(self._words, some))) for step, some in zip(told.steps, of, strict=True)
+                ),
+            )
+
+    def others(self) -> list[str]:
+        """What was found elsewhere than in a step that is drawn."""
+        steps = [step for each in self._planned for phase in each.declaration.phases for step in phase.steps]
+        return [self._words(each) for each in self._found if not any(_within(each, step) for step in steps)]
+
+    def _words(self, found: Diagnostic) -> str:
+        at = ""
+        if found.span is not None and found.span.file in self._sources:
+            at = f"{found.span.file}:{self._sources[found.span.file].position(found.span.start).line}: "
+        help = f"; {found.help}" if found.help else ""
+        return f"{at}{found.severity.value} {found.code.id}: {found.message}{help}"
+
+
+def checked_page(checkings: Sequence[Checking]) -> str:
+    """The page; the same bytes for the same sources."""
+    environment, style = templates()
+    drawings = [each for checking in checkings for each in checking.drawings()]
+    others = list(dict.fromkeys(text for checking in checkings for text in checking.others()))
+    refused = sum(each.refused for each in drawings)
+    text = environment.get_template("checked.html").render(
+        drawings=drawings,
+        others=others,
+        summary=f"Missions that are drawn: {len(drawings)}; of these refused: {refused}",
+        style=Markup(style),
+        style_digest=b64encode(sha256(style.encode()).digest()).decode("ascii"),
+    )
+    return visibly(text)
+
+
+def _within(found: Diagnostic, node: Node) -> bool:
+    span = found.span
+    return (
+        span is not None and span.file == node.span.file and node.span.start <= span.start and span.end <= node.span.end
+    )
+
+
+def _errs(found: Diagnostic) -> bool:
+    return found.severity is Severity.ERROR
+
+
+def _failed(policy: Policy, plans: Sequence[flat.Plan], errors: Sequence[bool], drawn: Plan) -> Failed:
+    """The legs of the steps that are refused, and where each of these first leaves the airspace."""
+    keeps = _Airspace(policy)
+    legs: list[str] = []
+    marks: list[tuple[float, float]] = []
+    here, height = (0, 0), 0
+    for plan, wrong in zip(plans, errors, strict=True):
+        points = [here, *zip(plan.path[::2], plan.path[1::2], strict=True)]
+        if plan.kind == MotionKind.CLIMB or plan.path:
+            height = plan.altitude or height
+        if wrong and len(points) > 1:
+            legs.append("M" + "L".join(f"{x} {-y}" for x, y in points))
+        left = next((place for leg in pairwise(points) for place in _along(*leg) if not keeps(place, height)), None)
+        if wrong and left is not None:
+            marks.append(drawn.at(*left))
+        here = points[-1]
+    return Failed(tuple(legs), tuple(marks))
+
+
+def _along(one: Point, other: Point) -> Iterator[Point]:
+    for part in range(_PLACES + 1):
+        yield (
+            one[0] + (other[0] - one[0]) * part // _PLACES,
+            one[1] + (other[1] - one[1]) * part // _PLACES,
+        )
+
+
+class _Airspace:
+    """Whether a place keeps the airspace with the vehicle's position error, at whatever time: a zone to stay out of is
+    there if it may be.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        stated, error = policy.airspace, policy.vehicle.position_error
+        self._box = (-error, -error, error, error)
+        self._inside, self._outside = (
+            tuple(PreparedZone(number, policy.zones[number]) for number in numbers)
+            for numbers in (((), ()) if stated is None else (stated.inside, stated.outside))
+        )
+
+    def __call__(self, place: Point, height: int) -> bool:
+        inside = (self._there(zone, place, height) for zone in self._inside)
+        outside = (self._there(zone, place, height) for zone in self._outside)
+        return all(truth == TRUE for truth in inside) and all(truth == FALSE for truth in outside)
+
+    def _there(self, zone: PreparedZone, place: Point, height: int) -> Truth:
+        return AND[zone.between(height, height)][zone.along(place, self._box)]

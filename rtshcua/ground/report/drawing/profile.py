@@ -1,0 +1,108 @@
+"""A side profile: from which height to which each zone reaches, above home."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rtshcua.ground.report.drawing.canvas import ROUND, WIDTH
+from rtshcua.ground.report.drawing.hatch import hatching
+from rtshcua.ground.report.drawing.labels import LETTER, Box
+from rtshcua.ground.report.model import Chapter, ZoneTold
+from rtshcua.model.quantity import Dimension, display
+
+#: px
+_HEIGHT, _TOP, _LEFT, _LINE, _LEAST = 240, 34, 70, 15, 74
+#: what is shown above the highest limit, as a part of it
+_ABOVE = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One zone: its bar, whether that goes on beyond the drawing, and its name in lines."""
+
+    x: float
+    width: float
+    top: float
+    bottom: float
+    kind: str
+    open_above: bool
+    lines: tuple[str, ...]
+    title: str
+    hatch: str
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A drawing of columns; `marks` are heights with their place on the page, `returns` the line of the way home."""
+
+    width: int
+    height: int
+    left: int
+    ground: float
+    columns: tuple[Column, ...]
+    marks: tuple[tuple[float, str], ...]
+    returns: tuple[float, str] | None
+
+
+def profiles(chapter: Chapter) -> tuple[Profile, ...]:
+    """As many drawings as the zones need, all to one scale."""
+    zones = [zone for zone in chapter.zones if not zone.derived]
+    limits = [limit for zone in zones for limit in (zone.floor, zone.ceiling) if limit is not None]
+    limits.append(chapter.return_altitude)
+    highest, lowest = max([*limits, 10_000]), min([*limits, 0])
+    top = highest + (highest - lowest) // _ABOVE
+    fit = (WIDTH - _LEFT - 10) // _LEAST
+    groups = [zones[at : at + fit] for at in range(0, len(zones), fit)]
+    return tuple(_profile(group, lowest, highest, top, chapter.return_altitude) for group in groups)
+
+
+def _profile(zones: Sequence[ZoneTold], lowest: int, highest: int, top: int, returns: int) -> Profile:
+    scale = _HEIGHT / (top - lowest)
+    base = _TOP + _HEIGHT
+
+    def at(height: int) -> float:
+        return base - (height - lowest) * scale
+
+    width = min((WIDTH - _LEFT - 10) / len(zones), 130)
+    columns = tuple(_column(zone, _LEFT + number * width, width, at) for number, zone in enumerate(zones))
+    most = max(len(column.lines) for column in columns)
+    step = _step(highest - lowest)
+    first = -(-lowest // step) * step
+    marks = tuple((at(height), display(height, Dimension.LENGTH)) for height in range(first, highest + 1, step))
+    line = (at(returns), f"return at {display(returns, Dimension.LENGTH)}") if returns else None
+    return Profile(WIDTH, round(base) + 12 + _LINE * (most + 1), _LEFT, at(0), columns, marks, line)
+
+
+def _column(zone: ZoneTold, x: float, width: float, at: Callable[[int], float]) -> Column:
+    base = _TOP + _HEIGHT
+    top = _TOP if zone.ceiling is None else at(zone.ceiling)
+    bottom = base if zone.floor is None else at(zone.floor)
+    box = Box(x + 8, top, width - 16, bottom - top)
+    return Column(
+        x=box.x,
+        width=box.width,
+        top=top,
+        bottom=bottom,
+        kind=zone.use or "other",
+        open_above=zone.ceiling is None,
+        lines=_lines(zone.name, int((width - 4) / LETTER)),
+        title=f"{zone.name}: {zone.band}",
+        hatch=hatching(box, WIDTH, base) if zone.use == "forbidden" else "",
+    )
+
+
+def _lines(name: str, letters: int) -> tuple[str, ...]:
+    """A name in lines that fit, broken at `_` where that is possible."""
+    lines: list[str] = []
+    for part in name.replace("_", "_\n").split("\n"):
+        for start in range(0, len(part), letters):
+            piece = part[start : start + letters]
+            if lines and len(lines[-1]) + len(piece) <= letters:
+                lines[-1] += piece
+            else:
+                lines.append(piece)
+    return tuple(lines)
+
+
+def _step(span: int) -> int:
+    """A round height of which about six fit."""
+    return next(step for step in ROUND if step * 6 >= span)

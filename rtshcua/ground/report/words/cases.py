@@ -1,0 +1,159 @@
+"""Tests and the nominals that they start from, in words."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from rtshcua.ground.report.words.conditions import told_condition
+from rtshcua.ground.report.words.places import utc
+from rtshcua.ground.report.words.skills import told_argument
+from rtshcua.ground.report.words.values import quantity, told_value
+from rtshcua.ground.report.words.vocabulary import Vocabulary, listed, name, named
+from rtshcua.model.decision import Decision
+from rtshcua.model.ir.expression import Quantity, Reference
+from rtshcua.model.ir.tests import (
+    Answer,
+    Asker,
+    Assignment,
+    Cell,
+    Expectation,
+    InPhase,
+    Instant,
+    Named,
+    NominalDecl,
+    Premises,
+    Request,
+    Subject,
+)
+from rtshcua.model.outcome import Outcome
+
+_OUTCOMES: Final = {
+    "allow": "it is allowed",
+    "deny": "it is denied",
+    "defer": "it must wait",
+    "fallback": "something else is flown",
+}
+
+
+def told_premises(premises: Premises, names: Vocabulary) -> Iterator[str]:
+    """What holds when the request is decided on, one line each."""
+    for each in premises.given:
+        yield told_assignment(each, names)
+    if premises.instant is not None:
+        yield _instant(premises.instant)
+    if premises.phase is not None:
+        yield _phase(premises.phase)
+    for answer in premises.answers:
+        yield _answer(answer)
+    if premises.released is not None:
+        yield f"its turn came {_ago(premises.released)}"
+    if premises.issued is not None:
+        ahead, distance = premises.issued.ahead, quantity(premises.issued.distance)
+        yield f"it was issued {f'in {distance}, ahead of the decision' if ahead else f'{distance} ago'}"
+    if premises.in_force is not None:
+        yield f"version {premises.in_force.version} of the policy is in force"
+    if premises.identity is not None:
+        yield f"the vehicle is “{premises.identity.text}”"
+    for deed in (premises.replayed, premises.tampered):
+        if deed is not None:
+            yield _deed(deed.kind)
+
+
+def _deed(kind: str) -> str:
+    return "the request was used before" if kind == "replayed" else "what was presented is not what was signed"
+
+
+def told_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
+    """Where tests start from."""
+    yield f"under the policy {name(nominal.policy.text)}"
+    yield f"on the vehicle {name(nominal.vehicle.text)}"
+    if nominal.asker is not None:
+        yield told_asker(nominal.asker)
+    yield from told_premises(nominal.premises, names)
+
+
+def told_assignment(one: Assignment, names: Vocabulary) -> str:
+    """`battery` is 20 %."""
+    return told_given(one.subject, one.cell, names)
+
+
+def told_given(subject: Subject, cell: Cell, names: Vocabulary) -> str:
+    """What is given of a signal, a parameter, or a condition over time."""
+    words = _cell(cell, names)
+    if isinstance(subject, Named):
+        known = subject.name.text in names.signals
+        return f"{'' if known else 'the asked '}{name(subject.name.text)} is {words}"
+    return f"it is {words} that {told_condition(subject.condition, names)}"
+
+
+def _cell(cell: Cell, names: Vocabulary) -> str:
+    if cell.value is None:
+        words = "not known"
+    elif isinstance(cell.value, Quantity) and cell.value.datum is None:
+        words = quantity(cell.value)
+    elif isinstance(cell.value, Reference) and cell.value.name in ("true", "false"):
+        words = cell.value.name
+    else:
+        words = told_value(cell.value, names)
+    return words if cell.measured is None else f"{words}, measured {_ago(cell.measured)}"
+
+
+def _instant(one: Instant) -> str:
+    within = "" if one.within is None else f", give or take {quantity(one.within)}"
+    return f"it is {utc(one.utc_us)}{within}"
+
+
+def _phase(one: InPhase) -> str:
+    order = f", of {named([each.text for each in one.order])}" if one.order else ""
+    return f"the mission is in the phase {name(one.phase.text)}{order}"
+
+
+def _answer(one: Answer) -> str:
+    ago = "" if one.ago is None else f" {_ago(one.ago)}"
+    return f"the role {name(one.role.text)} has {'approved' if one.granted else 'refused'} it{ago}"
+
+
+def _ago(one: Quantity) -> str:
+    return f"{quantity(one)} ago"
+
+
+def told_asker(asker: Asker) -> str:
+    """Who asks."""
+    role = "" if asker.role is None else f"the role {name(asker.role.text)}"
+    source = "" if asker.source is None else f"through {name(asker.source.text)}"
+    return f"asked {' '.join(part for part in (f'by {role}' if role else '', source) if part)}"
+
+
+def told_request(request: Request | None, names: Vocabulary) -> str:
+    """What is asked for, and by whom."""
+    if request is None:
+        return ""
+    given = listed([told_argument(each, names) for each in request.arguments])
+    words = name(request.skill.text) + (f" with {given}" if given else "")
+    return words if request.asker is None else f"{words}, {told_asker(request.asker)}"
+
+
+def told_expectation(expectation: Expectation | None) -> str:
+    """What must be decided, and why."""
+    if expectation is None:
+        return ""
+    words = _OUTCOMES[expectation.outcome]
+    if expectation.target is not None:
+        words = f"{name(expectation.target.text)} is flown instead"
+    if expectation.reason is not None:
+        words += f", because {name(expectation.reason.text)}"
+    if expectation.clause is not None:
+        words += f", decided by {name(expectation.clause.text.replace('`', ''))}"
+    return words
+
+
+def told_decision(decision: Decision, skills: Sequence[str]) -> str:
+    """What was decided, and why; `skills` are the names of the policy's, by number."""
+    words = _OUTCOMES[decision.outcome.name.lower()]
+    if decision.target is not None:
+        words = f"{name(skills[decision.target.skill])} is flown instead"
+    elif decision.outcome is Outcome.FALLBACK:
+        words = "nothing may be flown instead"
+    words += f", because {name(decision.reason.value)}"
+    if decision.clause is not None:
+        words += f", decided by {name(decision.clause.text.replace('`', ''))}"
+    return words

@@ -1,0 +1,223 @@
+"""What differs between two policies, in the words of each.
+
+From the signed form, for of an earlier policy there may be no source left.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from math import isqrt
+from typing import Final
+
+from rtshcua.decision.outline import rings
+from rtshcua.ground.report.words.missions import told_cells
+from rtshcua.ground.report.words.places import told_fitted, utc
+from rtshcua.ground.report.words.rules import told_evidence, told_limits, told_silence
+from rtshcua.ground.report.words.values import degrees, time_of_day, time_of_week
+from rtshcua.ground.report.words.vocabulary import listed, name, named
+from rtshcua.ground.versions.differences import Difference
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import CHOICE, QUANTITY, Contract, Link, MotionKind, Parameter, TimingClass
+from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind, Speeds, WithoutEvidence
+from rtshcua.model.flat.signal import ENUMERATION, Signal
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, unproject
+from rtshcua.model.quantity import Dimension, display
+
+#: follows words that are the same before and after
+ELSE: Final = "written alike, but what it names is another"
+_DIMENSIONS: Final = {dimension.value: dimension for dimension in Dimension}
+
+
+def told_difference(one: Difference, old: Policy, new: Policy) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """A line or more of what was, and of what is; none where there was, or is, no such thing."""
+    if one.what == "rule":
+        before, after = (
+            tuple(name(" ".join(each.split())) for each in (text,) if each) for text in (one.before, one.after)
+        )
+    else:
+        before, after = _told(one, old), _told(one, new)
+    return before, (*after, ELSE) if before == after else after
+
+
+def _told(one: Difference, policy: Policy) -> tuple[str, ...]:
+    match one.what:
+        case "airspace":
+            return (_airspace(policy),)
+        case "contingency":
+            return (_chain(policy.contingency, policy),)
+        case "evidence":
+            return (told_evidence(WithoutEvidence(policy.without_evidence).name.lower()),)
+        case "silence":
+            return (told_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),)
+        case "sensor":
+            return (told_fitted(one.name, one.name not in policy.vehicle.without),)
+        case "order":
+            kind = RuleKind[one.name.upper()]
+            return tuple(name(rule.text) for rule in policy.rules if rule.kind == kind)
+        case "vehicle":
+            return _lines(one.fields, _vehicle(policy))
+        case "zone":
+            zones = {zone.name: zone for zone in policy.zones[: policy.declared]}
+            return _lines(one.fields, _zone(zones[one.name], policy)) if one.name in zones else ()
+        case "skill":
+            skills = {contract.name: contract for contract in policy.contracts}
+            return _lines(one.fields, _skill(skills[one.name], policy)) if one.name in skills else ()
+        case _:
+            signals = {signal.name: signal for signal in policy.signals}
+            return _lines(one.fields, _signal(signals[one.name])) if one.name in signals else ()
+
+
+def _lines(fields: Iterable[str], told: Mapping[str, Callable[[], str]]) -> tuple[str, ...]:
+    return tuple(f"{field}: {told[field]() or 'nothing'}" for field in fields)
+
+
+def _airspace(policy: Policy) -> str:
+    if policy.airspace is None:
+        return told_limits((), ())
+    inside, outside = (
+        [policy.zones[number].name for number in side] for side in (policy.airspace.inside, policy.airspace.outside)
+    )
+    return told_limits(inside, outside)
+
+
+def _chain(links: Iterable[Link], policy: Policy) -> str:
+    return ", then ".join(_link(each, policy) for each in links)
+
+
+def _link(link: Link, policy: Policy) -> str:
+    contract = policy.contracts[link.skill]
+    given = [f"{name(each.name)} {told_cells(each, link.arguments, policy)}" for each in contract.parameters]
+    limit = f" for at most {_time(link.limit_us)}" if link.limit_us else ""
+    return name(contract.name) + (f" with {listed(given)}" if given else "") + limit
+
+
+def _vehicle(policy: Policy) -> Mapping[str, Callable[[], str]]:
+    vehicle, home = policy.vehicle, policy.projection
+    offset = vehicle.utc_offset_us
+    return {
+        "name": lambda: name(vehicle.name),
+        "identity": lambda: vehicle.identity,
+        "home": lambda: f"{_place(home.latitude, home.longitude)}, within {_length(vehicle.home_within)}",
+        "speed": lambda: f"at most {display(vehicle.speed, Dimension.SPEED)}",
+        "climb": lambda: f"at most {display(vehicle.climb, Dimension.SPEED)}",
+        "position error": lambda: f"at most {_length(vehicle.position_error)}",
+        "energy": lambda: f"{_time(vehicle.endurance_us)} of hovering",
+        "reserve": lambda: display(vehicle.reserve, Dimension.RATIO),
+        "local time": lambda: vehicle.time_zone or f"UTC {'-' if offset < 0 else '+'}{time_of_day(abs(offset))}",
+        "brakes": lambda: (
+            f"{display(vehicle.braking, Dimension.SPEED)} less in each second, after a delay of "
+            f"{_time(vehicle.reaction_us)}"
+            if vehicle.braking
+            else ""
+        ),
+        "return": lambda: f"at {_length(vehicle.return_altitude)} above home" if vehicle.return_altitude else "",
+        "speeds": lambda: _speeds(vehicle.speeds),
+    }
+
+
+def _speeds(speeds: Speeds | None) -> str:
+    if speeds is None:
+        return ""
+    names = {
+        "cruise": speeds.cruise,
+        "climb": speeds.climb,
+        "descent": speeds.descent,
+        "landing": speeds.landing,
+        "return": speeds.homeward,
+        "air": speeds.air,
+        "wind at most": speeds.wind,
+        "gained in a second": speeds.acceleration,
+    }
+    told = ", ".join(f"{what} {display(value, Dimension.SPEED)}" for what, value in names.items())
+    return f"{told}, slow below {_length(speeds.landing_below)}, {_time(speeds.flight_us)} of flight"
+
+
+def _zone(zone: Zone, policy: Policy) -> Mapping[str, Callable[[], str]]:
+    return {
+        "shape": lambda: _shape(zone, policy),
+        "floor": lambda: "" if zone.floor == LOWEST else f"{_length(zone.floor)} above home",
+        "ceiling": lambda: "" if zone.ceiling == HIGHEST else f"{_length(zone.ceiling)} above home",
+        "active": lambda: _active(zone),
+    }
+
+
+def _shape(zone: Zone, policy: Policy) -> str:
+    def place(x: int, y: int) -> str:
+        return _place(*unproject(policy.projection, x, y))
+
+    if zone.shape == CIRCLE:
+        x, y, squared = zone.data
+        return f"a circle of {_length(isqrt(squared))} around {place(x, y)}"
+    return "; ".join(f"an outline through {' - '.join(place(x, y) for x, y in ring)}" for ring in rings(zone))
+
+
+def _active(zone: Zone) -> str:
+    daily = f"every day from {' to '.join(map(time_of_day, zone.daily))} local time" if zone.daily else ""
+    weekly = zip(map(time_of_week, zone.weekly[::2]), (time_of_week(end - 1) for end in zone.weekly[1::2]), strict=True)
+    hours = (
+        f"every week from {listed([f'{start} to {end}' for start, end in weekly])} local time" if zone.weekly else ""
+    )
+    dates = f"from {' to '.join(map(utc, zone.dates))}" if zone.dates else ""
+    return listed([each for each in (daily, hours, dates) if each]) or "at all times"
+
+
+def _skill(contract: Contract, policy: Policy) -> Mapping[str, Callable[[], str]]:
+    phases = f", only in the phase {named(contract.phases, 'or')}" if contract.phases else ""
+    motion = contract.motion
+    cells = {each.cell: name(each.name) for each in contract.parameters}
+    given = [cells[cell] for cell in (motion.altitude, motion.speed, motion.time) if cell in cells]
+    return {
+        "parameters": lambda: "; ".join(map(_parameter, contract.parameters)),
+        "motion": lambda: name(MotionKind(motion.kind).name.lower()) + (f" with {listed(given)}" if given else ""),
+        "class": lambda: name(TimingClass(contract.timing_class).name.lower()),
+        "deadline": lambda: _time(contract.deadline_us),
+        "valid": lambda: f"for {_time(contract.validity_us)}{phases}",
+        "lasts": lambda: f"at most {_time(contract.duration_us)}",
+        "grace": lambda: _time(contract.grace_us),
+        "require": lambda: _clauses(contract.require),
+        "assume": lambda: _clauses(contract.assume),
+        "maintain": lambda: _clauses(contract.maintain),
+        "fallback": lambda: _chain(contract.fallback, policy),
+        "energy": lambda: f"at most {display(contract.energy, Dimension.RATIO)} of a full charge",
+        "record": lambda: named(sorted(contract.record)),
+    }
+
+
+def _parameter(parameter: Parameter) -> str:
+    words = name(parameter.name)
+    if parameter.kind == CHOICE:
+        return f"{words} one of {named(parameter.labels, 'or')}"
+    dimension = _DIMENSIONS.get(parameter.dimension)
+    if parameter.kind != QUANTITY or dimension is None:
+        return words
+    return f"{words} between {display(parameter.low, dimension)} and {display(parameter.high, dimension)}"
+
+
+def _clauses(clauses: Iterable[Clause]) -> str:
+    return " and ".join(name(clause.text) for clause in clauses)
+
+
+def _signal(signal: Signal) -> Mapping[str, Callable[[], str]]:
+    states = [f"{name(label)} ({number})" for number, label in sorted(signal.labels)]
+    return {
+        "type": lambda: name(signal.dimension) + (f" {', '.join(states)}" if signal.kind == ENUMERATION else ""),
+        "stale": lambda: f"after {_time(signal.stale_us)}",
+        "source": lambda: listed(
+            [
+                f"{name(each.message)} field {named(each.fields)}"
+                + (f" (unknown at {', '.join(map(str, each.unknown))})" if each.unknown else "")
+                for each in signal.sources
+            ],
+            "or",
+        ),
+    }
+
+
+def _place(latitude: int, longitude: int) -> str:
+    return f"{degrees(latitude, 'N', 'S')}, {degrees(longitude, 'E', 'W')}"
+
+
+def _length(mm: int) -> str:
+    return display(mm, Dimension.LENGTH)
+
+
+def _time(us: int) -> str:
+    return display(us, Dimension.DURATION)

@@ -1,0 +1,77 @@
+"""The steps of a mission in words, from their bound form: every argument, those that a default gave too."""
+
+from collections.abc import Iterator
+
+from rtshcua.ground.report.words.values import degrees
+from rtshcua.ground.report.words.vocabulary import listed, name, named
+from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter, SourceKind
+from rtshcua.model.flat.mission import Invocation, OnInadmissible
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import unproject
+from rtshcua.model.quantity import Dimension, display
+
+_DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
+_OTHERWISE = {
+    OnInadmissible.ABORT: "the mission ends: its fallback flies",
+    OnInadmissible.HOLD: "it is waited for",
+    OnInadmissible.SKIP: "it is left out",
+    OnInadmissible.REPLAN: "it is waited for, and whoever proposed it is asked for another step in its place",
+}
+
+
+def told_step(step: Invocation, policy: Policy) -> str:
+    """The skill of a step with all its arguments."""
+    contract = step.contract
+    given = [f"{name(each.name)} {told_cells(each, step.arguments, policy)}" for each in contract.parameters]
+    return name(contract.name) + (f" with {listed(given)}" if given else "")
+
+
+def told_otherwise(step: Invocation) -> str:
+    """What follows where a step may not begin when its turn comes."""
+    return _OTHERWISE[OnInadmissible(step.on_inadmissible)]
+
+
+def told_asker(step: Invocation, policy: Policy) -> str:
+    """In which role and through which source a step is asked for."""
+    return f"for the role {name(policy.roles[step.role])} through {name(SourceKind(step.source).name.lower())}"
+
+
+def told_tighter(step: Invocation, policy: Policy) -> Iterator[str]:
+    """What a step is held to beyond its skill's contract; conditions as they are written."""
+    own, skill = step.contract, policy.contracts[step.skill]
+    for words, mine, theirs in (
+        ("it begins within {} of its turn", own.deadline_us, skill.deadline_us),
+        ("the request is good for {}", own.validity_us, skill.validity_us),
+        ("it lasts at most {}", own.duration_us, skill.duration_us),
+        ("what must hold may be unknown for at most {}", own.grace_us, skill.grace_us),
+    ):
+        if mine != theirs:
+            yield words.format(display(mine, Dimension.DURATION))
+    if own.energy != skill.energy:
+        yield f"{display(own.energy, Dimension.RATIO)} of a full charge is kept for it"
+    if own.phases != skill.phases:
+        yield f"only in the phase {named(own.phases, 'or')}"
+    for words, clauses, known in (
+        ("before it begins", own.require, skill.require),
+        ("before it begins and while it runs", own.assume, skill.assume),
+        ("for the whole path and while it runs", own.maintain, skill.maintain),
+    ):
+        texts = {clause.text for clause in known}
+        yield from (f"{words}: {name(clause.text)}" for clause in clauses if clause.text not in texts)
+    more = [kind for kind in own.record if kind not in skill.record]
+    if more:
+        yield f"recorded too: {named(more)}"
+
+
+def told_cells(parameter: Parameter, cells: tuple[int, ...], policy: Policy) -> str:
+    """An argument in its bound form."""
+    value = cells[parameter.cell]
+    if parameter.kind == CHOICE:
+        return name(parameter.labels[value])
+    if parameter.kind == ZONE:
+        return name(policy.zones[value].name)
+    if parameter.kind == PLACE:
+        latitude, longitude = unproject(policy.projection, value, cells[parameter.cell + 1])
+        return f"{degrees(latitude, 'N', 'S')}, {degrees(longitude, 'E', 'W')}"
+    dimension = _DIMENSIONS.get(parameter.dimension)
+    return str(value) if dimension is None else display(value, dimension)

@@ -1,0 +1,150 @@
+"""A survey path is worked out again from what a bundle carries: the compiler's own is recognised, any other is told."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.decision import prepare
+from rtshcua.diagnostics import codes
+from rtshcua.ground.language.load import load
+from rtshcua.ground.lower.surveyed import Planned, planned_otherwise
+from rtshcua.ground.pipeline.program import compile_program
+from rtshcua.mavlink import dialect
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+from virtual.rows import rows
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+AREAS = {
+    "round": "circle(47.3985 N, 8.5470 E, 40 m) ceiling 60 m above home",
+    "square": "polygon(47.3990 N, 8.5460 E, 47.3990 N, 8.5472 E, 47.3982 N, 8.5472 E, 47.3982 N, 8.5460 E)\n"
+    "  ceiling 60 m above home  entry 47.3989 N, 8.5471 E",
+    "holed": "polygon(47.3990 N, 8.5456 E, 47.3990 N, 8.5466 E, 47.3982 N, 8.5466 E, 47.3982 N, 8.5456 E)\n"
+    "  hole (47.3986 N, 8.5460 E, 47.3986 N, 8.5462 E, 47.3985 N, 8.5462 E, 47.3985 N, 8.5460 E)\n"
+    "  ceiling 60 m above home  entry 47.3983 N, 8.5457 E",
+}
+
+
+def shipped(name: str) -> str:
+    """A source that ships; its survey may last so long, and take so much, that each of these can be flown."""
+    text = Path(name).read_text(encoding="utf-8")
+    return text.replace("30 min = 2 min", "30 min = 8 min").replace("= 13 %", "= 40 %")
+
+
+SHIPPED = {name: shipped(str(CHECKOUT / name)) for name in
+           ("skills/inspect_area.rts", "policies/bridge_inspection.rts")}  # fmt: skip
+#: the skill that ships with more time and charge, as the areas here are large; and one without a choice of pattern
+LOOK = SHIPPED["skills/inspect_area.rts"].replace("skill inspect_area", "skill look")
+SWEEP = (
+    LOOK.replace("skill look", "skill sweep")
+    .replace("  pattern:  one of grid, perimeter, orbit = grid,\n", "")
+    .replace(" pattern pattern", "")
+    .replace('import "', '// "')
+)
+PERMITS = "".join(
+    f"permit {skill} by role operator through agent when area inside {zone}\n"
+    for skill in ("look", "sweep")
+    for zone in AREAS
+)
+CALLS = [
+    *(f"look(round, altitude = 20 m, pattern = {each}, speed = 8 m/s)" for each in ("grid", "perimeter", "orbit")),
+    *(f"look(square, altitude = 20 m, pattern = {each}, speed = 8 m/s)" for each in ("grid", "perimeter", "orbit")),
+    "look(holed, altitude = 20 m, speed = 6 m/s)",
+    "sweep(square, altitude = 20 m, speed = 8 m/s)",
+    "sweep(round, altitude = 20 m)",
+]
+
+
+@cache
+def compiled(call: str) -> tuple[Policy, Invocation]:
+    rules = SHIPPED["policies/bridge_inspection.rts"].replace("permit  hover", PERMITS + "permit  hover", 1)
+    zones = "".join(f"zone {name} = {area}\n" for name, area in AREAS.items())
+    skill, _, rest = call.partition("(")
+    mission = f"""
+mission m under bridge_inspection@7 on quad {{
+  proposed by agent x for role operator
+  phase departure {{ takeoff(altitude = 20 m) }}
+  phase inspection {{
+    goto({"47.3985 N, 8.5470 E" if rest.startswith("round") else rest.split(",")[0] + ".entry"}, altitude = 20 m)
+    {call}
+  }}
+  phase recovery {{ return_home() }}
+}}
+"""
+    files = {"/nowhere/m.rts": "\n".join([LOOK, SWEEP, rules, zones, mission])}
+    program = load(
+        ["/nowhere/m.rts"],
+        lambda name: (files[name] if name in files else shipped(name)).encode(),
+        str(CHECKOUT),
+    )
+    found = compile_program(program, dialect.load(), mission=None, issued_at_us=1_700_000_000_000_000)
+    assert found.policy is not None, [each.message for each in found.diagnostics]
+    assert found.mission is not None, [each.message for each in found.diagnostics]
+    return found.policy, next(each for each in found.mission.invocations if each.contract.name == skill)
+
+
+def along(one: Invocation, *path: int) -> Invocation:
+    return replace(one, plan=replace(one.plan, path=path))
+
+
+@pytest.mark.slow
+@rows("call", CALLS)
+def test_the_compilers_own_path_is_the_planners_from_either_end(call: str) -> None:
+    policy, one = compiled(call)
+    assert planned_otherwise(policy, one) is None
+    points = list(zip(one.plan.path[::2], one.plan.path[1::2], strict=True))
+    turned = [coordinate for point in reversed(points) for coordinate in point]
+    assert planned_otherwise(policy, along(one, *turned)) is None
+    lingering = planned_otherwise(policy, along(one, *one.plan.path, *one.plan.path[-2:]))
+    assert lingering is not None, "a point more"
+    assert (lingering.points, lingering.apart) == (len(points), 0)
+    moved = planned_otherwise(policy, along(one, one.plan.path[0] + 1, *one.plan.path[1:]))
+    assert moved is not None
+    assert moved.apart <= 1
+
+
+def test_another_pattern_than_the_argument_is_told() -> None:
+    policy, grid = compiled(CALLS[3])
+    _, perimeter = compiled(CALLS[4])
+    found = planned_otherwise(policy, along(grid, *perimeter.plan.path))
+    assert found is not None
+    assert found.points == len(grid.plan.path) // 2
+    assert found.apart > 1_000
+    assert found.length > 100_000
+
+
+def test_one_point_is_a_path_too() -> None:
+    policy, grid = compiled(CALLS[3])
+    found = planned_otherwise(policy, along(grid, *grid.plan.path[:2]))
+    assert found is not None
+    assert found.apart > 10_000
+
+
+@pytest.mark.parametrize("pattern", [-1, 3])
+def test_where_nothing_can_be_planned_any_path_is_another(pattern: int) -> None:
+    """What is out of range is for the vehicle to refuse; what has no path has none that was chosen by us."""
+    policy, one = compiled(CALLS[3])
+    area, altitude, _, speed = one.arguments
+    none = Planned(0, 0, 0)
+    assert planned_otherwise(policy, replace(one, arguments=(area, altitude, pattern, speed))) == none
+    assert planned_otherwise(policy, replace(one, arguments=(99, altitude, 0, speed))) == none
+    small = replace(policy, vehicle=replace(policy.vehicle, position_error=1_000_000))
+    assert planned_otherwise(small, one) == none
+    zones = tuple(replace(zone, shape=0, data=(0, 0, 10**10 + 1)) for zone in policy.zones)
+    assert planned_otherwise(replace(policy, zones=zones), one) == none, "no compiler makes such a circle"
+
+
+def test_a_step_that_covers_nothing_has_no_path_to_choose() -> None:
+    policy, one = compiled(CALLS[3])
+    assert planned_otherwise(policy, replace(one, plan=replace(one.plan, kind=4, path=(0, 0)))) is None
+
+
+def test_a_survey_that_is_compared_with_too_many_edges_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What would be refused on board is a finding of the compiler."""
+    monkeypatch.setattr(prepare, "MAX_COMPARED", 3)
+    program = load([str(CHECKOUT / "missions" / "standard.rts")], lambda name: Path(name).read_bytes(), str(CHECKOUT))
+    found = compile_program(program, dialect.load(), mission=None, issued_at_us=0)
+    (told,) = [each.message for each in found.diagnostics if each.code is codes.TOO_MANY]
+    assert told.endswith("the legs of its paths would be compared with more than 3 edges of zones")

@@ -1,0 +1,318 @@
+"""E0618, E0717, E0806 to E0808, E1201 to E1203: what the text of a contract and of a policy says by itself."""
+
+import pytest
+
+from reference.sources import findings, found, mission, policy, program, skill
+from rtshcua.adapters.vehicle import manoeuvre
+from rtshcua.ground.prove import observation
+from rtshcua.ground.prove.rates import COMMANDS
+from rtshcua.mavlink import dialect
+from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
+from virtual.rows import rows
+
+LAND = {"motion": "land", "fallback": "", "class": "tactical"}
+
+
+def codes(*parts: str) -> list[str]:
+    return [code for code, _ in found(program(*parts))]
+
+
+def test_the_figures_are_those_of_what_flies() -> None:
+    assert observation.DECIDE_US == CONSERVATIVE_US
+    assert observation.ACTUATE_US == manoeuvre.RETRY_US
+    assert dialect.load().messages.keys() >= COMMANDS
+
+
+# ---------------------------------------------------------------- E0618
+
+
+@rows(
+    ("parts", "expected"),
+    [
+        ({}, []),
+        ({"energy": "at most 15 %"}, []),
+        ({"energy": "at most 16 %"}, ["E0618"]),
+        ({"maintain": "height < 100 m"}, ["E0618"]),
+        ({"maintain": "local time in 08:00 .. 18:00"}, []),  # that is known without any signal
+    ],
+)
+@rows("place", ["contingency", "fallback"])
+def test_a_last_link_can_when_nothing_is_known_and_only_the_reserve_is_left(
+    parts: dict[str, str], expected: list[str], place: str
+) -> None:
+    down = skill("come_down()", **{**LAND, **parts})
+    chain = "return_home, come_down"
+    if place == "contingency":
+        assert codes(down, policy(contingency=chain)) == expected
+    else:
+        assert codes(down, skill("probe()", fallback=chain), policy()) == expected
+
+
+def test_a_last_link_of_two_chains_is_reported_once() -> None:
+    down = skill("come_down()", **{**LAND, "energy": "at most 20 %"})
+    assert codes(down, skill("probe()", fallback="come_down"), policy(contingency="come_down")) == ["E0618"]
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(68, []), (67, ["E0618"])])
+def test_a_last_link_comes_down_from_the_highest_step(seconds: int, expected: list[str]) -> None:
+    """50 m at 1.5 m/s and 10 m at 0.5 m/s, with what stopping, speeding up and switching off take."""
+    down = skill("come_down()", **{**LAND, "lasts": f"at most {seconds} s"})
+    flight = mission("takeoff(altitude = 40 m)", "goto(47.39799 N, 8.54559 E, 60 m)", "return_home()")
+    assert codes(down, policy(contingency="return_home, come_down"), flight) == expected
+
+
+# ---------------------------------------------------------------- E0806, E0807
+
+
+@rows(
+    ("parts", "expected"),
+    [
+        ({"deadline": "30 s", "valid": "for 30 s", "lasts": "at most 30 s"}, []),
+        ({"deadline": "30 s", "valid": "for 29 s", "lasts": "at most 20 s"}, ["E0806"]),
+        ({"lasts": "at most 41 min"}, ["E0806"]),
+        ({"grace": "1 min"}, []),
+        ({"grace": "61 s"}, ["E0806"]),
+        ({"lasts": "at most 500 ms"}, []),
+        ({"lasts": "at most 400 ms"}, ["E0806"]),  # the grace that is not written is 500 ms
+        ({"lasts": "at most 400 ms", "grace": "400 ms"}, []),
+        ({"deadline": "31 s"}, ["E0807"]),
+        ({"deadline": "31 s", "class": "semantic"}, []),
+        ({"deadline": "200 ms", "class": "reflex"}, []),
+        ({"deadline": "201 ms", "class": "reflex"}, ["E0807"]),
+        ({"deadline": "5 m"}, ["E0310"]),  # no time at all
+    ],
+)
+def test_the_times_of_a_contract_agree(parts: dict[str, str], expected: list[str]) -> None:
+    assert codes(skill("probe()", **parts)) == expected
+
+
+@pytest.mark.parametrize(("within", "expected"), [(40, []), (41, ["E0806"])])
+def test_an_approval_is_not_awaited_for_longer_than_the_decision_is_valid(within: int, expected: list[str]) -> None:
+    rule = f"confirm probe by role supervisor within {within} min"
+    assert codes(skill("probe()"), policy(rule)) == expected
+
+
+@pytest.mark.parametrize(
+    ("block", "expected"),
+    [
+        ("deadline 2 s valid for 10 min lasts at most 1 min", []),
+        ("valid for 30 s", ["E0806"]),  # shorter than what the skill lasts
+        ("lasts at most 400 ms", ["E0806"]),
+    ],
+)
+def test_a_step_of_its_own_times_is_looked_at_too(block: str, expected: list[str]) -> None:
+    flight = mission("takeoff(altitude = 20 m)", f"probe() {{ {block} }}", "return_home()")
+    assert [code for code in codes(skill("probe()"), policy(), flight) if code != "E0801"] == expected
+
+
+# ---------------------------------------------------------------- E0808
+
+SLOW = "signal slow : speed = WIND.speed stale after {}\n"
+
+
+@rows(
+    ("stale", "lasts", "expected"),
+    [
+        ("10 s", "2020 ms", []),  # 1 s to the next report, 20 ms, 1 s
+        ("10 s", "2019 ms", ["E0808"]),
+        ("2 s", "1520 ms", []),  # comes every 500 ms
+        ("2 s", "1519 ms", ["E0808"]),
+        ("28480 ms", "10 s", []),  # 500 ms of grace: noticed within 30 s
+        ("28481 ms", "10 s", ["E0808"]),
+        ("58480 ms", "1 min", []),
+        ("58481 ms", "1 min", ["E0808"]),
+    ],
+)
+def test_a_breach_and_a_loss_are_noticed_while_the_skill_runs(stale: str, lasts: str, expected: list[str]) -> None:
+    probe = skill("probe()", assume="slow < 9 m/s", lasts=f"at most {lasts}")
+    assert codes(SLOW.format(stale), probe, policy()) == expected
+
+
+def test_what_is_only_required_is_not_watched() -> None:
+    assert codes(SLOW.format("10 min"), skill("probe()", require="slow < 9 m/s"), policy()) == []
+
+
+# ---------------------------------------------------------------- E0717
+
+
+@rows(
+    ("parts", "expected"),
+    [
+        ({"deadline": "50 ms", "require": "wind.speed < 9 m/s"}, []),  # asked for as often as it needs it
+        ({"deadline": "49 ms", "require": "wind.speed < 9 m/s"}, ["E0717"]),  # nothing comes more often
+        ({"deadline": "49 ms", "assume": "wind.speed < 9 m/s"}, ["E0717"]),
+        ({"deadline": "50 ms", "require": "gps.fix >= fix_3d and landed == on_ground and battery > 20 %"}, []),
+        ({"deadline": "1 s", "require": "heard > 20 %"}, []),  # a radio reports once a second
+        ({"deadline": "999 ms", "require": "heard > 20 %"}, ["E0717"]),
+        ({"deadline": "999 ms", "require": "mode == 4"}, ["E0717"]),  # PX4's heartbeat comes once a second
+        ({"deadline": "49 ms", "require": "wind.speed < 9 m/s", "class": "reflex"}, []),  # does not wait
+        ({"require": "told < 9 m/s"}, ["E0717"]),
+        ({"assume": "told < 9 m/s"}, ["E1201"]),
+        ({"require": "told < 9 m/s", "maintain": "told < 9 m/s"}, ["E1201"]),
+    ],
+)
+def test_what_a_step_waits_for_can_come(parts: dict[str, str], expected: list[str]) -> None:
+    told = (
+        "signal told : count = COMMAND_LONG.command stale after 2 s\n"
+        "signal heard : ratio = RADIO_STATUS.txbuf stale after 5 s\n"
+        "signal mode : count = HEARTBEAT.custom_mode stale after 5 s\n"
+    )
+    clauses = {key: value.replace("told < 9 m/s", "told < 9") for key, value in parts.items()}
+    assert codes(told, skill("probe()", **clauses), policy()) == expected
+
+
+def test_what_a_forbid_waits_for_counts_for_its_skills() -> None:
+    heard, quick = "signal heard : ratio = RADIO_STATUS.txbuf stale after 5 s\n", skill("quick()", deadline="900 ms")
+    assert codes(heard, quick, policy("forbid quick by any when heard < 9 %")) == ["E0717"]
+    assert codes(heard, quick, policy("forbid takeoff by any when heard < 9 %")) == []
+
+
+def test_nobody_approves_a_reflex() -> None:
+    rule = policy("confirm probe by role supervisor within 30 s")
+    assert codes(skill("probe()", **{"class": "reflex", "deadline": "100 ms"}), rule) == ["E0717"]
+    assert codes(skill("probe()"), rule) == []
+
+
+@pytest.mark.parametrize(("window", "expected"), [("5 s", []), ("6 s", ["E0717"]), ("5 min", ["E0717"])])
+def test_what_takes_longer_to_observe_than_the_flight_lasts_is_never_known(window: str, expected: list[str]) -> None:
+    probe = skill("probe()", require=f"battery > 20 % and (height < 90 m for the last {window})", motion="land",
+                  fallback="")  # fmt: skip
+    assert codes(probe, policy(), mission("probe()")) == expected
+    late = mission("takeoff(altitude = 20 m)", "hover()", "probe()")
+    assert codes(probe, policy(), late) == (expected if window == "5 min" else [])
+
+
+@pytest.mark.parametrize(
+    ("to", "message"),
+    [
+        ("45 m", []),
+        ("45001 mm", ["`rise` lasts at most 37.5 s, and the step takes up to 1 ms longer"]),
+        ("45600 mm", ["`rise` lasts at most 37.5 s, and the step takes up to 400 ms longer"]),
+        ("50 m", ["the step takes up to 41 s, and `rise` lasts at most 37.5 s"]),
+    ],
+)
+def test_by_how_much_a_plan_takes_too_long(to: str, message: list[str]) -> None:
+    """At 1.5 m/s, with 1.5 s for speeding up and 6 s from the command to leaving the ground."""
+    rise = skill("rise(to: altitude in 5 m .. 60 m)", motion="climb to to", lasts="at most 37500 ms")
+    said = found(program(rise, policy(), mission(f"rise({to})", "return_home()")))
+    assert [words for code, words in said if code == "E0804"] == message
+
+
+LONG = "battery > 20 % for the last {}"
+RARE = "battery > 20 % within the last {}"
+
+
+@rows(
+    ("permits", "expected"),
+    [
+        ([LONG.format("1 ms")], ["E0717"]),  # no step waits for a permit: the first is denied at once
+        ([LONG.format("11 s")], ["E0717"]),
+        ([LONG.format("6 min")], ["E0717"]),
+        ([f"altitude < 30 m and ({LONG.format('6 min')} or {LONG.format('7 min')})"], ["E0717"]),
+        ([f"{LONG.format('6 min')} or battery > 90 %"], []),
+        ([RARE.format("6 min")], []),
+        ([f"not ({RARE.format('6 min')})"], ["E0717"]),
+        ([f"not ({LONG.format('6 min')} and {RARE.format('7 min')})"], []),
+        ([LONG.format("6 min"), LONG.format("7 min")], ["E0717"]),
+        ([LONG.format("6 min"), f"altitude < 10 m or {LONG.format('7 min')}"], ["E0717"]),
+        ([LONG.format("6 min"), f"altitude < 30 m and {LONG.format('3 s')}"], ["E0717"]),
+        ([LONG.format("6 min"), f"altitude < 30 m and {RARE.format('3 s')}"], []),
+        ([LONG.format("6 min"), f"altitude < 10 m and {LONG.format('3 s')}"], ["E0717"]),  # not of this step
+    ],
+)
+def test_a_permit_of_a_step_can_be_known_before_it(permits: list[str], expected: list[str]) -> None:
+    rules = [f"permit takeoff by role operator through agent when {when}" for when in permits]
+    lines = [*rules, "permit hover, return_home, emergency_land by any", "contingency return_home, emergency_land"]
+    text = "policy rules version 1 {\n" + "\n".join(lines) + "\n}\n"
+    found = findings(program(text, mission("takeoff(altitude = 20 m)", "return_home()")))
+    about_steps = [each for each in found if each.code.id == "E0717"]
+    assert [each.code.id for each in about_steps] == expected
+    assert all(each.labels for each in about_steps)
+
+
+@pytest.mark.parametrize(("window", "expected"), [("70 s", []), ("71 s", ["E0717"])])
+def test_a_permit_of_a_later_step_is_known_by_its_release(window: str, expected: list[str]) -> None:
+    goto = f"permit goto by role operator through agent when {LONG.format(window)}"
+    text = (
+        "policy rules version 1 {\n  permit takeoff by role operator through agent\n"
+        f"  {goto}\n  permit hover, return_home, emergency_land by any\n  contingency return_home, emergency_land\n}}\n"
+    )
+    flight = mission("takeoff(altitude = 20 m)", "goto(47.39774 N, 8.54569 E, 20 m)", "return_home()")
+    assert [each.code.id for each in findings(program(text, flight))] == expected
+
+
+# ---------------------------------------------------------------- E1201 to E1203
+
+
+@pytest.mark.parametrize(
+    ("source", "stale", "expected"),
+    [
+        ("WIND.speed", "150 ms", []),  # every 50 ms, and without a stamp as old as the position before it
+        ("WIND.speed", "149 ms", ["E1201"]),
+        ("LOCAL_POSITION_NED.vx", "50 ms", []),  # it says when it was measured
+        ("LOCAL_POSITION_NED.vx", "49 ms", ["E1201"]),
+        ("GPS_RAW_INT.vel", "267 ms", []),  # its stamp is that of the fix, of which there are five a second
+        ("GPS_RAW_INT.vel", "266 ms", ["E1201"]),
+        ("COMMAND_LONG.param1", "1 ms", None),  # never comes, which is said in its own words
+    ],
+)
+def test_a_signal_comes_before_it_is_stale(source: str, stale: str, expected: list[str] | None) -> None:
+    kind, limit = ("count", "9") if expected is None else ("speed", "9 m/s")
+    signal = f"signal here : {kind} = {source} stale after {stale}\n"
+    if expected is None:
+        assert codes(signal, skill("probe()", require=f"here < {limit}"), policy()) == ["E0717"]
+        return
+    for clause in ("assume", "maintain"):
+        assert codes(signal, skill("probe()", **{clause: "here < 9 m/s"}), policy()) == expected
+    assert codes(signal, skill("probe()"), policy("degrade any when here > 9 m/s to return_home")) == expected
+    assert codes(signal, skill("probe()", require="here < 9 m/s"), policy()) == expected
+    assert codes(signal, skill("probe()"), policy("forbid probe by any when here > 9 m/s")) == expected
+
+
+@pytest.mark.parametrize(("window", "expected"), [("1 s", []), ("999 ms", ["E1201"])])
+@pytest.mark.parametrize("kind", ["for the last", "within the last"])
+def test_a_window_holds_more_than_one_report(window: str, kind: str, expected: list[str]) -> None:
+    probe = skill("probe()", assume=f"wind.speed < 9 m/s {kind} {window}")
+    assert codes(probe, policy()) == expected
+
+
+@rows(
+    ("clause", "expected"),
+    [
+        ("up <= 40 m", ["E1203"]),
+        ("up <= 40 m or up >= 41 m", ["E1203"]),
+        ("height <= up + 5 m", []),
+        ("position inside meadow", []),
+        ("local time in 08:00 .. 18:00", []),
+        ("phase == departure", ["E1203"]),
+    ],
+)
+def test_what_is_maintained_can_change(clause: str, expected: list[str]) -> None:
+    parts = {"motion": "climb to up", "maintain": clause}
+    assert codes(skill("probe(up: altitude in 5 m .. 50 m)", **parts), policy()) == expected
+
+
+@rows(
+    ("timing", "record", "expected"),
+    [
+        ("tactical", "decision, state, authorization", []),
+        ("tactical", "intent, decision", ["E1202"]),
+        ("tactical", "intent, decision, state, effect", ["E1202"]),
+        ("semantic", "decision, state, authorization", []),
+        ("semantic", "state, authorization", ["E1202"]),
+        ("reflex", "decision, state, effect", []),
+        ("reflex", "decision, state, authorization", ["E1202"]),
+        ("tactical", "", []),
+        ("tactical", "decisions", ["E0610"]),
+        ("tactical", "synced_first", []),
+        ("tactical", "written, decision", ["E1202"]),
+        ("tactical", "written, synced, written", ["E1205"]),
+        ("tactical", "synced, synced", []),
+        ("tactical", "buffered", ["E1204"]),
+        ("semantic", "buffered", ["E1204"]),
+        ("reflex", "buffered", []),
+        ("reflex", "buffered, written", ["E1205"]),
+    ],
+)
+def test_what_is_recorded_suffices_to_derive_a_decision_again(timing: str, record: str, expected: list[str]) -> None:
+    assert codes(skill("probe()", **{"class": timing, "deadline": "200 ms", "record": record})) == expected

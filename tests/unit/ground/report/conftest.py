@@ -1,0 +1,75 @@
+"""Handbooks of the shipped library and of a source that has every construct of the language once."""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.pipeline.program import compile_program, examine_program
+from rtshcua.ground.pipeline.suite import suite
+from rtshcua.ground.report.cases import Tried
+from rtshcua.ground.report.handbook import Flown, Part, handbook
+from rtshcua.ground.report.model import Handbook
+from rtshcua.ground.testing.run import run_case
+from rtshcua.mavlink import dialect
+from virtual.once import once
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+EVERYTHING = Path(__file__).with_name("everything.rts")
+STANDARD = CHECKOUT / "missions" / "standard.rts"
+#: 2026-01-31 08:00 UTC
+AT = 1_769_846_400_000_000
+
+
+@cache
+def program_of(path: Path) -> Program:
+    program = load([str(path)], lambda name: Path(name).read_bytes(), str(CHECKOUT))
+    assert not has_errors(program.diagnostics), program.diagnostics
+    return program
+
+
+@cache
+def part_of(path: Path) -> Part:
+    program = program_of(path)
+    checked = examine_program(program, dialect.load())
+    assert not has_errors(checked.diagnostics), checked.diagnostics
+    flown = []
+    for mission in program.units[0].missions:
+        compiled = compile_program(program, dialect.load(), mission=mission.name.text, issued_at_us=0)
+        assert compiled.policy is not None
+        assert compiled.mission is not None
+        flown.append(Flown(compiled.policy, compiled.mission, mission, checked.bounds.get(mission.name.text)))
+    tried = Tried(program, tuple(run_case(case) for case in suite(program, dialect.load()).cases))
+    return Part(program, checked.policies, tuple(flown), checked.diagnostics, (tried,), program.units[0].scenarios)
+
+
+@cache
+def book_of(path: Path) -> Handbook:
+    return once(f"handbook_{path.stem}", lambda: handbook([part_of(path)], made_at_us=AT, made_by="rtshcua"))
+
+
+@pytest.fixture(name="everything_program", scope="session")
+def read_everything() -> Program:
+    """The source that has every construct, and what it imports."""
+    return program_of(EVERYTHING)
+
+
+@pytest.fixture(name="everything", scope="session")
+def made_everything() -> Handbook:
+    """Its handbook."""
+    return book_of(EVERYTHING)
+
+
+@pytest.fixture(name="standard", scope="session")
+def made_standard() -> Handbook:
+    """The handbook of the shipped policy, with a mission."""
+    return book_of(STANDARD)
+
+
+@pytest.fixture(name="part", scope="session")
+def parts() -> Callable[[Path], Part]:
+    """The program of a file, examined."""
+    return part_of

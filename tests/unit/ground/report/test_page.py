@@ -1,0 +1,213 @@
+"""The page: well formed, complete in itself, closed to whatever a source may say, and the same every time."""
+
+import re
+from base64 import b64decode
+from collections.abc import Callable
+from dataclasses import replace
+from hashlib import sha256
+from html import unescape
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from rtshcua.ground.report.handbook import Part, handbook
+from rtshcua.ground.report.model import Handbook
+from rtshcua.ground.report.page import page
+from rtshcua.wire.bundle import policy_digest, policy_payload
+
+VOID = {"meta", "link", "br", "hr", "img", "input"}
+#: what closes a paragraph that it stands in, so that a browser shows something else than is written
+BLOCKS = {"p", "ul", "ol", "dl", "div", "table", "section", "figure", "pre", "h1", "h2", "h3", "h4"}
+
+
+class Outline(HTMLParser):
+    """The elements of a page, and what is wrong with how they are nested."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.wrong: list[str] = []
+        self.elements: list[tuple[str, dict[str, str]]] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attrs}))
+        if "p" in self.open and tag in BLOCKS:
+            self.wrong.append(tag)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attrs}))
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.wrong.append(tag)
+
+    def of(self, tag: str) -> list[dict[str, str]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@pytest.fixture(scope="module")
+def text(everything: Handbook) -> str:
+    return page(everything)
+
+
+@pytest.fixture(scope="module")
+def outline(text: str) -> Outline:
+    return Outline(text)
+
+
+def test_elements_are_nested_and_closed(outline: Outline) -> None:
+    assert outline.wrong == []
+    assert outline.open == []
+
+
+def test_every_id_is_unique_and_every_link_leads_somewhere(outline: Outline) -> None:
+    ids = [attributes["id"] for _, attributes in outline.elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    links = [attributes["href"] for attributes in outline.of("a")]
+    assert len(links) > 50
+    assert not {link for link in links if not link.startswith("#") or link[1:] not in ids}
+    labelled = {word for _, attributes in outline.elements for word in attributes.get("aria-labelledby", "").split()}
+    assert not labelled - set(ids)
+    inner = {found for _, each in outline.elements for found in re.findall(r"url\(#(.*?)\)", " ".join(each.values()))}
+    assert inner
+    assert not inner - set(ids)
+
+
+def test_nothing_is_loaded_and_nothing_runs(outline: Outline, text: str) -> None:
+    assert not {tag for tag, _ in outline.elements} & {"script", "link", "img", "iframe", "object", "form", "base"}
+    for _, attributes in outline.elements:
+        assert not {name for name in attributes if name.startswith("on") or name in ("src", "style", "srcset")}
+    assert "@import" not in text
+    assert "url(http" not in text
+
+
+def test_the_policy_of_the_page_allows_its_own_style_alone(outline: Outline, text: str) -> None:
+    (policy,) = (each["content"] for each in outline.of("meta") if each.get("http-equiv") == "Content-Security-Policy")
+    (style,) = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    digest = re.search(r"style-src 'sha256-([^']+)'", policy)
+    assert digest is not None
+    assert b64decode(digest[1]) == sha256(style.encode()).digest()
+    assert policy.startswith("default-src 'none'; ")
+    assert "unsafe" not in policy
+
+
+def test_tables_and_drawings_say_what_they_are(outline: Outline) -> None:
+    tags = [tag for tag, _ in outline.elements]
+    assert tags.count("table") == tags.count("caption") > 10
+    assert all(attributes.get("scope") in ("col", "row", "rowgroup") for attributes in outline.of("th"))
+    assert len(outline.of("svg")) >= 4
+    assert all(each["role"] == "img" and each["aria-labelledby"] for each in outline.of("svg"))
+    levels = [int(tag[1]) for tag in tags if re.fullmatch(r"h[1-6]", tag)]
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_what_a_source_says_is_text(text: str) -> None:
+    """The identity, a comment and the intent of the sample hold markup."""
+    for hostile in ("<i>01</i>", '<script>alert("a comment is text")</script>', "<b>everything</b> & come home"):
+        assert hostile not in text
+        assert hostile in unescape(text)
+
+
+@pytest.mark.parametrize("hostile", ['"><svg onload=alert(1)>', "</style><script>1</script>", "{{ 7 * 7 }}", "`<b>`"])
+def test_a_hostile_title_is_text(everything: Handbook, hostile: str) -> None:
+    text = page(replace(everything, title=hostile, made_by=hostile))
+    outline = Outline(text)
+    assert outline.wrong == []
+    assert "script" not in {tag for tag, _ in outline.elements}
+    assert hostile.replace("`", "") in re.sub(r"</?code>", "", unescape(text))
+
+
+@pytest.mark.parametrize("hidden", ["\u202e", "\u200b", "\ufeff", "\x07", "\r", "\u2066"])
+def test_what_would_hide_or_turn_text_is_shown(everything: Handbook, hidden: str) -> None:
+    text = page(replace(everything, title=f"look{hidden}here"))
+    assert hidden not in text
+    assert f"look&lt;U+{ord(hidden):04X}&gt;here" in text
+
+
+def test_the_same_sources_make_the_same_bytes(part: Callable[[Path], Part], standard: Handbook) -> None:
+    path = Path(__file__).resolve().parents[4] / "missions" / "standard.rts"
+    again = handbook([part(path)], made_at_us=1_769_846_400_000_000, made_by="rtshcua")
+    assert again == standard
+    assert page(again).encode() == page(standard).encode()
+    assert "2026-01-31 08:00 UTC" in page(again)
+
+
+def test_the_digest_is_of_what_is_signed(part: Callable[[Path], Part], standard: Handbook) -> None:
+    path = Path(__file__).resolve().parents[4] / "missions" / "standard.rts"
+    signed = policy_digest(policy_payload(part(path).missions[0].policy)).hex()
+    assert [chapter.digest for chapter in standard.chapters] == [signed]
+    shown = re.findall(r'class="digest">(.*?)</(?:td|dd|p)>', page(standard), re.DOTALL)
+    assert sum(re.sub(r"<[^>]*>|\s", "", each) == signed for each in shown) == 3
+
+
+def test_a_policy_that_two_programs_have_is_one_chapter(part: Callable[[Path], Part]) -> None:
+    """With the missions of both."""
+    missions = Path(__file__).resolve().parents[4] / "missions"
+    book = handbook([part(missions / "standard.rts"), part(missions / "extended.rts")], made_at_us=0, made_by="x")
+    (chapter,) = book.chapters
+    assert [mission.name for mission in chapter.missions] == ["standard", "extended"]
+
+
+def test_changes_are_told_and_marked(part: Callable[[Path], Part]) -> None:
+    everything = part(Path(__file__).with_name("everything.rts"))
+    new = everything.policies[0].policy
+    old = type(new)(**{**{name: getattr(new, name) for name in new.__struct_fields__}, "rules": new.rules[1:]})
+    book = handbook([everything], made_at_us=0, made_by="x", earlier=[old], since="old.bundle")
+    (chapter,) = book.chapters
+    assert chapter.since == "old.bundle"
+    assert len(chapter.changes) == 1
+    assert [rule.number for rule in chapter.rules if rule.changed] == [1]
+    assert "old.bundle" in page(book)
+    same = handbook([everything], made_at_us=0, made_by="x", earlier=[new], since="old.bundle")
+    assert same.chapters[0].changes == ()
+    assert "It means the same" in page(same)
+
+
+def test_tests_and_missions_are_in_the_page(everything: Handbook, text: str) -> None:
+    (chapter,) = everything.chapters
+    assert [case.name for case in chapter.cases] == [
+        'an approval is "waited" for', "charge decides", "charge decides", "another policy", "too windy",
+    ]  # fmt: skip
+    (mission,) = chapter.missions
+    assert [step.number for step in mission.steps] == [1, 2, 3, 4, 5]
+    assert mission.steps[2].tighter == ("it begins within 4 s of its turn", "before it begins: `battery > 50 %`")
+    assert "an approval is &#34;waited&#34; for" in text
+    (scenario,) = chapter.scenarios
+    assert scenario.name == "a gust on the way"
+    assert scenario.told[0] == "the mission `look` is flown on the simulated vehicle"
+    assert 'id="p1-scenarios"' in text
+    assert "They were not flown when this page was made" in text
+    assert "a breach is answered within " in text
+
+
+def luminance(colour: str) -> float:
+    """WCAG 2.2, relative luminance."""
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def test_text_stands_out_by_day_and_by_night(text: str) -> None:
+    """At least 4.5 to 1 (WCAG 2.2, AA) on the page and in the heads of tables, 3 to 1 for the lines of a map."""
+    faces = re.findall(r":root \{(.*?)\}", text, re.DOTALL)
+    assert len(faces) == 3  # light, dark, paper
+    for face in faces[:2]:
+        colours = dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6});", face))
+
+        def ratio(one: str, other: str, known: dict[str, str] = colours) -> float:
+            light, dark = sorted((luminance(known[one]), luminance(known[other])), reverse=True)
+            return (light + 0.05) / (dark + 0.05)
+
+        for ink in ("ink", "soft", "link", "good", "bad", "warn"):
+            assert ratio(ink, "page") >= 4.5, ink
+            assert ratio(ink, "band") >= 4.5, ink
+        for line in ("allowed-line", "forbidden-line", "other-line", "way"):
+            assert ratio(line, "sheet") >= 3, line
+            assert ratio(line, "allowed") >= 3, line

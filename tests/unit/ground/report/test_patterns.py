@@ -1,0 +1,88 @@
+"""What the page says of the patterns of a survey is what the planner plans."""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import hypot
+
+import pytest
+
+from rtshcua.ground.checker.checks.contracts import PATTERNS as KNOWN
+from rtshcua.ground.geometry.shapes import Disc, Outline
+from rtshcua.ground.geometry.survey import survey
+from rtshcua.ground.report.drawing.patterns import drawn
+from rtshcua.ground.report.model import Handbook
+from rtshcua.ground.report.page import page
+from rtshcua.ground.report.words.skills import PATTERNS
+
+M = 1_000
+HOUSE = Outline(((0, 0), (120 * M, 0), (150 * M, 55 * M), (120 * M, 90 * M), (0, 90 * M)))
+ROUND = Disc((0, 0), 50 * M)
+
+
+def turned(points: tuple[tuple[int, int], ...]) -> int:
+    """Twice the area that a closed way goes around: positive counter-clockwise."""
+    return sum(ax * by - bx * ay for (ax, ay), (bx, by) in pairwise(points))
+
+
+def test_each_pattern_that_there_is_has_words_and_a_drawing() -> None:
+    assert set(PATTERNS) == set(KNOWN)
+    for name in KNOWN:
+        assert len(drawn(name).arrows) > 3
+
+
+@pytest.mark.parametrize(("height", "apart"), [(20 * M, 20 * M), (3 * M, 5 * M)])
+def test_a_grid_is_no_wider_than_it_flies_high(height: int, apart: int) -> None:
+    way = survey(HOUSE, "grid", height, 3 * M, (0, 0))
+    other = survey(HOUSE, "grid", height, 3 * M, (150 * M, 90 * M))
+    assert way is not None
+    assert other == way[::-1]
+    lines = sorted({y for (_, y), (_, then) in pairwise(way) if y == then})
+    spaces = {b - a for a, b in pairwise(lines)}
+    assert max(spaces) <= apart
+    assert max(spaces) - min(spaces) <= 1
+    assert abs(lines[0] - 3 * M - max(spaces) / 2) < 10
+
+
+def test_a_line_of_a_grid_that_meets_a_corner_is_flown_like_any_other() -> None:
+    pointed = Outline(((0, 0), (120 * M, 0), (150 * M, 45 * M), (120 * M, 90 * M), (0, 90 * M)))
+    way = survey(pointed, "grid", 20 * M, 3 * M, (0, 0))
+    assert way is not None
+    lines = [(a, b) for (a, y), (b, then) in pairwise(way) if y == then]
+    assert len(way) == 10
+    assert len(lines) == 5
+    assert min(abs(b - a) for a, b in lines) > 110 * M
+
+
+def test_a_perimeter_goes_around_counter_clockwise_from_the_west() -> None:
+    way = survey(HOUSE, "perimeter", 20 * M, 3 * M, (150 * M, 45 * M))
+    assert way is not None
+    assert way[0] == way[-1] == min(way)
+    assert turned(way) > 0
+    around = survey(ROUND, "perimeter", 20 * M, 3 * M, None)
+    assert around is not None
+    assert len(around) == 17
+    assert around[0] == max(around)
+    assert turned(around) > 0
+
+
+def test_an_orbit_is_the_largest_circle_in_the_area() -> None:
+    way = survey(HOUSE, "orbit", 20 * M, 3 * M, (0, 0))
+    assert way is not None
+    assert len(way) == 17
+    assert way[0] == way[-1] == max(way)
+    assert turned(way) > 0
+    x0, y0 = (way[0][0] + way[8][0]) // 2, way[0][1]
+    assert all(abs(hypot(x - x0, y - y0) - (way[0][0] - x0)) < 10 for x, y in way)
+    # it touches the inset edge in the south or in the north, and leaves it nowhere
+    assert min(y for _, y in way) >= 3 * M
+    assert min(min(y for _, y in way) - 3 * M, 87 * M - max(y for _, y in way)) < 10
+
+
+def test_the_page_draws_the_patterns_of_surveys_alone(everything: Handbook) -> None:
+    text = page(everything)
+    surveys = [skill for chapter in everything.chapters for skill in chapter.skills if skill.patterns]
+    assert surveys
+    assert text.count('<figure class="pattern">') == sum(len(skill.patterns) for skill in surveys)
+    assert all("survey path" in skill.motion for skill in surveys)
+    bare = replace(everything.chapters[0], skills=tuple(replace(s, patterns=()) for s in everything.chapters[0].skills))
+    assert '<figure class="pattern">' not in page(replace(everything, chapters=(bare,)))

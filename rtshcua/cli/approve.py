@@ -26,7 +26,7 @@ from rtshcua.cli.unlock import person_key, terminal, unlock_person
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.ground.analysis.asking import may_match
+from rtshcua.ground.analysis.confirming import may_match
 from rtshcua.ground.lower.surveyed import Planned, planned_otherwise
 from rtshcua.model.step_number import index_of, number_of
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval

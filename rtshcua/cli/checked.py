@@ -68,22 +68,27 @@ def check_sources(
             out(drawn)
     if code is ExitCode.OK and since is not None and not found.versions:
         return findings.end(_nothing_compared(since, gone))
-    return findings.finish(
-        code,
-        missions=[{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
-        versions=[
-            {
-                "policy": each.name,
-                "version": each.version,
-                "earlier": each.earlier,
-                "changes": [asdict(change) for change in each.changes],
-            }
-            for each in found.versions
-        ],
-        not_here=gone,
-        left_out=[each._asdict() for each in found.left_out],
-        issued_now=[{"code": each.code.id, "message": each.message} for each in found.now],
-    )
+    return findings.finish(code, **_as_json(found, gone))
+
+
+def _as_json(found: Found, gone: Sequence[str]) -> dict[str, object]:
+    """What else the object of `--json` holds."""
+    versions = [
+        {
+            "policy": each.name,
+            "version": each.version,
+            "earlier": each.earlier,
+            "changes": [asdict(change) for change in each.changes],
+        }
+        for each in found.versions
+    ]
+    return {
+        "missions": [{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
+        "versions": versions,
+        "not_here": gone,
+        "left_out": [each._asdict() for each in found.left_out],
+        "issued_now": [{"code": each.code.id, "message": each.message} for each in found.now],
+    }
 
 
 def _not_here(earlier: Earlier, found: Found) -> list[str]:

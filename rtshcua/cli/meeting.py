@@ -17,7 +17,7 @@ from rtshcua.cli.signing import Signing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.ports import Event
-from rtshcua.simulation.mark import hundredths, marked_speed
+from rtshcua.simulation.simulated_mark import hundredths, marked_speed
 
 #: How long a heartbeat is waited for, in seconds,
 HEARTBEAT_S = 10.0

@@ -17,7 +17,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.bundle import BundleError, check_proposer
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
-from rtshcua.wire.trust import key_refusal, open_root
+from rtshcua.wire.trust import TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 #: octets of a passphrase, in a file
@@ -104,16 +104,20 @@ def person_key(store: KeyStore, person: str | None, role: str | None) -> Verific
     ]
     who = f"{person or 'anybody'} as {role or 'anything'}"
     if not keys:
-        text = f"there is no approval key of {who}: `rtshcua keys approver` makes one"
-        own = {one for key in root.keys_for(Duty.APPROVAL).values() if person == key.person for one in key.roles}
-        if person is not None and own:
-            may = ", ".join(f"`{one}`" for one in sorted(own))
-            text = f"the key of {person} may not sign as {role}, but as {may}: `rtshcua keys approver` makes another"
-        raise KeyStoreError("no-approver", text)
+        raise KeyStoreError("no-approver", _no_approver(root, person, role, who))
     if len({key.person for key in keys}) > 1:
         names = ", ".join(f"`{each}`" for each in sorted({key.person for key in keys}))
         raise KeyStoreError("several-approvers", f"there are approval keys of {names}: `--as NAME` says whose to use")
     return keys[0]
+
+
+def _no_approver(root: TrustRoot, person: str | None, role: str | None, who: str) -> str:
+    """That there is no such approval key, or that the person's may sign for other roles, in words."""
+    own = {one for key in root.keys_for(Duty.APPROVAL).values() if person == key.person for one in key.roles}
+    if person is None or not own:
+        return f"there is no approval key of {who}: `rtshcua keys approver` makes one"
+    may = ", ".join(f"`{one}`" for one in sorted(own))
+    return f"the key of {person} may not sign as {role}, but as {may}: `rtshcua keys approver` makes another"
 
 
 def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mission) -> None:

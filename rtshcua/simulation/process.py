@@ -37,8 +37,8 @@ from rtshcua.simulation.config import (
     SimulationConfig,
 )
 from rtshcua.simulation.fault_syntax import parse_fault
-from rtshcua.simulation.mark import hundredths
 from rtshcua.simulation.place import Home
+from rtshcua.simulation.simulated_mark import hundredths
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 

@@ -12,7 +12,7 @@ from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.config import Extra, Purpose
 from rtshcua.simulation.failsafe import LOW_TO_LAND
-from rtshcua.simulation.mark import marked
+from rtshcua.simulation.simulated_mark import marked
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
 
 _HEARTBEAT = maker(mavlink.MAVLink_heartbeat_message)

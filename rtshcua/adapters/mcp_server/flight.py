@@ -7,7 +7,7 @@ from collections import deque
 from pathlib import Path
 from typing import Any, Final
 
-from rtshcua.adapters.mcp_server.lines import understood
+from rtshcua.adapters.mcp_server.flight_lines import understood
 from rtshcua.ground.language.size import values_of, without_texts
 
 #: how long until it is tried again to follow, in seconds

@@ -18,7 +18,7 @@ from rtshcua.ground.report.model import (
     SkillTold,
     Start,
 )
-from rtshcua.ground.report.permitted import permitted
+from rtshcua.ground.report.permitted_limits import permitted
 from rtshcua.ground.report.rights import asked_of, rights, rule_names
 from rtshcua.ground.report.subject import Subject
 from rtshcua.ground.report.words.places import told_vehicle

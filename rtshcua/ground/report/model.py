@@ -83,7 +83,7 @@ class ParameterTold:
 
 
 @dataclass(frozen=True, slots=True)
-class Permitted:
+class PermittedLimit:
     """What the rules permit of a parameter of a skill, over all who may ask. `kind` is `altitude`, `speed` or `place`;
     `conditions`: something else must hold besides for what is widest in it.
     """
@@ -285,7 +285,7 @@ class Chapter:
     rights: tuple[Rights, ...]
     rules: tuple[RuleTold, ...]
     rules_left_out: tuple[str, ...]
-    permitted: tuple[Permitted, ...]
+    permitted: tuple[PermittedLimit, ...]
     airspace: str
     contingency: tuple[str, ...]
     evidence: str

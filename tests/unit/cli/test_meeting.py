@@ -12,7 +12,7 @@ from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.cli import meeting
 from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.simulation.mark import marked
+from rtshcua.simulation.simulated_mark import marked
 
 
 class Silent:

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from pymavlink.dialects.v20 import development
 
 from rtshcua.model.faults import MessageSilence, Mode
-from rtshcua.simulation.mark import marked_speed
+from rtshcua.simulation.simulated_mark import marked_speed
 from virtual import plans as p
 
 Pilots = Callable[..., Any]

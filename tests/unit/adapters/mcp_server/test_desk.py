@@ -14,7 +14,7 @@ import pytest
 from rtshcua import library
 from rtshcua.adapters.mcp_server import tools as desks
 from rtshcua.adapters.mcp_server.flight import Following
-from rtshcua.adapters.mcp_server.lines import understood
+from rtshcua.adapters.mcp_server.flight_lines import understood
 from rtshcua.adapters.mcp_server.missions import Answer, Missions
 from rtshcua.adapters.mcp_server.tools import Desk, Misused, Signer
 from rtshcua.ground.agent.specification import load_specification

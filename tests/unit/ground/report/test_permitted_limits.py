@@ -7,8 +7,8 @@ import pytest
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import examine_program
-from rtshcua.ground.report.model import Permitted
-from rtshcua.ground.report.permitted import permitted
+from rtshcua.ground.report.model import PermittedLimit
+from rtshcua.ground.report.permitted_limits import permitted
 from rtshcua.ground.report.subject import Subject
 from rtshcua.mavlink import dialect
 
@@ -38,7 +38,7 @@ role pilot, trainee
 """
 
 
-def limits(rules: str, require: str = "battery > 20 %") -> dict[str, Permitted]:
+def limits(rules: str, require: str = "battery > 20 %") -> dict[str, PermittedLimit]:
     text = SOURCE.replace("RULES", rules).replace("REQUIRE", require).encode()
     program = load(["p.rts"], lambda _: text, str(Path.cwd()))
     checked = examine_program(program, dialect.load())

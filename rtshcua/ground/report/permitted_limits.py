@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from rtshcua.decision.prepare import Compiler
 from rtshcua.decision.tree import AtMost, Node, Not
 from rtshcua.ground.analysis.extent import FAR, Bounds, Extents, alternatives
-from rtshcua.ground.report.model import Permitted
+from rtshcua.ground.report.model import PermittedLimit
 from rtshcua.ground.report.rights import rule_names
 from rtshcua.ground.report.subject import Subject, within
 from rtshcua.ground.report.words.conditions import conjuncts, told_condition
@@ -32,7 +32,7 @@ class _Way(NamedTuple):
     forbids: tuple[int, ...]
 
 
-def permitted(subject: Subject) -> tuple[Permitted, ...]:
+def permitted(subject: Subject) -> tuple[PermittedLimit, ...]:
     """What is permitted of every height, speed and place that some step may be asked for."""
     return tuple(_Permitted(subject).every())
 
@@ -45,7 +45,7 @@ class _Permitted:
         self._extents = Extents(compiler.tables, self._policy.zones)
         self._compiler = compiler
 
-    def every(self) -> Iterator[Permitted]:
+    def every(self) -> Iterator[PermittedLimit]:
         for number, contract in enumerate(self._policy.contracts):
             ways = list(dict.fromkeys(self._ways(number)))
             for parameter in contract.parameters:
@@ -70,22 +70,9 @@ class _Permitted:
                     if all(self._policy.rules[each].when is not None for each in forbids):
                         yield _Way(at, forbids)
 
-    def _quantity(self, contract: Contract, parameter: Parameter, ways: Sequence[_Way]) -> Iterator[Permitted]:
+    def _quantity(self, contract: Contract, parameter: Parameter, ways: Sequence[_Way]) -> Iterator[PermittedLimit]:
         cell = (True, parameter.cell)
-        ranges: Bounds = {
-            (True, each.cell): (each.low, each.high) for each in contract.parameters if each.kind != PLACE
-        }
-        needed = [self._parts(self._compiler.node(clause, contract)) for clause in contract.require]
-        reaches = []
-        for way in ways:
-            parts: list[Bounds] = [ranges]
-            some = [self._parts(self._nodes[way.permit]), *(self._parts(Not(self._nodes[at])) for at in way.forbids)]
-            for narrower in [*some, *needed]:
-                if any(not bounds for bounds in narrower):
-                    continue  # it bounds nothing by itself
-                both = (_common(one, other) for one in parts for other in narrower)
-                parts = _around([each for each in both if each is not None])
-            reaches += [each[cell] for each in parts]
+        reaches = [each[cell] for way in ways for each in self._reaches(contract, way)]
         if not reaches:
             return
         low, high = min(low for low, _ in reaches), max(high for _, high in reaches)
@@ -94,7 +81,21 @@ class _Permitted:
         limits = f"between {display(low, dimension)} and {display(high, dimension)}{_FROM[dimension]}"
         if low == high:
             limits = f"exactly {display(low, dimension)}{_FROM[dimension]}"
-        yield Permitted(contract.name, parameter.name, parameter.dimension, limits, not plain)
+        yield PermittedLimit(contract.name, parameter.name, parameter.dimension, limits, not plain)
+
+    def _reaches(self, contract: Contract, way: _Way) -> list[Bounds]:
+        """What may be asked for by one way: the skill's own ranges within what the rules and its `require` leave."""
+        parts: list[Bounds] = [
+            {(True, each.cell): (each.low, each.high) for each in contract.parameters if each.kind != PLACE}
+        ]
+        needed = [self._parts(self._compiler.node(clause, contract)) for clause in contract.require]
+        some = [self._parts(self._nodes[way.permit]), *(self._parts(Not(self._nodes[at])) for at in way.forbids)]
+        for narrower in [*some, *needed]:
+            if any(not bounds for bounds in narrower):
+                continue  # it bounds nothing by itself
+            both = (_common(one, other) for one in parts for other in narrower)
+            parts = _around([each for each in both if each is not None])
+        return parts
 
     def _parts(self, node: Node) -> list[Bounds]:
         """What a condition says of what is asked for."""
@@ -114,7 +115,7 @@ class _Permitted:
             if node is not _ALWAYS
         )
 
-    def _place(self, contract: Contract, parameter: Parameter, ways: Sequence[_Way]) -> Permitted:
+    def _place(self, contract: Contract, parameter: Parameter, ways: Sequence[_Way]) -> PermittedLimit:
         """What the rules say of a place in their own words; what one says of other things too is under conditions."""
         told: dict[str, None] = {}
         everywhere, plain = False, False
@@ -128,7 +129,7 @@ class _Permitted:
             everywhere |= not words
             told[listed(words)] = None
         limits = "wherever the airspace allows it" if everywhere else f"if {'; or if '.join(told)}"
-        return Permitted(contract.name, parameter.name, "place", limits, not plain)
+        return PermittedLimit(contract.name, parameter.name, "place", limits, not plain)
 
     def _reads(self, number: int, parameter: str) -> bool:
         when = self._subject.rules[number].when

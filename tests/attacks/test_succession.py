@@ -231,7 +231,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
 def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, what: str) -> None:
     """A run is killed in the air, a key of its bundle is revoked, and it is started again with the old command line."""
     of = launched(order())
-    store = FileReplayStore(state_folder(), QUAD)
+    store = FileReplayStore(launch._left_in(order()), QUAD)
     store.open_once(of.bundle.mission_digest, of.expires_us, 0, of.bundle.policy.name, of.bundle.policy.version)
     old_key, again = fleet.key_path(Duty.LOG).read_bytes(), order()
     if what == "damaged":
@@ -324,7 +324,7 @@ def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, d
     with pytest.raises(Refused) as fresh:  # nothing of it flew
         launch._trusting(order(), bundle, Late())
     assert fresh.value.slug == lapsed.slug == ("expired" if duty is Duty.ROOT else "key-expired")
-    store = FileReplayStore(state_folder(), QUAD)
+    store = FileReplayStore(launch._left_in(order()), QUAD)
     store.open_once(of.bundle.mission_digest, of.expires_us, 0, of.bundle.policy.name, of.bundle.policy.version)
     trusted, _, loaded = launch._trusting(order(), bundle, Late())
     assert loaded.bundle.mission_digest == of.bundle.mission_digest
@@ -351,7 +351,7 @@ def test_a_wait_brings_down_its_own_flight_and_none_of_somebody_else_long_after(
         return launch._broken_off(order(), past, base, vehicle, clock, []) is not None
 
     assert not found(SystemClock()), "nothing of that bundle flew"
-    store = FileReplayStore(state_folder(), QUAD)
+    store = FileReplayStore(launch._left_in(order()), QUAD)
     store.open_once(base.bundle.mission_digest, base.expires_us, 0, base.bundle.policy.name, base.bundle.policy.version)
     assert found(SystemClock())
     assert not found(Late())

@@ -80,9 +80,7 @@ def test_what_is_approved_is_told_by_us(low: Path, capsys: pytest.CaptureFixture
     assert "area = bridge_a [77.0 m from west to east by 53.4 m, its middle 176.8 m from home, bearing 47°]" in out
 
 
-@pytest.mark.parametrize(
-    ("typed", "code"), [("y\n", ExitCode.OK), ("n\n", ExitCode.REFUSED), ("", ExitCode.INTERRUPTED)]
-)
+@pytest.mark.parametrize(("typed", "code"), [("y\n", ExitCode.OK), ("n\n", ExitCode.REFUSED), ("", ExitCode.INPUT)])
 def test_what_is_approved_is_told_before_it_is_signed(
     low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, typed: str, code: ExitCode
 ) -> None:

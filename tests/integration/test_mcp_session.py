@@ -432,8 +432,10 @@ def served(ground: Any, base: str, place: Path) -> Iterator[tuple[int, str]]:
         "mcp", base, "--to", str(place), "--with", str(POLICY), "--http", "0", "--token-file", str(token)
     )
     assert select.select([run.process.stderr], [], [], 60)[0]
-    said = run.process.stderr.readline().decode()
-    found = re.search(r"http://127\.0\.0\.1:(\d+)/mcp", said)
+    said, found = "", None
+    while found is None and (line := run.process.stderr.readline().decode()):  # a note may come before
+        said += line
+        found = re.search(r"http://127\.0\.0\.1:(\d+)/mcp", line)
     assert found, said
     assert token.read_text() not in said
     try:

@@ -19,7 +19,7 @@ from virtual.rows import rows
 CHECKOUT = Path(__file__).resolve().parents[2]
 EXTENSION = CHECKOUT / "editors" / "vscode"
 SOURCES = sorted(path for folder in ("policies", "skills", "missions") for path in (CHECKOUT / folder).glob("*.rts"))
-SAMPLE = CHECKOUT / "tests" / "unit" / "ground" / "handbook" / "everything.rts"
+SAMPLE = CHECKOUT / "tests" / "unit" / "ground" / "report" / "everything.rts"
 
 
 def read(name: str) -> Any:

@@ -412,7 +412,7 @@ def _apart(
     assert not isinstance(own_key, Elsewhere)
     try:
         process = started(
-            loaded.vehicle, trust.signed, order.state, link_key=order.signing_key, own_key=own_key,
+            loaded.vehicle, trust.signed, _left_in(order), link_key=order.signing_key, own_key=own_key,
             log_key=log_key.key(),
             user=order.boundary_user, paced=order.speed != 1, settings=order.settings, owed=owed,
             utc_error_us=UTC_ERROR_US if order.link is None else order.utc_error_us,

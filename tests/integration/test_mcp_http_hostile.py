@@ -141,8 +141,10 @@ def served(grounds: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
         at = ("--with", str(POLICY), "--http", "0", "--token-file", str(token))
         run = ground.start("mcp", ground.bundle(), "--to", f"{place}/s", *at)
         assert select.select([run.process.stderr], [], [], 60)[0]
-        lines = iter(run.process.stderr.readline, b"")  # a note may come before: no run listens there yet
-        found = next(filter(None, (re.search(rb"http://127\.0\.0\.1:(\d+)/mcp", line) for line in lines)), None)
+        said = b""
+        while b"token`\n" not in said and (line := run.process.stderr.readline()):  # a note may come before it
+            said += line
+        found = re.search(rb"http://127\.0\.0\.1:(\d+)/mcp", said)
         assert found
         made = Served(int(found[1]), token.read_text().strip(), run)
         yield made

@@ -24,8 +24,8 @@ SPEED = 1.5
 class Aboard:
     """A vehicle, and a boundary for it that has the keys; the run's key store has none."""
 
-    def __init__(self, ground: Any, made: Listening, port: int, *, signed: bool) -> None:
-        self.ground, self.made, self.port = ground, made, port
+    def __init__(self, ground: Any, made: Listening, port: int, *, signed: bool, speed: float = SPEED) -> None:
+        self.ground, self.made, self.port, self.speed = ground, made, port, speed
         self.key = ground.folder / "link.key"
         self.key.write_text("5a" * 32 + "\n")
         self.key.chmod(0o600)
@@ -34,7 +34,7 @@ class Aboard:
         assert ground.start(*words).process.wait() == 0
         made.give()
         self.bundles = [ground.bundle(), ground.bundle(name="another")]
-        ground.vehicle(port, SPEED, *linked)
+        ground.vehicle(port, speed, *linked)
         self.key.unlink()
         self.log_key = ground.store.key_path(Duty.LOG).read_bytes()
         for secret in ground.store.folder.glob("*.key"):
@@ -43,7 +43,7 @@ class Aboard:
     def run(self, bundle: int = 0, *words: str) -> Any:
         where = ("--connect", f"udpin:127.0.0.1:{self.port}", "--vehicle", "quad-07", "--unsigned-radio")
         socket = ("--boundary-socket", str(self.made.socket))
-        return self.ground.run(self.bundles[bundle], *where, *socket, *words, speed=SPEED)
+        return self.ground.run(self.bundles[bundle], *where, *socket, *words, speed=self.speed)
 
     def verified(self, folder: Path) -> tuple[int, dict[str, Any]]:
         done = self.ground.start("verify-log", "--audit", str(folder), "--json").end()
@@ -134,7 +134,7 @@ def test_a_vehicle_that_enforces_signing_is_not_waited_for_without_the_boundary(
     ground: Any, made: Listening, port: int
 ) -> None:
     """Nothing that this run could send is obeyed: it ends, and one that is begun once the boundary is there does it."""
-    aboard = Aboard(ground, made, port, signed=True)
+    aboard = Aboard(ground, made, port, signed=True, speed=1)  # who cannot ask it does not know that it is simulated
     first = aboard.run()
     first.until("dispatched", step=1)
     first.signal(signal.SIGKILL)

@@ -83,14 +83,14 @@ def mcp(
         from rtshcua import library
         from rtshcua.adapters.mcp_server.flight import Following
         from rtshcua.adapters.mcp_server.missions import Missions
-        from rtshcua.adapters.mcp_server.tools import Desk, Signer
+        from rtshcua.adapters.mcp_server.tools import Signer, Tools
 
-    def make() -> Desk:
+    def make() -> Tools:
         signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))
         with _loading():
-            desk = Desk(Missions(with_, str(library.root())), signer, to, Following(to))
+            offered = Tools(Missions(with_, str(library.root())), signer, to, Following(to))
             gc.freeze()
-        return desk
+        return offered
 
     if not to.exists():
         say(f"note: `{to}` does not exist yet: `rtshcua run BUNDLE --wait --agent-socket {to}` makes it")

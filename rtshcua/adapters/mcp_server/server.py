@@ -136,7 +136,7 @@ class Opening:
 
 
 def serve(make: Callable[[], Any]) -> None:
-    """Speak over the standard streams until the host ends. `make` gives the tools (`desk.Desk`)."""
+    """Speak over the standard streams until the host ends. `make` gives the tools (`tools.Tools`)."""
     _quieten()
     anyio.run(_speak, Opening(make))
 

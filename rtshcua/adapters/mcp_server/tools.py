@@ -89,7 +89,7 @@ class _Ticket:
         return {"ticket": self.name, "state": self.state, "code": self.slug or None, "text": self.text}
 
 
-class Desk:
+class Tools:
     """The tools of one server."""
 
     misused = Misused

@@ -16,7 +16,7 @@ from rtshcua.adapters.mcp_server import tools as desks
 from rtshcua.adapters.mcp_server.flight import Following
 from rtshcua.adapters.mcp_server.flight_lines import understood
 from rtshcua.adapters.mcp_server.missions import Answer, Missions
-from rtshcua.adapters.mcp_server.tools import Desk, Misused, Signer
+from rtshcua.adapters.mcp_server.tools import Misused, Signer, Tools
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.wire import cose, names
 from rtshcua.wire.binding import bind
@@ -66,16 +66,16 @@ def handed(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
 
 
 @pytest.fixture
-def desk(missions: Missions, tmp_path: Path) -> Desk:
+def desk(missions: Missions, tmp_path: Path) -> Tools:
     payload = policy_payload(missions.policy)
     envelope = cose.sign1(payload, key=POLICY, duty=Duty.POLICY, content_type=names.POLICY.content_type)
     following = Following(tmp_path / "none.sock")
     following.end()
     signer = Signer(AGENT, envelope, policy_digest(payload), lambda policy, mission: None)
-    return Desk(missions, signer, tmp_path / "none.sock", following)
+    return Tools(missions, signer, tmp_path / "none.sock", following)
 
 
-def status(desk: Desk, ticket: str) -> str:
+def status(desk: Tools, ticket: str) -> str:
     """How a proposal stands once the vehicle answered."""
     until_s = time.monotonic() + 60
     while desk.mission_status(ticket)["state"] == "submitted" and time.monotonic() < until_s:
@@ -101,7 +101,7 @@ def test_each_of_two_checks_at_a_time_is_of_its_own_mission(
     assert others[0].accepted
 
 
-def test_two_calls_with_one_key_are_one_proposal(desk: Desk, handed: list[bytes]) -> None:
+def test_two_calls_with_one_key_are_one_proposal(desk: Tools, handed: list[bytes]) -> None:
     begin = threading.Barrier(2)
 
     def propose(_: int) -> Any:
@@ -115,14 +115,14 @@ def test_two_calls_with_one_key_are_one_proposal(desk: Desk, handed: list[bytes]
     assert len(handed) == 1
 
 
-def flying(desk: Desk) -> None:
+def flying(desk: Tools) -> None:
     desk.following.connected, desk.following.hello = True, {"flight": (bytes([7]) * 16).hex()}
     desk.following.mission = {"type": "mission", "digest": (bytes([8]) * 32).hex()}
     assert desk.following.stage == "flying"
 
 
 @pytest.mark.parametrize("key", ["one", "two"])
-def test_a_repeated_proposal_is_told_that_the_mission_flies(desk: Desk, handed: list[bytes], key: str) -> None:
+def test_a_repeated_proposal_is_told_that_the_mission_flies(desk: Tools, handed: list[bytes], key: str) -> None:
     first = desk.propose_mission(PROPOSAL, "one")
     assert status(desk, first["ticket"]) == "admitted"
     flying(desk)
@@ -132,7 +132,7 @@ def test_a_repeated_proposal_is_told_that_the_mission_flies(desk: Desk, handed: 
     assert len(handed) == 1
 
 
-def test_another_proposal_or_one_after_the_flight_is_handed_in(desk: Desk, handed: list[bytes]) -> None:
+def test_another_proposal_or_one_after_the_flight_is_handed_in(desk: Tools, handed: list[bytes]) -> None:
     first = desk.propose_mission(PROPOSAL, "one")
     assert status(desk, first["ticket"]) == "admitted"
     flying(desk)
@@ -144,7 +144,7 @@ def test_another_proposal_or_one_after_the_flight_is_handed_in(desk: Desk, hande
     assert len(handed) == 3
 
 
-def test_proposals_are_bounded(desk: Desk, handed: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_proposals_are_bounded(desk: Tools, handed: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(desks, "MOST_TICKETS", 1)
     assert desk.propose_mission(PROPOSAL, "one")["accepted"]
     with pytest.raises(Misused) as misused:
@@ -153,7 +153,7 @@ def test_proposals_are_bounded(desk: Desk, handed: list[bytes], monkeypatch: pyt
     assert desk.propose_mission(PROPOSAL, "one")["accepted"], "what is known is answered as before"
 
 
-def test_a_cancellation_says_which_flight_and_nothing_of_where_to(desk: Desk, handed: list[bytes]) -> None:
+def test_a_cancellation_says_which_flight_and_nothing_of_where_to(desk: Tools, handed: list[bytes]) -> None:
     with pytest.raises(Misused) as misused:
         desk.cancel()
     assert (misused.value.code, handed) == ("not-flying", [])
@@ -177,7 +177,7 @@ def test_a_cancellation_says_which_flight_and_nothing_of_where_to(desk: Desk, ha
 
 
 def test_a_decision_is_explained_by_the_mission_that_it_is_of_alone(
-    desk: Desk, handed: list[bytes], missions: Missions
+    desk: Tools, handed: list[bytes], missions: Missions
 ) -> None:
     assert status(desk, desk.propose_mission(PROPOSAL, "one")["ticket"]) == "admitted"
     other = missions.check(PROPOSAL, 1_000_000).mission  # issued at another time
@@ -216,7 +216,7 @@ LINES: dict[str, dict[str, Any]] = {
 HOSTILE: tuple[Any, ...] = ("x", "\ud800", None, [], {}, True, -5, 1.5, 1 << 70)
 
 
-def ask_everything(desk: Desk) -> None:
+def ask_everything(desk: Tools) -> None:
     """Each tool that reads what the vehicle told; it may say no."""
     for ask in (desk.describe_vehicle, desk.flight, desk.explain_decision, desk.cancel, desk._in_force,
                 lambda: desk.explain_decision(7), lambda: desk.read_evidence(3, 2)):  # fmt: skip
@@ -227,7 +227,7 @@ def ask_everything(desk: Desk) -> None:
 
 
 @rows("kind", tuple(LINES))
-def test_no_line_of_whoever_listens_at_the_socket_fails_a_tool(kind: str, desk: Desk, handed: list[bytes]) -> None:
+def test_no_line_of_whoever_listens_at_the_socket_fails_a_tool(kind: str, desk: Tools, handed: list[bytes]) -> None:
     """Its fields were taken to be numbers, and texts in hexadecimal."""
     desk.following.hello, desk.following.mission = {}, {}
     desk.following.connected = True

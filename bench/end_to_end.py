@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
+from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.onboard.enforcement.frames import FrameSession

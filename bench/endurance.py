@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from msgspec.structs import replace
 
 from reference import flat_case as flat
-from rtshcua.adapters.files.evidence import EvidenceFile
 from rtshcua.adapters.loop import RunLoop
+from rtshcua.adapters.store.evidence import EvidenceFile
 from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Plan

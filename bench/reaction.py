@@ -31,17 +31,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.files.evidence import EvidenceFile, LogFile
-from rtshcua.adapters.files.telemetry import TelemetryFile
-from rtshcua.adapters.files.writer import EvidenceWriter
 from rtshcua.adapters.loop import RunLoop
+from rtshcua.adapters.store.evidence import EvidenceFile, LogFile
+from rtshcua.adapters.store.telemetry import TelemetryFile
+from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.transport import UdpTransport
-from rtshcua.cli.live.feed import Feed
-from rtshcua.cli.live.story import Note
-from rtshcua.cli.live.telling import Teller
-from rtshcua.cli.live.watching import Watching
 from rtshcua.codec.frames import Codec
+from rtshcua.front.cli.live.feed import Feed
+from rtshcua.front.cli.live.story import Note
+from rtshcua.front.cli.live.telling import Teller
+from rtshcua.front.cli.live.watching import Watching
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.runtime.view import Stage
 from virtual.flight import Flight

@@ -23,7 +23,7 @@ from msgspec.structs import replace
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from reference import flat_case as flat
-from rtshcua.adapters.files.verification import Asked, verify_carefully, verify_quickly
+from rtshcua.adapters.store.verification import Asked, verify_carefully, verify_quickly
 from rtshcua.decision.decide import decide
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission

@@ -2,7 +2,7 @@
 
 import sys
 
-from rtshcua.cli.entry_point import main
+from rtshcua.front.cli.entry_point import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -301,7 +301,7 @@ def as_made(folder: Path) -> bool:
 
 
 #: what the terminal of every test is like
-#: so wide that tests find what is said in one line; `tests/unit/cli/test_width.py` holds it to 80 columns
+#: so wide that tests find what is said in one line; `tests/unit/front/cli/test_width.py` holds it to 80 columns
 PLAIN = {"COLUMNS": "400", "NO_COLOR": "1", "TZ": "UTC"}
 NOT_SET = ("FORCE_COLOR", "GITHUB_ACTIONS", "RTSHCUA_DEBUG")
 

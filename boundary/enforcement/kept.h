@@ -1,5 +1,5 @@
 /* What a boundary keeps over a restart, in one file of two slots that are written in turn: a write that breaks off leaves the other.
-   Mirrors adapters/files/replay.py (missions that were opened, versions of policies) and adapters/files/signing.py. */
+   Mirrors adapters/store/replay.py (missions that were opened, versions of policies) and adapters/store/signing.py. */
 #ifndef RT_ENFORCEMENT_KEPT_H
 #define RT_ENFORCEMENT_KEPT_H
 

@@ -336,7 +336,7 @@ static uint32_t from_hex(const uint8_t *text, size_t size, uint8_t *into, uint32
     return found;
 }
 
-/* A key in a file: 32 octets or 64 hexadecimal digits, not all 0, as `read_link_key` of adapters/files/signing.py has it. */
+/* A key in a file: 32 octets or 64 hexadecimal digits, not all 0, as `read_link_key` of adapters/store/signing.py has it. */
 static int read_key(int file, uint8_t key[RT_KEY_BYTES]) {
     uint8_t data[1024], any = 0;
     size_t size = read_all(file, data, sizeof data);
@@ -359,7 +359,7 @@ static int read_writes(int file, rt_preparation *into, const rt_preparation **li
 
 #define LINK_NAME 8
 
-/* A name for a key that gives nothing of it away: `fingerprint` of adapters/files/signing.py. */
+/* A name for a key that gives nothing of it away: `fingerprint` of adapters/store/signing.py. */
 static void name_link(const uint8_t key[RT_KEY_BYTES], uint8_t *name) {
     static const uint8_t domain[] = "rtshcua/link-key";
     uint8_t digest[RT_DIGEST_BYTES];

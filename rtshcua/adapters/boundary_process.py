@@ -20,7 +20,7 @@ from struct import Struct
 from typing import Final
 from urllib.parse import quote
 
-from rtshcua.adapters.files.signing import no_link_key, open_link_key
+from rtshcua.adapters.store.signing import no_link_key, open_link_key
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, lock, make_folder
 from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 from rtshcua.wire.keys import PUBLIC_BYTES

@@ -18,7 +18,7 @@ from queue import SimpleQueue
 from threading import Event, Thread
 from typing import Final, NamedTuple
 
-from rtshcua.adapters.files.logs import add_anchors, anchors_path
+from rtshcua.adapters.store.logs import add_anchors, anchors_path
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.codec.frames import Codec, Received
 from rtshcua.codec.tunnel import Assembler, Whole, answer_name, messages, name_of

@@ -5,7 +5,7 @@ of SHA-256 over key, header, payload, checksum, link id and timestamp (guide, "S
 
 Two things are stricter here than in pymavlink's own signing. It remembers a timestamp before it checks the signature,
 so that a forged frame can lock out a stream for ever; and it keeps nothing over a restart, so that what was sent before
-can be sent again. `State` is what has to be kept; `rtshcua.adapters.files.signing` keeps it.
+can be sent again. `State` is what has to be kept; `rtshcua.adapters.store.signing` keeps it.
 """
 
 import hashlib

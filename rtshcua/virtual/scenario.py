@@ -16,8 +16,8 @@ from traceback import format_exception
 from typing import Any, Final
 
 from rtshcua.adapters.clock import StepWatch
-from rtshcua.adapters.files.writer import Lateness
 from rtshcua.adapters.packs import manoeuvres, packs_of
+from rtshcua.adapters.store.writer import Lateness
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.recovery import RECOVERABLE, Examination, ending
 from rtshcua.model import faults

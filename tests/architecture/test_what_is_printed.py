@@ -1,4 +1,4 @@
-"""What commands print passes `rtshcua/cli/stdout.py` or `rtshcua/cli/faults.py`; who prints otherwise stands here."""
+"""What commands print passes `front/cli/stdout.py` or `front/cli/faults.py`; who prints otherwise stands here."""
 
 import ast
 import re
@@ -11,27 +11,27 @@ PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
 
 #: who writes on a standard stream by other means, and why nothing that others wrote can be in it unseen
 ALLOWED = {
-    "adapters/language_server/prover.py": "logs, of a process whose standard error an editor reads",
-    "adapters/language_server/server.py": "speaks the protocol, and logs",
-    "cli/approve.py": "asks; the question passes `visible`",
-    "cli/app.py": "the version and the overview: our own words",
-    "cli/archiving/checking.py": "a count",
-    "cli/archiving/told.py": "a CSV writer; each text passed `visible`",
-    "cli/campaign.py": "counts, and slugs of ours",
-    "cli/claims.py": "in colour; each line passes `visible`",
-    "cli/completion.py": "a script for a shell: our own words",
-    "cli/doctor.py": "a count of seconds",
-    "cli/explain.py": "a page that ships, in colour",
-    "cli/faults.py": "errors; each line passes `visible`",
-    "cli/fmt.py": "gives the standard input back, laid out, octet for octet",
-    "cli/keys.py": "asks for a passphrase in our own words",
-    "cli/live/__main__.py": "lines of `live/lines.py`, each of which passes `visible` or `escaped`",
-    "cli/live/screen.py": "in colour; each text passes `visible`",
-    "cli/progress.py": "passes `visible`",
-    "cli/stdout.py": "the door",
-    "cli/testing/flying.py": "passes `visible`",
-    "cli/unlock.py": "asks for a passphrase, by the duty of its key",
-    "cli/verify_log.py": "a bar",
+    "front/lsp/prover.py": "logs, of a process whose standard error an editor reads",
+    "front/lsp/server.py": "speaks the protocol, and logs",
+    "front/cli/approve.py": "asks; the question passes `visible`",
+    "front/cli/app.py": "the version and the overview: our own words",
+    "front/cli/archiving/checking.py": "a count",
+    "front/cli/archiving/told.py": "a CSV writer; each text passed `visible`",
+    "front/cli/campaign.py": "counts, and slugs of ours",
+    "front/cli/claims.py": "in colour; each line passes `visible`",
+    "front/cli/completion.py": "a script for a shell: our own words",
+    "front/cli/doctor.py": "a count of seconds",
+    "front/cli/explain.py": "a page that ships, in colour",
+    "front/cli/faults.py": "errors; each line passes `visible`",
+    "front/cli/fmt.py": "gives the standard input back, laid out, octet for octet",
+    "front/cli/keys.py": "asks for a passphrase in our own words",
+    "front/cli/live/__main__.py": "lines of `live/lines.py`, each of which passes `visible` or `escaped`",
+    "front/cli/live/screen.py": "in colour; each text passes `visible`",
+    "front/cli/progress.py": "passes `visible`",
+    "front/cli/stdout.py": "the door",
+    "front/cli/testing/flying.py": "passes `visible`",
+    "front/cli/unlock.py": "asks for a passphrase, by the duty of its key",
+    "front/cli/verify_log.py": "a bar",
     "simulation/process.py": "a process of its own: its ready line is JSON in ASCII, its options are ours",
 }
 PRINTING = {
@@ -91,6 +91,6 @@ def test_what_is_printed_passes_one_door() -> None:
         for path in PACKAGE.rglob("*.py")
     }
     stray = {name: ways for name, ways in found.items() if ways and name not in ALLOWED}
-    assert not stray, f"printed past `rtshcua/cli/stdout.py`: {stray}"
+    assert not stray, f"printed past `rtshcua/front/cli/stdout.py`: {stray}"
     idle = sorted(name for name in ALLOWED if not found.get(name))
     assert not idle, f"these print nothing themselves any more: {idle}"

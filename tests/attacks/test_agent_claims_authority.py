@@ -16,10 +16,10 @@ from reference.documents import shorter
 from reference.flat_case import MISSION, POLICY
 from reference.forgery import edit, expect, flight, signed
 from reference.world import FLIGHT, MISSION_KEY, ROOT, START, VEHICLE, sealed
-from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli import app
+from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli import app
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now

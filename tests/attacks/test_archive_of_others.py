@@ -14,8 +14,8 @@ from reference import generated_logs
 from reference.archived import write_fleet
 from rtshcua.adapters.archive.folder import TABLES
 from rtshcua.adapters.store.writing import append
-from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import app
 
 ROOT = ("--root", generated_logs.ROOT_KEY.hex(), "--jobs", "1")
 
@@ -161,7 +161,7 @@ def test_a_file_that_is_changed_before_it_is_copied_is_looked_at_again(
 ) -> None:
     Path("run").mkdir()
     Path("run/log.jsonl").write_text("-----BEGIN PRIVATE KEY-----\n")
-    monkeypatch.setattr("rtshcua.cli.archiving.given.begins_as_log", lambda *_: True)
+    monkeypatch.setattr("rtshcua.front.cli.archiving.given.begins_as_log", lambda *_: True)
     assert archive("add", "run", *ROOT) == ExitCode.INPUT
     assert "it is not a log of this program" in capsys.readouterr().err
     assert not list(Path("archive/logs").rglob("*.jsonl"))

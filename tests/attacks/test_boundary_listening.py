@@ -22,9 +22,9 @@ import pytest
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import BoundaryError, ListeningBoundary, Measure
 from rtshcua.adapters.clock import monotonic_ns
-from rtshcua.cli import isolating
-from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli import isolating
+from rtshcua.front.cli.refused import Refused
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import ENFORCE, LOAD, LOST, SEAL, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load

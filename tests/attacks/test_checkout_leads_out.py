@@ -11,13 +11,13 @@ import pytest
 from lsprotocol import types as lsp
 
 from rtshcua import library
-from rtshcua.adapters.files.runs import logs_of
-from rtshcua.adapters.files.witness import logs_in
-from rtshcua.adapters.language_server.session import Session
 from rtshcua.adapters.store import writing
 from rtshcua.adapters.store.checkout import checkout_of, expect_inside
-from rtshcua.cli import app
+from rtshcua.adapters.store.runs import logs_of
+from rtshcua.adapters.store.witness import logs_in
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import app
+from rtshcua.front.lsp.session import Session
 
 SECRET = "TOKEN=hunter2 {"
 

@@ -12,11 +12,11 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.flat_case import CALM, ENOUGH_CHARGE, MISSION, POLICY
 from reference.world import Run, assert_audited, loaded, sealed, try_load
-from rtshcua.cli.app import main
-from rtshcua.cli.showing.log import show_log
-from rtshcua.cli.showing.page import Page
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.app import main
+from rtshcua.front.cli.showing.log import show_log
+from rtshcua.front.cli.showing.page import Page
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.calls import is_own

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.writer import EvidenceWriter
+from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.model.durability import WRITTEN
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from reference.lint_project import MISSION, POLICY, put
-from rtshcua.adapters.files import git as asking
-from rtshcua.adapters.files.git import NoChanges, changed_files
-from rtshcua.cli.app import main
+from rtshcua.adapters.store import git as asking
+from rtshcua.adapters.store.git import NoChanges, changed_files
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.app import main
 
 WHO = ("-c", "user.name=a", "-c", "user.email=a@example.org")
 

@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from reference.attested_flight import attested, second
 from reference.forgery import LOG_KEY, edit, expect, prove, read, signed, sound
-from rtshcua.cli.outcome import exit_code_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.report import Verdict
+from rtshcua.front.cli.outcome import exit_code_of
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.statement import Statement, open_statement, sign

@@ -30,9 +30,9 @@ from reference.world import (
     _signed_root,
     renewed,
 )
-from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.report import Report, Verdict
+from rtshcua.front.cli.app import main
 from rtshcua.ground.audit.audit import Auditor
 from rtshcua.ground.audit.revoked import RevokedKeys
 from rtshcua.wire.keys import Duty, SigningKey

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.cli.app import main
+from rtshcua.front.cli.app import main
 from rtshcua.library import root
 
 NAME = "ev\x1b]0;il\x07\u202e\n::error::no.rts"

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.adapters.files.folders import data_folder
-from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.cli.app import main
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.app import main
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire import cose, names

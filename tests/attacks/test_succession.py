@@ -17,18 +17,18 @@ from msgspec.structs import replace
 from reference.documents import approval, low, presented, recall, replacement
 from reference.world import APPROVAL_KEY, LOG_KEY, MISSION_KEY, POLICY_KEY, ROOT, START, VEHICLE, renewed, sealed_again
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.files.folders import data_folder, state_folder
-from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.adapters.files.replay import FileReplayStore, looked_up
-from rtshcua.adapters.files.roots import RootStore, opened
-from rtshcua.adapters.files.signing import fingerprint, read_link_key
-from rtshcua.cli import launch
-from rtshcua.cli.app import main
-from rtshcua.cli.refused import Refused
-from rtshcua.cli.signing import Signing
-from rtshcua.cli.trusting import trust
+from rtshcua.adapters.store.folders import data_folder, state_folder
+from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.adapters.store.replay import FileReplayStore, looked_up
+from rtshcua.adapters.store.roots import RootStore, opened
+from rtshcua.adapters.store.signing import fingerprint, read_link_key
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli import launch
+from rtshcua.front.cli.app import main
+from rtshcua.front.cli.refused import Refused
+from rtshcua.front.cli.signing import Signing
+from rtshcua.front.cli.trusting import trust
 from rtshcua.library import root as library
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.cli import app
 from rtshcua.diagnostics.codes import NAMING, UNUSED
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.render import MOST_PLACES, MOST_SHOWN, most_severe, render_one
 from rtshcua.diagnostics.span import Source, Span
+from rtshcua.front.cli import app
 
 MANY = 1_000
 

@@ -7,21 +7,21 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.adapters.files.folders import data_folder
-from rtshcua.adapters.files.keystore import KeyStore
-from rtshcua.adapters.files.roots import opened
-from rtshcua.cli.app import main
-from rtshcua.cli.documents import deliver
-from rtshcua.cli.faults import say
-from rtshcua.cli.live.lines import plain
-from rtshcua.cli.live.story import Plan
-from rtshcua.cli.unlock import unlock_person
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.adapters.store.roots import opened
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.report.github import github
 from rtshcua.diagnostics.span import Source, Span
+from rtshcua.front.cli.app import main
+from rtshcua.front.cli.documents import deliver
+from rtshcua.front.cli.faults import say
+from rtshcua.front.cli.live.lines import plain
+from rtshcua.front.cli.live.story import Plan
+from rtshcua.front.cli.unlock import unlock_person
 from rtshcua.ground.agent.specification import parse_specification
 from rtshcua.ground.language.parse import parse
 from rtshcua.library import root
@@ -86,9 +86,9 @@ def test_what_is_approved_is_told_before_it_is_signed(
 ) -> None:
     """A person at a terminal sees the step, and only then says whether to sign it."""
     seen: list[str] = []
-    monkeypatch.setattr("rtshcua.cli.approve.terminal", lambda: True)
+    monkeypatch.setattr("rtshcua.front.cli.approve.terminal", lambda: True)
     monkeypatch.setattr(
-        "rtshcua.cli.approve.unlock_person", lambda *a, **k: (seen.append("key"), unlock_person(*a, **k))[1]
+        "rtshcua.front.cli.approve.unlock_person", lambda *a, **k: (seen.append("key"), unlock_person(*a, **k))[1]
     )
     monkeypatch.setattr("sys.stdin", io.StringIO(typed))
     assert main(["approve", "low.bundle", "--step", "3", "-o", "yes", *FLIGHT]) == code
@@ -122,7 +122,7 @@ def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys:
 def test_a_script_at_a_terminal_is_not_asked(
     low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rtshcua.cli.approve.terminal", lambda: True)
+    monkeypatch.setattr("rtshcua.front.cli.approve.terminal", lambda: True)
     assert main(["approve", "low.bundle", "--step", "3", "-o", "no", "--refuse", "--yes", *FLIGHT]) == ExitCode.OK
     assert "step 3 of `low` on `quad-07`: `inspect_area(" in capsys.readouterr().err
 

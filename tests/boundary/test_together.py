@@ -49,7 +49,7 @@ def test_both_stop_signing_ahead_at_the_same_frame(tmp_path: Path, monkeypatch: 
         ("onboard.enforcement.preparation.VALID_US", 1),
         ("mavlink.signing.LEAD", 3_000_001),
         ("wire.boundary_chain.START", bytes(31) + b"\1"),
-        ("adapters.files.replay.FileReplayStore.give_back", lambda *_: None),
+        ("adapters.store.replay.FileReplayStore.give_back", lambda *_: None),
     ],
 )
 def test_an_answer_that_differs_is_noticed(

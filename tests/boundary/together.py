@@ -36,7 +36,7 @@ from reference.world import MISSION_KEY, ROOT, ROOT_KEY, START, VEHICLE, read_an
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
 from rtshcua.adapters.clock import monotonic_ns
-from rtshcua.adapters.files.replay import FileReplayStore
+from rtshcua.adapters.store.replay import FileReplayStore
 from rtshcua.adapters.vehicle import messages
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import unsigned

@@ -17,7 +17,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.verifiers import agree, careful
-from rtshcua.adapters.files.keystore import KeyStore
+from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.wire.keys import Duty
 from virtual import case

@@ -66,7 +66,7 @@ def test_a_flight(program: Path, ground: Any) -> None:
         "from pathlib import Path\n"
         "from rtshcua.adapters import boundary_process\n"
         f"boundary_process.program = lambda: Path({str(program)!r})\n"
-        "from rtshcua.cli.app import main\n"
+        "from rtshcua.front.cli.app import main\n"
         "main()\n"
     )
     ground.command = (sys.executable, "-c", start)

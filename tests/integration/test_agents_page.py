@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.cli import app
+from rtshcua.front.cli import app
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGE = (CHECKOUT / "docs/agents.md").read_text(encoding="utf-8")

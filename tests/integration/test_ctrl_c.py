@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from rtshcua import library
-from rtshcua.cli import interrupts
-from rtshcua.cli.entry_point import main
-from rtshcua.cli.table import COMMANDS
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import interrupts
+from rtshcua.front.cli.entry_point import main
+from rtshcua.front.cli.table import COMMANDS
 
 PATIENCE_S = 60.0
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
@@ -73,7 +73,7 @@ def test_the_door_leaves_alone_what_whoever_starts_it_wants(
 ) -> None:
     """A shell starts what runs in the background with SIGINT ignored."""
     was = signal.signal(signal.SIGINT, getattr(signal, before))
-    monkeypatch.setattr("rtshcua.cli.app.main", lambda: 0)
+    monkeypatch.setattr("rtshcua.front.cli.app.main", lambda: 0)
     try:
         assert main() == ExitCode.OK
         assert signal.getsignal(signal.SIGINT) == getattr(signal, after)
@@ -127,8 +127,8 @@ def test_a_command_that_goes_on_and_on_ends_in_order_and_without_a_traceback(wor
 
 def test_the_door_imports_nothing_of_ours_before_it_is_open() -> None:
     code = (
-        "import sys, signal; from rtshcua.cli.entry_point import main\n"
+        "import sys, signal; from rtshcua.front.cli.entry_point import main\n"
         "print([name for name in sys.modules if name.startswith('rtshcua.')])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "['rtshcua.cli', 'rtshcua.cli.entry_point']"
+    assert done.stdout.strip() == "['rtshcua.front.cli', 'rtshcua.front.cli.entry_point']"

@@ -10,8 +10,8 @@ import pytest
 from typer.main import get_command
 
 from rtshcua.adapters.qualification.sortie import SORTIES
-from rtshcua.cli.sources import compile_sources
-from rtshcua.cli.table import find
+from rtshcua.front.cli.sources import compile_sources
+from rtshcua.front.cli.table import find
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual.forked import Forked
 from virtual.qualifying import Qualifying

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.adapters.files.roots import opened
+from rtshcua.adapters.store.roots import opened
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.wire.keys import Duty
 

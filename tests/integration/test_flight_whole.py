@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from rtshcua.adapters.files.signing import fingerprint, read_link_key, write_link_key
+from rtshcua.adapters.store.signing import fingerprint, read_link_key, write_link_key
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.mavlink import tlog
@@ -41,7 +41,7 @@ class Flown(NamedTuple):
 TELLING = """
 import sys
 from pathlib import Path
-from rtshcua.cli.app import main
+from rtshcua.front.cli.app import main
 code = main(sys.argv[1:])
 Path("modules").write_text(" ".join(sys.modules))
 sys.exit(code)

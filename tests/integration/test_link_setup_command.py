@@ -6,12 +6,12 @@ import pytest
 
 from integration.test_doctor_command import free_port
 from rtshcua.adapters import link_setup
-from rtshcua.adapters.files.signing import read_link_key, write_link_key
 from rtshcua.adapters.link_setup import SetUp
 from rtshcua.adapters.simulator import Simulator
-from rtshcua.cli import app, keys
+from rtshcua.adapters.store.signing import read_link_key, write_link_key
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli import app, keys
 
 AT = "udpin:127.0.0.1:{}"
 

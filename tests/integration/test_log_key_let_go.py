@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from rtshcua.cli import app
-from rtshcua.cli.flight import Flight
-from rtshcua.cli.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import app
+from rtshcua.front.cli.flight import Flight
+from rtshcua.front.cli.refused import Refused
 from rtshcua.wire.keys import Duty, SigningKey
 
 

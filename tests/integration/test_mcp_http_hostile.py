@@ -21,7 +21,7 @@ import pytest
 
 pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
 
-from rtshcua.adapters.mcp_server.connections import MOST, PATIENCE_S
+from rtshcua.front.mcp.connections import MOST, PATIENCE_S
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 POLICY = CHECKOUT / "policies/bridge_inspection.rts"

@@ -302,7 +302,7 @@ def test_what_the_first_call_needs_is_loaded_before_the_host_is_greeted(ground: 
         command, cwd=ground.folder, env=ground.environment, stdin=subprocess.DEVNULL, capture_output=True, check=True
     )
     loaded = {line.split("|")[-1].strip() for line in ended.stderr.decode().splitlines()}
-    assert {"rtshcua.adapters.mcp_server.tools", "rtshcua.ground.pipeline.program"} <= loaded
+    assert {"rtshcua.front.mcp.tools", "rtshcua.ground.pipeline.program"} <= loaded
     assert "rtshcua.onboard.runtime.controller" not in loaded, "nor anything that only flies"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.cli import app
+from rtshcua.front.cli import app
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 #: parts of the paths of what nobody else may read

@@ -12,7 +12,7 @@ import pytest
 
 from rtshcua.adapters.agent_socket import hand_in
 from rtshcua.adapters.boundary_process import ListeningBoundary
-from rtshcua.cli.app import main
+from rtshcua.front.cli.app import main
 from rtshcua.wire.keys import Duty
 from virtual.listening import Listening, listening
 

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters import utc
-from rtshcua.cli import meeting
-from rtshcua.cli.app import main
+from rtshcua.front.cli import meeting
+from rtshcua.front.cli.app import main
 
 IDENTITY = ("--vehicle", "quad-07")
 
@@ -41,7 +41,7 @@ def test_a_bundle_that_expired_begins_nothing_where_the_time_is_known(
 ) -> None:
     """Before a vehicle is looked for; one that is waited with says the policy alone, and may be of any age."""
     monkeypatch.setattr(utc, "kernel_error_us", lambda: 1_000)
-    monkeypatch.setattr("rtshcua.cli.launch._simulate", None)
+    monkeypatch.setattr("rtshcua.front.cli.launch._simulate", None)
     if words == ("--wait",):
         words = ("--connect", "PORT", *IDENTITY, "--mode", "software", "--wait", "--agent-socket", "agents")
     link = [f"udpin:127.0.0.1:{port}" if word == "PORT" else word for word in words]

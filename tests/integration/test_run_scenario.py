@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from rtshcua.cli import app
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import app
 
 FIELD = Path(__file__).parents[1] / "campaign" / "field.rts"
 SOURCE = """import "field.rts"

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import hand_in
 from rtshcua.adapters.boundary_process import program
-from rtshcua.adapters.files.roots import opened
+from rtshcua.adapters.store.roots import opened
 from rtshcua.wire.keys import Duty
 from virtual import case
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import yaml
 
-from rtshcua.cli import app
-from rtshcua.cli.init import project
+from rtshcua.front.cli import app
+from rtshcua.front.cli.init import project
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/ci.md").read_text(encoding="utf-8")
 

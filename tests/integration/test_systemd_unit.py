@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.cli.app import main
+from rtshcua.front.cli.app import main
 
 UNITS = Path(__file__).resolve().parents[2] / "examples" / "systemd"
 UNIT = UNITS / "rtshcua@.service"
@@ -84,7 +84,7 @@ def test_a_flight_with_no_memory_that_is_written_and_run(ground: Any) -> None:
     start = (
         "import ctypes, os, sys\n"
         "refused = ctypes.CDLL(None).prctl(65, 1, 0, 0, 0)\n"
-        "os.execv(sys.executable, [sys.executable, '-m', 'rtshcua.cli.app', *sys.argv[1:]])\n"
+        "os.execv(sys.executable, [sys.executable, '-m', 'rtshcua.front.cli.app', *sys.argv[1:]])\n"
     )
     ground.command = (sys.executable, "-c", start)
     assert ground.run(ground.bundle(), "--mode", "process", speed=5).end().code == 0

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.cli import app
+from rtshcua.front.cli import app
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "tutorial.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(rts|console) ?(\S*)\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)

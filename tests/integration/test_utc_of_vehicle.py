@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters import utc
-from rtshcua.cli import meeting
-from rtshcua.cli.app import main
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import meeting
+from rtshcua.front.cli.app import main
 
 
 def rehearsal(ground: Any, capfd: Any, port: int, *words: str) -> dict[str, Any]:

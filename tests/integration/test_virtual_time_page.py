@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.cli import app
+from rtshcua.front.cli import app
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGE = (CHECKOUT / "docs/flying/virtual-time.md").read_text(encoding="utf-8")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.cli import app
+from rtshcua.front.cli import app
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 FILES = {

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
-from rtshcua.adapters.files.recovery import Signer
+from rtshcua.adapters.store.recovery import Signer
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.report import Verdict
 from rtshcua.evidence.verify import verify

@@ -1,7 +1,7 @@
 """What the scenarios of a program find when they are flown."""
 
-from rtshcua.cli.testing.flying import Flying
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.front.cli.testing.flying import Flying
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.mavlink import dialect

@@ -10,7 +10,7 @@ from reference import independent_verifier
 from reference.forgery import flight, read
 from reference.log_vectors import WITNESSES, anchor, close, effect, genesis, log, seal, sealing, times
 from reference.verifiers import ROOT_KEY, careful, independent, quick_accepts
-from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.store.logs import lines
 from rtshcua.evidence.verify import Verifier
 
 copyreg.pickle(type(sha256()), lambda hasher: (hasher.copy, ()))

@@ -5,7 +5,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 from reference import independent_verifier
-from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.store.logs import lines
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.quick import outline, quick, scan
 from rtshcua.evidence.records import Genesis

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from reference.faulty_disk import FaultyDisk
-from rtshcua.adapters.files.evidence import EvidenceFile
-from rtshcua.adapters.files.writer import SYNC_S, Keeper, Lateness
+from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.writer import SYNC_S, Keeper, Lateness
 from rtshcua.virtual.vehicle import VirtualClock
 
 

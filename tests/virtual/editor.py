@@ -9,7 +9,7 @@ from typing import Any
 from lsprotocol import types as lsp
 from pygls.lsp.client import LanguageClient
 
-from rtshcua.adapters.language_server.disk import uri_of
+from rtshcua.front.lsp.disk import uri_of
 
 PATIENCE = 60  # seconds, for a machine that does other things too
 HEAD = 'import "lib:policies/bridge_inspection.rts"\n'

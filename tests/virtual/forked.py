@@ -27,7 +27,7 @@ from threading import Thread
 from typing import BinaryIO, NamedTuple
 
 #: the packages of what commands load sooner or later
-LOADED = ("rtshcua.cli", "rtshcua.ground", "rtshcua.adapters.files", "rtshcua.adapters.mcp_server")
+LOADED = ("rtshcua.front.cli", "rtshcua.ground", "rtshcua.adapters.store", "rtshcua.front.mcp")
 
 
 class Ended(NamedTuple):
@@ -271,13 +271,13 @@ def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], 
 def _warm() -> None:
     """Remember what ships as each command would: read, checked, its zones compared."""
     from rtshcua import library
-    from rtshcua.cli.sources import compile_sources
+    from rtshcua.front.cli.sources import compile_sources
 
     compile_sources([library.root() / "missions" / "standard.rts"], mission=None, issued_at_us=0)
 
 
 def _main(words: Sequence[str]) -> int:
-    from rtshcua.cli.app import main
+    from rtshcua.front.cli.app import main
 
     try:
         return main(words)

@@ -12,9 +12,9 @@ from typing import NamedTuple, Protocol
 from msgspec.structs import replace
 
 from rtshcua.adapters.archive.entry import AUDIT, FAILED, Entry, Examined, Step
-from rtshcua.adapters.files.logs import read_anchors
-from rtshcua.adapters.files.verification import follow
+from rtshcua.adapters.store.logs import read_anchors
 from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.verification import follow
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.records import AnyRecord, Effect, Genesis

@@ -20,9 +20,9 @@ from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
 
-from rtshcua.adapters.files.logs import ANCHORS, START, anchors_path
-from rtshcua.adapters.files.runs import LOG
+from rtshcua.adapters.store.logs import ANCHORS, START, anchors_path
 from rtshcua.adapters.store.reading import NotRegular, open_regular, read_regular
+from rtshcua.adapters.store.runs import LOG
 from rtshcua.adapters.store.writing import (
     PUBLIC_FILE,
     UNFINISHED,

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.archive.entry import Entry, Examined, Step
 from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
-from rtshcua.adapters.files.logs import lines
+from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, publish, replacing
 from rtshcua.evidence.reading import LONGEST

@@ -9,11 +9,11 @@ from random import Random
 from fuzz import board
 from fuzz.mutation.trees import changed
 from reference import world as reference
-from rtshcua.cli.showing.bundle import claimed
-from rtshcua.cli.showing.mission import show_mission
-from rtshcua.cli.showing.page import Page
-from rtshcua.cli.showing.policy import show_policy
 from rtshcua.decision.prepare import prepare
+from rtshcua.front.cli.showing.bundle import claimed
+from rtshcua.front.cli.showing.mission import show_mission
+from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.policy import show_policy
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.load import Loaded

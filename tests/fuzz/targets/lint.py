@@ -6,11 +6,11 @@ from random import Random
 from fuzz import corpus, world
 from fuzz.mutation import sentences
 from reference import ignoring
-from rtshcua.cli.linting.fixing import fix
-from rtshcua.cli.linting.gathered import Gathered
 from rtshcua.diagnostics.codes import can_be_ignored
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.span import Source
+from rtshcua.front.cli.linting.fixing import fix
+from rtshcua.front.cli.linting.gathered import Gathered
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.lint.comments import comments

@@ -6,7 +6,7 @@ import pytest
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 
-from rtshcua.adapters.language_server.disk import uri_of
+from rtshcua.front.lsp.disk import uri_of
 from virtual.editor import HEAD, MISSION, Editor, at, document
 
 

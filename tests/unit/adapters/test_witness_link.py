@@ -11,8 +11,8 @@ import pytest
 
 from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Log, log_keys
 from rtshcua.adapters import witness_link
-from rtshcua.adapters.files.logs import anchors_path, read_anchors
-from rtshcua.adapters.files.witness import FileWitness, WitnessStore
+from rtshcua.adapters.store.logs import anchors_path, read_anchors
+from rtshcua.adapters.store.witness import FileWitness, WitnessStore
 from rtshcua.adapters.witness_link import ANSWER, REQUEST, Anchor, Trouble, WitnessClient, WitnessLink
 from rtshcua.codec.frames import Codec
 from rtshcua.codec.tunnel import answer_name, messages, name_of

@@ -11,7 +11,7 @@ SCRIPT = """
 import os, signal, sys, threading, time
 from pathlib import Path
 from distributed import LocalCluster
-from rtshcua.cli import app
+from rtshcua.front.cli import app
 
 if __name__ == "__main__":
     with LocalCluster(n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None) as local:

@@ -9,8 +9,8 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.doctor.identity import IdentityQuestions, as_octets, those_that_matter
 from rtshcua.adapters.doctor.standing import WHOLE, standing
-from rtshcua.adapters.files.qualifications import keep_record, path_of, read_record
 from rtshcua.adapters.qualification.sortie import SORTIES
+from rtshcua.adapters.store.qualifications import keep_record, path_of, read_record
 from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification, QualificationCheck, parameters_digest
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rtshcua import library
-from rtshcua.adapters.mcp_server.missions import Missions
+from rtshcua.front.mcp.missions import Missions
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.cli.bounds import bounds_told
+from rtshcua.front.cli.bounds import bounds_told
 from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.ground.prove.bounds import Bounds, _taken, most, rounded_energy, rounded_time
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.cli.app import main
+from rtshcua.front.cli.app import main
 from rtshcua.ground.report.model import Handbook
 from rtshcua.ground.report.page import page
 

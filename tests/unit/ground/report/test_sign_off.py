@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.cli.app import main
+from rtshcua.front.cli.app import main
 from rtshcua.ground.report.glance import glance
 from rtshcua.ground.report.handbook import Part, handbook
 from rtshcua.ground.report.model import ChangeTold, Handbook

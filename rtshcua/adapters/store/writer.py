@@ -1,0 +1,307 @@
+"""Evidence off the reflex path: a thread that owns the evidence file, fed without waiting (docs/adr/0016)."""
+
+import errno
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
+from time import monotonic
+
+from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.evidence.records import is_signed
+from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
+
+#: More lines than this that are not kept mean that the disk does not keep up, and evidence fails. They are not dropped,
+#: for the chain has no holes: it goes on, while the flight comes down, up to `TIMES_MOST` times as many.
+MOST_WAITING = 1_000
+TIMES_MOST = 64
+#: What was written is synced once nothing has come for this time, in seconds, so that a sync stands in nobody's way.
+SYNC_S = 0.2
+#: a disk that hangs is waited for this long at the end, in seconds
+CLOSE_S = 10.0
+#: A line of class `SYNCED` is synced this long after it was taken at the latest, in seconds: half of what is promised,
+#: for the sync takes its time too.
+SYNC_AFTER_S = SYNC_US / 1e6 / 2
+#: A line that was to be on the disk within `SYNC_US` and is not is told; when it is not after this time, in seconds,
+#: the disk counts as failed: it hangs.
+STUCK_S = 5.0
+#: Who looks after a longer time than this, in seconds, stood still meanwhile, and with it the thread that writes: that
+#: says nothing of the disk. A loop that goes on looks far more often.
+STOOD_S = 1.0
+
+_BEHIND = OSError(errno.ENOBUFS, "the disk does not keep up")
+_OVER = OSError(errno.ENOSPC, "the disk did not keep up, and the log ends before this")
+
+
+class EvidenceWriter:
+    """The `EvidenceSink` over a file. Lines are written in the order in which they were appended, each as soon as the
+    disk lets it, those that wait together with one sync.
+
+    `append`, `trouble`, `late` and `close` are for one thread. `SimpleQueue.put` takes no lock that the writer might
+    hold.
+    """
+
+    def __init__(
+        self, file: EvidenceFile, *, most_waiting: int = MOST_WAITING, sync_s: float = SYNC_S,
+        sync_after_s: float = SYNC_AFTER_S, stuck_s: float = STUCK_S, close_s: float = CLOSE_S,
+    ) -> None:  # fmt: skip
+        self._keeper = Keeper(file, sync_after_s=sync_after_s)
+        self._most = most_waiting
+        self._sync_s = sync_s
+        self._lateness = Lateness(sync_after_s * 2, stuck_s)
+        self._close_s = close_s
+        self._queue: SimpleQueue[tuple[bytes, int] | None] = SimpleQueue()
+        self._given = 0
+        self._cut = False
+        self._over = Event()
+        self._last_error: OSError | None = None
+        self._thread: Thread | None = Thread(target=self._run, name="evidence", daemon=True)
+        self._thread.start()
+
+    @property
+    def kept(self) -> int:
+        """How many lines, from the first on, are in the file."""
+        return self._keeper.written
+
+    @property
+    def synced(self) -> int:
+        """How many lines, from the first on, are on the disk."""
+        return self._keeper.synced
+
+    @property
+    def waiting(self) -> int:
+        """How many lines were taken over, or should have been, and are not kept."""
+        return self._given - self._keeper.written
+
+    def append(self, line: bytes, durability: int) -> int:
+        """Takes one line over; see `EvidenceSink`. Raises OSError when too many wait: it is written all the same,
+        unless so many wait that the log must end, and then before the first that was not taken over.
+        """
+        self._given += 1
+        waiting = self.waiting
+        self._cut = self._cut or waiting > self._most * TIMES_MOST or self._thread is None
+        if self._cut:
+            raise _OVER
+        self._queue.put((line, durability))
+        self._lateness.given(self._given, durability)
+        if waiting > self._most:
+            raise _BEHIND
+        return self._given
+
+    def trouble(self) -> str | None:
+        """Why lines are not kept, once for each failure of the disk."""
+        if not self._keeper.troubles.empty():  # nobody else takes from it
+            return self._keeper.troubles.get_nowait()
+        return self._overdue(self._lateness.stuck)
+
+    def late(self) -> str | None:
+        """That a line was not on the disk in time, once for each time that it falls behind."""
+        return self._overdue(self._lateness.late)
+
+    def _overdue(self, judge: Callable[[int, float], str | None]) -> str | None:
+        keeper = self._keeper
+        if keeper.failing or self._lateness.kept(keeper.synced):
+            return None
+        return judge(keeper.synced, monotonic())
+
+    def settle(self) -> None:
+        """Waits until all that was given is on the disk. Raises OSError when it is not, or not in time."""
+        until_s = monotonic() + self._close_s
+        while self._keeper.synced < self._given:
+            if self._keeper.failing:
+                raise OSError(errno.EIO, self.trouble() or "the disk does not take everything")
+            if monotonic() > until_s:
+                raise self._hangs()
+            self._over.wait(0.001)
+
+    def _hangs(self) -> OSError:
+        return OSError(errno.ETIMEDOUT, f"the disk has not answered for {self._close_s:g} s")
+
+    def close(self) -> None:
+        """Waits until all that can be written is, and closes the file. Raises OSError, also when the disk does not
+        answer: what is left is then left to the thread, and not counted as kept. Closing twice does nothing.
+        """
+        if self._thread is None:
+            return
+        self._queue.put(None)
+        self._thread = None
+        if not self._over.wait(self._close_s):
+            raise self._hangs()
+        if self._last_error is not None:
+            raise self._last_error
+
+    # -------------------------------------------------------- in the thread
+
+    def _run(self) -> None:
+        keeper = self._keeper
+        try:
+            going = True
+            while going:
+                batch, going = self._next()
+                if batch or going:
+                    keeper.take(batch, monotonic())
+        except Exception as error:  # noqa: BLE001  a thread that dies in silence would leave the flight unrecorded
+            keeper.fail(str(error))
+        try:
+            keeper.close()
+        except OSError as error:
+            self._last_error = error
+        finally:
+            self._over.set()
+
+    def _next(self) -> tuple[list[tuple[bytes, int]], bool]:
+        """All lines that wait, after at least one came or something is due; False when no more will come."""
+        batch: list[tuple[bytes, int]] = []
+        with suppress(Empty):
+            item = self._queue.get(timeout=self._sync_s if self._keeper.busy else None)
+            while item is not None:
+                batch.append(item)
+                item = self._queue.get_nowait()
+            return batch, False
+        return batch, True
+
+
+class Keeper:
+    """Feeds one evidence file. `written` and `synced` count lines from the first on, and never more than is certain.
+
+    They may be read in another thread. `troubles` is what the disk refused, in its words, each refusal once. It neither
+    waits nor looks at a clock: the writer's thread does, or a test.
+    """
+
+    def __init__(self, file: EvidenceFile, *, sync_after_s: float = SYNC_AFTER_S) -> None:
+        self.file = file
+        self.written = self.synced = 0
+        self.troubles: SimpleQueue[str] = SimpleQueue()
+        self._sync_after_s = sync_after_s
+        self._taken = 0
+        self._unsynced = False  # something was written since the last sync
+        self._promised_s: float | None = None  # since when a line waits that is to be synced
+        self._refused = False  # lines wait that the disk did not take
+        self._doubtful = False  # a sync failed: what is durable is not known any more
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is left to be written or synced."""
+        return self._unsynced or self.file.waiting > 0
+
+    @property
+    def failing(self) -> bool:
+        """Whether the disk refused something, and not all of that was made good."""
+        return self._doubtful or self._refused
+
+    def take(self, batch: Sequence[tuple[bytes, int]], now_s: float) -> None:
+        """Takes lines over, each with its class of durability, in their order; syncs if one asks for it, or it is time.
+
+        Without lines: nothing came for a while, and all that is left is written and synced.
+        """
+        self._taken += len(batch)
+        highest = WRITTEN
+        refused: OSError | None = None
+        for line, durability in batch:
+            highest = max(highest, durability)
+            if durability == SYNCED_FIRST and is_signed(line):
+                self.file.settle()
+            try:
+                self.file.append(line, min(durability, WRITTEN))
+            except OSError as error:
+                refused = error
+        if not batch:
+            with suppress(OSError):  # it was told when it was refused first
+                self.file.flush()
+        if refused is not None:
+            self._tell(refused)
+        self._refused = self.file.waiting > 0 and (self._refused or refused is not None)
+        self._unsynced = self._unsynced or bool(batch)
+        if highest >= SYNCED and self._promised_s is None:
+            self._promised_s = now_s
+        self._count()
+        if highest == SYNCED_FIRST or not batch or self._overdue(now_s):
+            self._sync(now_s)
+
+    def fail(self, reason: str) -> None:
+        """Nothing that comes from here on can be believed."""
+        self._doubtful = True
+        self.troubles.put(reason)
+
+    def close(self) -> None:
+        """Writes and syncs what it can, and closes the file. Raises OSError."""
+        try:
+            self.file.close()
+        finally:
+            self._count()
+        if not self._doubtful:
+            self.synced = self.written
+
+    def _overdue(self, now_s: float) -> bool:
+        return self._promised_s is not None and now_s - self._promised_s >= self._sync_after_s
+
+    def _sync(self, now_s: float) -> None:
+        if not self._unsynced:
+            return
+        waiting = self.file.waiting
+        try:
+            self.file.sync()
+        except OSError as error:
+            if not self._doubtful:
+                self._tell(error)
+            self._doubtful = True
+        self._unsynced = waiting > 0
+        self._promised_s = now_s if waiting and self._promised_s is not None else None
+        if not self._doubtful:
+            self.synced = self.written
+
+    def _count(self) -> None:
+        if not self._doubtful:
+            self.written = self._taken - self.file.waiting
+
+    def _tell(self, error: OSError) -> None:
+        self.troubles.put(error.strerror or str(error))
+
+
+class Lateness:
+    """Watches over the sync of lines, one at a time: the next is the last that was given when the one before came true.
+
+    Times are in seconds of the caller's clock, which never goes back. A time in which nobody looked does not count: the
+    whole process stood still.
+    """
+
+    def __init__(self, late_s: float = SYNC_US / 1e6, stuck_s: float = STUCK_S) -> None:
+        self._late_s, self._stuck_s = late_s, stuck_s
+        self._promised = 0  # the last line that is to be synced,
+        self._watched = 0  # the one that is watched,
+        self._since_s = 0.0  # since when,
+        self._told_s = 0.0  # and after how long it was told to be late
+        self._looked_s = 0.0  # when somebody looked last
+
+    def given(self, number: int, durability: int) -> None:
+        """Line `number`, counted from 1, was given to the disk."""
+        if durability >= SYNCED:
+            self._promised = number
+
+    def kept(self, synced: int) -> bool:
+        """Whether all that was promised came true: then neither `late` nor `stuck` has anything to say."""
+        return self._promised <= synced
+
+    def late(self, synced: int, now_s: float) -> str | None:
+        """That a line is late, once for each time that the disk falls behind; `synced` lines are on it."""
+        if self._told_s or self._waited_s(synced, now_s) <= self._late_s:
+            return None
+        self._told_s = self._late_s
+        return f"what was to be on the disk within {SYNC_US // 1_000} ms is not"
+
+    def stuck(self, synced: int, now_s: float) -> str | None:
+        """That the disk hangs, once for each time that it does."""
+        if self._waited_s(synced, now_s) <= self._stuck_s or self._told_s >= self._stuck_s:
+            return None
+        self._told_s = self._stuck_s
+        return f"the disk has not answered for {self._stuck_s:g} s"
+
+    def _waited_s(self, synced: int, now_s: float) -> float:
+        stood_s, self._looked_s = now_s - self._looked_s, now_s
+        if self._promised <= synced:
+            return 0.0
+        if self._watched <= synced:
+            self._watched, self._since_s, self._told_s = self._promised, now_s, 0.0
+        elif stood_s > STOOD_S:
+            self._since_s += stood_s
+        return now_s - self._since_s

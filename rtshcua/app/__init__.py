@@ -1,0 +1,1 @@
+"""The services behind every front end: a typed request in, a typed result or a `Refusal` out, and no terminal."""

@@ -1,0 +1,1 @@
+"""What people, editors and agents meet: the command line, the language server and the MCP server."""

@@ -1,0 +1,127 @@
+"""`rtshcua agent-bundle`: a plug-in by which hosts of agents have the MCP server, a skill that says how, and a hook."""
+
+import json
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from rtshcua import __version__
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.laying import lay
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.faults import distrust, fail, words_of
+from rtshcua.front.cli.recognising import read_bundle
+from rtshcua.front.cli.stdout import out, out_json
+from rtshcua.library import root
+from rtshcua.wire import cose
+from rtshcua.wire.bundle import MAX_BUNDLE, envelopes, policy_digest, policy_payload
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+#: what the plug-in is called, and its server: hosts put it before the names of the tools
+NAME: Final = "rtshcua"
+#: what is shipped as it is, below `examples/agent`
+COPIED: Final = (f"skills/{NAME}/SKILL.md", "hooks/keep_out.py")
+#: tools of a host that may reach for files
+_REACHING: Final = "Bash|Read|Edit|Write|NotebookEdit"
+_DATA: Final = "RTSHCUA_DATA_DIR"
+#: what tells where the user's data lies, and hosts do not hand on to the servers that they start
+_CHOOSING: Final = (_DATA, "XDG_DATA_HOME")
+
+
+@app.command("agent-bundle")
+def agent_bundle(
+    directory: Annotated[Path, typer.Argument(help="the folder to make it in")],
+    bundle: Annotated[Path, typer.Option(help="the bundle that `rtshcua run --wait` has: its policy is in force")],
+    to: Annotated[Path, typer.Option(metavar="SOCKET", help="the agent socket of the vehicle that waits")],
+    with_: Annotated[list[Path], typer.Option("--with", help="the sources of that policy (repeatable)")],
+    mission_key: Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace files of the same names; others stay")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Make a plug-in for hosts of agents, OpenClaw and Claude's: the MCP server, a skill that says how to use it, and a
+    hook that keeps the model out of the key store and the socket.
+
+    It names BUNDLE, SOCKET, the sources and the key by whole paths, and holds no key, no passphrase and no bundle.
+    docs/agents.md says how a host takes it up. The sources must make the very policy that BUNDLE has.
+
+    Ends with 0 where it was made, 3 where a file cannot be read or is damaged, the policy is another one, or files of
+    the same names are there, 74 where it cannot be written.
+    """
+    from rtshcua.front.mcp.missions import Missions, NoPolicy
+
+    try:
+        envelope, _ = envelopes(read_bundle(bundle))
+        signed = policy_digest(cose.unverified(envelope, limit=MAX_BUNDLE).payload)
+    except Untrusted as error:
+        return distrust(error)
+    for path in (*with_, *(each for each in (mission_key, passphrase_file) if each is not None)):
+        read_regular(path, 1)
+    try:
+        policy = Missions(with_, str(root())).policy
+    except NoPolicy as error:
+        return fail(ExitCode.INPUT, str(error), "`rtshcua check` says what is wrong with them", slug="no-policy")
+    if policy_digest(policy_payload(policy)) != signed:
+        text = (
+            f"the sources make another policy than `{bundle}` has: `{policy.name}@{policy.version}`, or changed since"
+        )
+        return fail(ExitCode.INPUT, text, "compile BUNDLE from these sources", slug="wrong-policy")
+    words = ["mcp", _whole(bundle), "--to", _whole(to), *(word for path in with_ for word in ("--with", _whole(path)))]
+    for option, key in (("--mission-key", mission_key), ("--passphrase-file", passphrase_file)):
+        words += [] if key is None else [option, _whole(key)]
+    files = plugin(words, _whole(to), f"{policy.name}@{policy.version}", policy.vehicle.name)
+    try:
+        taken = lay(files, directory, replace=force)
+    except OSError as error:
+        return fail(ExitCode.FULL, f"cannot write to `{directory}`: {words_of(error)}")
+    if taken is not None:
+        there = ", ".join(f"`{path}`" for path in taken.paths)
+        return fail(ExitCode.INPUT, f"nothing was made, for these are there: {there}", "--force", slug="exists")
+    if as_json:
+        out_json(json.dumps({"folder": _whole(directory), "files": [*files]}, ensure_ascii=False))
+        return ExitCode.OK
+    out(f"made a plug-in for {policy.vehicle.name} under {policy.name}@{policy.version} in {directory.absolute()}")
+    out(f"Claude Code: claude --plugin-dir {shlex.quote(_whole(directory))}")
+    out(f"OpenClaw:    openclaw plugins install {shlex.quote(_whole(directory))}")
+    return ExitCode.OK
+
+
+def plugin(words: list[str], socket: str, policy: str, vehicle: str) -> dict[str, bytes]:
+    """Every file of a plug-in whose server is started with these words, by its path in it."""
+    script = Path(sys.executable).parent / NAME
+    command = [str(script)] if script.is_file() else [sys.executable, "-P", "-m", "rtshcua"]
+    server: dict[str, object] = {"command": command[0], "args": [*command[1:], *words]}
+    if any(map(os.environ.get, _CHOOSING)):
+        server["env"] = {_DATA: _whole(data_folder())}
+    manifest = {
+        "name": NAME,
+        "version": __version__,
+        "description": f"Propose missions to {vehicle} under {policy}, and follow them; the vehicle decides each step.",
+        "author": {"name": NAME},
+        "keywords": ["drone", "mavlink", "mcp"],
+    }
+    places = " ".join(shlex.quote(place) for place in (_whole(data_folder()), socket))
+    guard = f'{shlex.quote(sys.executable)} -P "${{CLAUDE_PLUGIN_ROOT}}/hooks/keep_out.py" {places}'
+    hooks = {"PreToolUse": [{"matcher": _REACHING, "hooks": [{"type": "command", "command": guard, "timeout": 10}]}]}
+    shipped = root() / "examples" / "agent"
+    return {
+        ".claude-plugin/plugin.json": _json(manifest),
+        ".mcp.json": _json({"mcpServers": {NAME: server}}),
+        "hooks/hooks.json": _json({"description": "keeps the model to the tools of the server", "hooks": hooks}),
+        **{name: (shipped / name).read_bytes() for name in COPIED},
+    }
+
+
+def _json(what: object) -> bytes:
+    return (json.dumps(what, ensure_ascii=False, indent=2) + "\n").encode()
+
+
+def _whole(path: Path) -> str:
+    return str(path.absolute())

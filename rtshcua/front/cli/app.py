@@ -1,0 +1,202 @@
+"""The front door: `rtshcua COMMAND ...`. Reads the table, imports the one command that is asked for, and guards it.
+
+`rtshcua`, `rtshcua --help` and `rtshcua --version` import neither typer nor rich (bench/startup.py measures it).
+"""
+
+import gc
+import io
+import os
+import re
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+from importlib import import_module
+from typing import Any, cast
+
+from rtshcua import __version__
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.faults import as_json, barrier, fail
+from rtshcua.front.cli.streams import mend_streams
+from rtshcua.front.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
+from rtshcua.front.cli.width import fitted
+
+#: when the collector looks for garbage while sources are checked: syntax trees come by thousands, and stay
+_COLLECTING = (50_000, 20, 100)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command and gives its exit code back, for `sys.exit`; nothing but SystemExit rises from it."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    mend_streams()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a poor terminal must not turn a degree sign into a fault
+    options = words[: words.index("--")] if "--" in words else words
+    with as_json(wanted="--json" in options):
+        return int(barrier(lambda: _dispatch(words)))
+
+
+def _dispatch(words: list[str]) -> int:
+    first, rest = (words[0], words[1:]) if words else ("--help", [])
+    if first in ("--version", "-V"):
+        print(f"rtshcua {__version__}")
+        return ExitCode.OK
+    if first == "help" and rest:
+        first, rest = rest[0], ["--help"]
+    if first in ("--help", "-h", "help"):
+        print(overview(bold=_wants_colour()))
+        return ExitCode.OK
+    row = find(first)
+    return _unknown(first) if row is None else _call(row, rest)
+
+
+def _unknown(word: str) -> ExitCode:
+    from rtshcua.diagnostics.suggest import nearest
+
+    kind = "option" if word.startswith("-") else "command"
+    near = nearest(word, [row.name for row in COMMANDS] + ["--help", "--version"])
+    help = f"did you mean `rtshcua {near}`?" if near else "`rtshcua --help` lists the commands"
+    return fail(ExitCode.USAGE, f"no such {kind}: `{word}`", help)
+
+
+def _call(row: Row, words: list[str]) -> int:
+    """Imports the command of `row` and runs it through typer, whose own way of reporting errors is left out."""
+    if row.quick:
+        from rtshcua.front.cli.quick import QUICK
+
+        before = gc.get_threshold()
+        gc.set_threshold(*_COLLECTING)
+        try:
+            code = QUICK[row.name](words)
+        finally:
+            gc.set_threshold(*before)
+        if code is not None:
+            return code
+    collecting = gc.isenabled()
+    gc.disable()  # what is loaded stays: to look through it for garbage takes a tenth of a command's start
+    try:
+        import typer
+        from typer.main import get_command
+
+        from rtshcua.front.cli.interrupts import breakable
+        from rtshcua.front.cli.option_groups import grouped
+
+        command = get_command(import_module(row.module).app)
+    finally:
+        if collecting:
+            gc.enable()
+    _unguarded(command)
+    _reflowed(command)
+    grouped(command, row.name)
+    try:
+        with (
+            command.make_context(f"rtshcua {row.name}", list(words), help_option_names=["-h", "--help"]) as context,
+            breakable() if row.ends_in_order else nullcontext(),
+        ):
+            return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
+    except typer.Exit as end:
+        return end.exit_code
+    except (typer.Abort, EOFError) as error:  # Ctrl-C, or the end of the input, at a question
+        if sys.stderr is not None and sys.stderr.isatty():
+            sys.stderr.write("\n")  # the question stands there
+        if isinstance(error, EOFError) or isinstance(error.__context__, EOFError):
+            return fail(ExitCode.INPUT, "the input ended at a question that was not answered")
+        return fail(ExitCode.INTERRUPTED, "stopped at a question that was not answered")
+    except typer.TyperException as error:
+        return _misused(row, error, words)
+
+
+def _unguarded(command: object) -> None:
+    """Leaves it to the command to open its files: one that cannot be read is bad input, not a wrong command line."""
+    for parameter in getattr(command, "params", ()):
+        described = getattr(parameter, "type_descriptor", None)
+        each: Any
+        for each in (getattr(described, "parameter_info", None), getattr(parameter, "type", None)):
+            if hasattr(each, "readable"):
+                each.readable = False
+    for verb in getattr(command, "commands", {}).values():
+        _unguarded(verb)
+
+
+def _reflowed(command: object) -> None:
+    """Makes each paragraph of a command's help one line, which typer then breaks where the terminal ends."""
+    text = getattr(command, "help", None)
+    if text:
+        command.help = "\n\n".join(" ".join(each.split()) for each in text.split("\n\n"))  # type: ignore[attr-defined]
+    for verb in getattr(command, "commands", {}).values():
+        _reflowed(verb)
+
+
+def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
+    """Says what is wrong with the command line as every other error is said; with `--json` as JSON, where the command
+    reports findings.
+    """
+    words = cast("str", error.format_message()).rstrip(".")  # type: ignore[attr-defined]
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else f"rtshcua {row.name}"
+    words = words.replace("Value error, ", "")  # typer's words for what an enumeration does not have
+    words = words.replace(": Input should", ": it should")
+    words = words.replace("a valid integer, unable to parse string as an integer", "a whole number")
+    words, _, near = words.partition(" (Possible options: ")
+    near = _meant(words, getattr(context, "command", None)) or near.rstrip(")")
+    words = words.partition(" Did you mean ")[0].rstrip(".") if near else words
+    words = f"{words}; did you mean {near}?" if near else words
+    words = words[:1].lower() + words[1:]
+    verb = re.fullmatch(r"no such command '(.*?)'(?:\. Did you mean (.*?))?\??", words, re.DOTALL)
+    if verb is not None:
+        meant = (verb[2] or "").replace("'", "").removeprefix("one of: ").partition(", ")[0]
+        help = f"did you mean `{path} {meant}`?" if meant else f"`{path} --help` lists the commands"
+        return fail(ExitCode.USAGE, f"no such command: `{path.partition(' ')[2]} {verb[1]}`", help)
+    help = f"`{path} --help` explains it"
+    if row.reports and "--json" in given:
+        from rtshcua.front.cli.findings import Findings
+
+        return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, help)
+    usage = None if context is None else context.get_usage().removeprefix("Usage: ")
+    return fail(ExitCode.USAGE, words, help, usage=usage)
+
+
+def _meant(words: str, command: object) -> str:
+    """What was probably meant by an option that ends as others do, or by a word that is none of those accepted."""
+    from rtshcua.diagnostics.suggest import nearest
+
+    chosen = re.search(r"'([^']*)' is not one of (.+)$", words)
+    if chosen is not None:
+        return nearest(chosen[1], re.findall("'([^']*)'", chosen[2])) or ""
+    option = re.match(r"[Nn]o such option: --([a-z-]+)", words)
+    known = [each for parameter in getattr(command, "params", ()) for each in parameter.opts]
+    return "" if option is None else " or ".join(each for each in known if each.endswith(f"-{option[1]}"))
+
+
+def overview(*, bold: bool) -> str:
+    """What `rtshcua --help` prints, from the table alone."""
+    width = max(len(row.name) for row in COMMANDS)
+    example_width = max(len(line) for line, _ in EXAMPLES)
+
+    def head(text: str) -> str:
+        return f"\033[1m{text}\033[0m" if bold else text
+
+    lines = [
+        f"{head('rtshcua')} {__version__}: an agent may propose what a drone does,",
+        "and can never make the drone do it",
+        "",
+        f"{head('usage')}  rtshcua COMMAND [OPTIONS] ...",
+    ]
+    for group, title in GROUPS.items():
+        lines += ["", head(title)]
+        for row in COMMANDS:
+            lines += fitted(f"  {row.name:<{width}}  {row.help}") if row.group == group else []
+    lines += ["", head("For example")]
+    for line, what in EXAMPLES:
+        lines += fitted(f"  {line:<{example_width}}  {what}")
+    lines += [
+        "",
+        head("Options"),
+        f"  {'-h, --help':<{width + 3}}  this page; `rtshcua COMMAND --help` for one command",
+        f"  {'-V, --version':<{width + 3}}  the version",
+    ]
+    return "\n".join(lines)
+
+
+def _wants_colour() -> bool:
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    return terminal and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"

@@ -1,0 +1,441 @@
+"""One flight of a verified bundle, put together: link, runtime, evidence, raw frames, view, and the summary."""
+
+import secrets
+import shlex
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rtshcua.adapters.clock import LinkClock, StepWatch
+from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop, append_all
+from rtshcua.adapters.preparation import Preparations
+from rtshcua.adapters.store.owed import OwedParameters
+from rtshcua.adapters.store.runs import LOG, RunFolder
+from rtshcua.adapters.store.writer import EvidenceWriter
+from rtshcua.adapters.utc import CLOCK, UtcWatch, certain_from_us
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.drain import drained
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.log_writer import Recorder
+from rtshcua.front.cli.agents import Agents
+from rtshcua.front.cli.attesting import BoundarySession
+from rtshcua.front.cli.closing import close_log, keep_summary
+from rtshcua.front.cli.configured import foreign
+from rtshcua.front.cli.interrupts import Interrupts, Wish
+from rtshcua.front.cli.live.feed import Feed
+from rtshcua.front.cli.live.story import Note, Plan, Snapshot, Summary
+from rtshcua.front.cli.live.telling import Answering, Teller, plan_of
+from rtshcua.front.cli.live.watching import Watching
+from rtshcua.front.cli.log_signer import LogSigner
+from rtshcua.front.cli.past import LOG_BEFORE, Past
+from rtshcua.front.cli.read_back import ReadBack, read_back
+from rtshcua.front.cli.refused import Refused
+from rtshcua.front.cli.simulation import SIMULATED
+from rtshcua.front.cli.tape import Tape
+from rtshcua.front.cli.witnessed import Witnessing
+from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Append, Ending, Event, Interrupted, Presented
+from rtshcua.onboard.runtime.limits import Limits
+from rtshcua.onboard.runtime.runtime import Runtime
+
+if TYPE_CHECKING:
+    from rtshcua.front.cli.incidents import Incidents, Watch
+
+_SEED_BYTES = 32
+
+EXIT_CODES = {
+    Ending.COMPLETED: ExitCode.OK,
+    Ending.ABORTED: ExitCode.ABORTED,
+    Ending.RECALLED: ExitCode.ABORTED,
+    Ending.CANCELLED: ExitCode.ABORTED,
+    Ending.REFUSED: ExitCode.REFUSED,
+    Ending.STOOD_DOWN: ExitCode.STOOD_DOWN,
+    Ending.CRASHED: ExitCode.CRASHED,
+    Ending.LINK_LOST: ExitCode.LINK,
+    Ending.INTERRUPTED: ExitCode.INTERRUPTED,
+    Ending.EVIDENCE_LOST: ExitCode.FULL,
+}
+
+_BACKLOG_S = 1.0
+_WAIT_US = 50_000
+_FASTEST_WAIT_S = 0.002
+_WAIT_S = 0.02
+#: how many documents are taken up before the loop begins; more of them wait in their sockets
+_MOST_EARLY = 32
+
+_LANDING = "interrupted: it falls back and lands first, and the log is closed then"
+_SILENT = (
+    "interrupted: the vehicle is silent; it falls back as soon as it is heard again, and is given up if it stays "
+    "silent. Ctrl-C twice more within 3 s leaves it"
+)
+_CRASHED = (
+    "CRASHED: the vehicle came down as no landing does; nothing more is sent. Keep away from its rotors and battery"
+)
+_FAILED = (
+    "this program failed, and the vehicle may be flying: nothing more is sent, and nothing watches it. The same "
+    "`rtshcua run` again brings it down"
+)
+_ON_GROUND = "interrupted on the ground: nothing is sent, and the log is closed"
+_KNOWING = (
+    "it is brought down; Ctrl-C once more within 3 s tells it to land where it is, stops watching, and closes the log"
+)
+
+
+class Flight:
+    """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off.
+    `simulated`: what the log says of a flight that was. `lapsed` says why the bundle is not to be trusted by the
+    time that the clock has now. `answering`: how a person answers a step that asks.
+
+    Once it is made, the first record is on the disk; not of one that is `resumed`, which waits for no disk. Raises
+    OSError where the disk does not take it.
+    """
+
+    def __init__(
+        self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts,
+        tape: Tape,
+        *, bundle: bytes, root: bytes, log_key: LogSigner, run: RunFolder, speed: float, live: bool, resumed: bool,
+        events: Sequence[Event], past: Past, boundary: BoundarySession, witnesses: Witnessing, utc: UtcWatch,
+        lapsed: Callable[[], Refused | None], debts: OwedParameters, agents: Agents | None = None,
+        simulated: str | None = None, incidents: "Incidents | None" = None, answering: Answering | None = None,
+    ) -> None:  # fmt: skip
+        self._loaded = loaded
+        self._vehicle = vehicle
+        self._clock = clock
+        self._feed = feed
+        self._interrupts = interrupts
+        self._tape = tape
+        self._run, self._root = run, root
+        self._speed = speed
+        self._early = list(events)
+        self._agents = agents
+        self._witnesses = witnesses
+        self._recorder = Recorder(log_key.sign, log_key.public, draw)
+        log = run.log()
+        past.begin(log.path, aloft=resumed)
+        self._past = past
+        self._frames = run.telemetry()
+        tape.attach(self._frames)
+        now = clock.now()
+        self._start_us = now.monotonic_us
+        policy, mission = loaded.bundle.policy, loaded.bundle.mission
+        self._teller = Teller(policy, mission, self._start_us, answering)
+        self._steps = StepWatch()
+        self._sink = EvidenceWriter(log)
+        genesis = self._recorder.genesis(
+            now, bundle=bundle, root=root, boot=loaded.in_force.flight, vehicle=loaded.vehicle,
+            mission=mission.name, mode=loaded.mode, before=past.hash, received_us=loaded.in_force.received_us(0),
+            sync_us=clock.us_in(SYNC_US / 1e6),
+        )  # fmt: skip
+        self._sink.append(genesis, SYNCED_FIRST)
+        self._boundary = boundary
+        session = loaded.attestation.begin(boundary.key)
+        boundary.begun(loaded.attestation.digest, session)
+        self._recorder.attest = loaded.attestation.statement
+        append_all(self._sink, self._recorder.attested(now), WRITTEN)
+        if simulated is not None:
+            self._sink.append(self._recorder.effect(now, SIMULATED, detail=simulated), WRITTEN)
+        if past.note:
+            self._sink.append(self._recorder.effect(now, LOG_BEFORE, detail=past.note), WRITTEN)
+        self._utc, self._lapsed = utc, lapsed
+        self._sink.append(self._recorder.effect(now, CLOCK, detail=utc.bound.told()), WRITTEN)
+        if not resumed:  # what hangs in the air comes down whatever the disk does
+            self._sink.settle()
+        witnesses.begin(log.path, lambda: self._sink.synced)
+        self._incidents = incidents
+        slack = max(1, round(speed / 5))
+        self._preparations = Preparations(
+            loaded, vehicle.driver, clock, debts.left, self._record, self._note, debts.keep, slack,
+            debts.trouble,
+        )  # fmt: skip
+        self._preparing, self._told = True, ""
+        self._left = ""  # that the operator stopped watching what may be flying
+        if debts.trouble is not None:
+            self._feed.post(Note(debts.trouble))
+        limits = Limits(stalled_us=Limits().stalled_us * slack)
+        self._runtime = Runtime(loaded, self._recorder, limits=limits, resumed=resumed)
+        vehicle.driver.resumes = resumed
+        self._feed.post(self._plan())
+        self._watch = Watching(
+            feed, self._teller, self._runtime.view, self._waits_for, live=live,
+            replan=self._replan, agents=agents,
+        )  # fmt: skip
+
+    def fly(self) -> tuple[ExitCode, Summary]:
+        """Fly to the end, whatever it is, and close the log."""
+        try:
+            ending = self._follow()
+            if ending is not Ending.CRASHED:
+                self._put_back()
+        except BaseException:
+            if self._runtime.aloft:
+                self._feed.post(Note(_FAILED))
+            self._close(None)
+            self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=False)
+            raise
+        self._feed.post(Snapshot(self._runtime.view(self._clock.now())))
+        if ending is Ending.REFUSED and self._vehicle.driver.unready is not None and not self._preparing:
+            self._feed.post(Note(f"the vehicle was not ready to fly: {self._vehicle.driver.unready}"))
+        if ending is Ending.CRASHED:
+            self._feed.post(Note(_CRASHED))
+        missing = self._close(ending)
+        lacks = ExitCode.FULL
+        found = ReadBack(None) if missing else read_back(self._run.path / LOG)
+        if found.refused is not None:
+            missing, lacks = (found.refused,), ExitCode.EVIDENCE
+        self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=not missing)
+        if not missing:
+            self._past.end(self._recorder.final_hash)
+        code = EXIT_CODES[ending]
+        if missing and code is ExitCode.OK:
+            code = lacks
+        summary = keep_summary(self._run, self._summary(ending, code, missing, found.gaps_us))
+        return (code if summary.whole or code is not ExitCode.OK else ExitCode.FULL), summary
+
+    def settle(self) -> None:
+        """Put back what an earlier run left, and close the log of a flight that is not to be."""
+        self._put_back()
+        self._close(Ending.REFUSED)
+
+    def refuse(self) -> None:
+        """Close the log of a flight that is not to be."""
+        self._close(Ending.REFUSED)
+
+    @property
+    def _may_fly(self) -> str:
+        return self._left or self._runtime.may_fly
+
+    @property
+    def used_up(self) -> bool:
+        """Whether the bundle may not fly any more, after the flight."""
+        return self._runtime.used_up
+
+    @property
+    def final_hash(self) -> str:
+        """The hash of the last line of its log."""
+        return self._recorder.final_hash
+
+    def _plan(self) -> Plan:
+        bundle = self._loaded.bundle
+        return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._speed)
+
+    def _replan(self) -> Plan:
+        """The mission was replaced: this is the plan from now on."""
+        self._teller.replace(self._loaded.bundle.mission)
+        return self._plan()
+
+    def _follow(self) -> Ending:
+        wait_us = max(_WAIT_US, self._clock.us_in(_FASTEST_WAIT_S))
+        held_wait_us = max(HELD_WAIT_US, self._clock.us_in(HELD_WAIT_US / 1e6))
+        watch: Watch = self._watch
+        if self._incidents is not None:
+            watch = self._incidents.around(watch, self._start_us)
+        problem = self._preparations.begin(self._pass)
+        if problem is not None:
+            self._tell_once(problem)
+            flavour = self._vehicle.driver.flavour
+            for text in () if flavour is None else foreign(self._loaded.preparation.settings, flavour.name):
+                self._feed.post(Note(text))
+            return Ending.REFUSED
+        self._preparing = False
+        loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, watch, wait_us, held_wait_us)
+        also = [*self._early, *self._backlog()]
+        while True:
+            match self._interrupts.wish():
+                case Wish.LAND:
+                    self._feed.post(Note(self._what_follows()))
+                    also.append(Interrupted(self._clock.now().monotonic_us))
+                case Wish.KNOW:
+                    self._feed.post(Note(_KNOWING))
+                case Wish.LEAVE:
+                    self._runtime.leave()
+                    return loop.turn(also) or self._leave()
+                case None:
+                    pass
+            also += self._handed_in()
+            also += self._witnesses.events(self._clock.now().monotonic_us)
+            also += self._steps.events(self._clock.now())
+            if self._utc.waits:
+                also += self._look_at_utc()
+            ending = loop.turn(also)
+            if ending is not None:
+                return ending
+            also = []
+
+    def _pass(self) -> bool:
+        """Let time pass before the loop, which is told then what happened; False once somebody asked to stop."""
+        self._early += self._poll()
+        self._seal_when_due()
+        if sum(isinstance(each, Presented) for each in self._early) < _MOST_EARLY:
+            self._early += self._handed_in()
+        if self._interrupts.wish() is None:
+            return True
+        self._feed.post(Note(_ON_GROUND))
+        self._early.append(Interrupted(self._clock.now().monotonic_us))
+        return False
+
+    def _waits_for(self) -> str | None:
+        """What the vehicle is waited for, in words; until parameters are set, nothing is known of that."""
+        return None if self._preparing else self._vehicle.driver.unready
+
+    def _put_back(self) -> None:
+        problem = self._preparations.end(self._linger)
+        if problem is not None:
+            self._tell_once(problem)
+
+    def _tell_once(self, text: str) -> None:
+        """Tell a person, who is told of each record besides."""
+        if text != self._told:
+            self._feed.post(Note(text))
+
+    def _linger(self) -> bool:
+        """Let time pass after the loop; False once somebody would not wait."""
+        self._poll()
+        self._seal_when_due()
+        if self._agents is not None:
+            self._agents.turn_away(self._clock.now())
+        return self._interrupts.wish() is not Wish.LEAVE
+
+    def _handed_in(self) -> Sequence[Event]:
+        """What agents and operators handed in; whoever came to their sockets is heard and told from now on."""
+        if self._agents is None:
+            return ()
+        found = self._agents.events(self._clock.now())
+        for text in self._agents.notes():
+            self._feed.post(Note(text))
+        return found
+
+    def _poll(self) -> Sequence[Event]:
+        return self._vehicle.poll(self._clock.now().monotonic_us, self._clock.us_in(_WAIT_S))
+
+    def _record(self, event: str, detail: str) -> None:
+        """Put an effect of before or after the loop into the log; it is on the disk then. Raises OSError."""
+        self._note(event, detail)
+        self._sink.settle()
+
+    def _note(self, event: str, detail: str) -> None:
+        """Put one there, and do not wait for the disk: the loop sees what becomes of it. Raises OSError."""
+        now = self._clock.now()
+        self._catch_up(now)
+        line = self._recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST)
+        self._sink.append(line, SYNCED_FIRST)
+        self._told = detail
+        self._watch(now, (), (Append(line, SYNCED_FIRST),))
+
+    def _catch_up(self, now: Now) -> None:
+        """End an epoch that is over, before anything else is recorded. Raises OSError."""
+        append_all(self._sink, self._recorder.caught_up(now), SYNCED_FIRST)
+
+    def _seal_when_due(self) -> None:
+        """End an epoch that is over, outside of the loop; the loop sees what becomes of it."""
+        now = self._clock.now()
+        if self._recorder.due(now):
+            with suppress(OSError):
+                append_all(self._sink, self._recorder.sealing(now), SYNCED_FIRST)
+
+    def _look_at_utc(self) -> list[Event]:
+        """The vehicle may tell the time of day after the log began: from then on it is known. By it something may have
+        expired that this machine's clock took for good; then nothing flies.
+        """
+        now, flavour = self._clock.now(), self._vehicle.driver.flavour
+        if flavour is None or not self._utc.look(self._vehicle.driver.source, flavour.name, now.monotonic_us):
+            return []
+        self._vehicle.driver.asks_utc = False
+        now = self._clock.now()
+        self._vehicle.driver.issued_from_us = certain_from_us(self._loaded.issued_us, now)
+        self._catch_up(now)
+        self._sink.append(self._recorder.effect(now, CLOCK, detail=self._utc.bound.told()), WRITTEN)
+        lapsed = self._lapsed()
+        if lapsed is None:
+            return []
+        self._feed.post(Note(f"by the vehicle's time: {lapsed}"))
+        return [Interrupted(now.monotonic_us)]
+
+    def _what_follows(self) -> str:
+        """What comes of the first request to stop."""
+        if not self._runtime.aloft:
+            return _ON_GROUND
+        return _LANDING if self._runtime.linked else _SILENT
+
+    def _backlog(self) -> list[Event]:
+        """What the vehicle said while this was put together, so that the runtime begins with the present."""
+        events: list[Event] = []
+        until_s = time.monotonic() + _BACKLOG_S
+        while time.monotonic() < until_s and (said := self._vehicle.poll(self._clock.now().monotonic_us, 0)):
+            events += said
+        return events
+
+    def _leave(self) -> Ending:
+        """Stop watching, after the vehicle was told to come down, if it could be told; say so in the log."""
+        now = self._clock.now()
+        told = "it was told to come down" if self._runtime.homeward else "it could not be told to come down"
+        self._vehicle.release()
+        with suppress(OSError):
+            self._catch_up(now)
+        line = self._recorder.effect(now, "left", detail=f"the operator stopped watching; {told}; nothing more is sent")
+        with suppress(OSError):
+            self._sink.append(line, SYNCED)
+        self._feed.post(Note(f"left: {told}; nothing more is sent"))
+        self._left = f"the vehicle may be flying: {told}; the operator left, so nothing watches it any more"
+        return Ending.INTERRUPTED
+
+    def _close(self, ending: Ending | None) -> tuple[str, ...]:
+        """Sign and close the log; what of the evidence is missing. Without an ending (a fault) it stays unsigned."""
+        missing = close_log(
+            self._recorder, self._sink, self._frames, self._clock.now, ending,
+            lambda text: self._feed.post(Note(text)),
+            self._agents.tell if self._agents is not None else lambda line: None,
+        )  # fmt: skip
+        if ending is not None and not missing and self._loaded.boundary.lost is None:
+            self._boundary.ended(self._loaded.attestation.digest)
+        return missing
+
+    def _summary(self, ending: Ending, code: ExitCode, missing: tuple[str, ...], gaps_us: int) -> Summary:
+        loaded, policy, mission = self._loaded, self._loaded.bundle.policy, self._loaded.bundle.mission
+        flavour = self._vehicle.driver.flavour
+        log = _short(self._run.path / LOG)
+        used = self._vehicle.driver.consumption
+        for_a_km, km_declared = used.for_a_km
+        return Summary(
+            mission=mission.name,
+            policy=f"{policy.name}@{policy.version}",
+            vehicle=loaded.vehicle,
+            flavour=flavour.name if flavour is not None else "",
+            mode=loaded.mode,
+            ending=ending,
+            exit_code=code,
+            steps=len(mission.invocations),
+            steps_done=len(self._teller.done),
+            outcomes=self._teller.outcomes,
+            flight_us=self._clock.now().monotonic_us - self._start_us,
+            records=self._recorder.count,
+            whole=not missing,
+            missing=missing,
+            gaps_us=gaps_us,
+            unconfirmed=tuple(self._teller.unconfirmed),
+            may_fly=self._may_fly,
+            battery=used.summary,
+            drain_declared=drained(policy.vehicle),
+            drain_measured=used.in_a_minute,
+            km_declared=km_declared if for_a_km else 0,
+            km_measured=for_a_km,
+            folder=str(self._run.path),
+            log=log,
+            next=f"rtshcua verify-log {'--audit ' if self._loaded.boundary.lost else ''}{shlex.quote(log)}",
+        )
+
+
+def draw() -> bytes:
+    """The secret of an epoch's key."""
+    return secrets.token_bytes(_SEED_BYTES)
+
+
+def _short(path: Path) -> str:
+    """A path as seen from here, where that is shorter."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except (ValueError, OSError):
+        return str(path)

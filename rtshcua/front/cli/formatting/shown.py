@@ -1,0 +1,42 @@
+"""What formatting changes, as a unified diff that `patch` takes."""
+
+import os
+import sys
+from collections.abc import Iterator
+from difflib import unified_diff
+
+from rtshcua.diagnostics.excerpt import visible
+from rtshcua.front.cli.formatting.each import Laid
+
+_COLOURS = {"---": "\033[1m", "+++": "\033[1m", "@@": "\033[36m", "-": "\033[31m", "+": "\033[32m"}
+_END = "\033[0m"
+
+
+def difference(laid: Laid) -> str:
+    """The diff of one file, empty where nothing changes; in colour on a terminal."""
+    if laid.after is None or not laid.changed:
+        return ""
+    colour = sys.stdout is not None and sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    made = unified(laid.name, laid.before, laid.after, "as it is", "formatted")
+    return "".join(map(_coloured, made) if colour else made)
+
+
+def unified(name: str, before: bytes, after: bytes, was: str = "", now: str = "") -> Iterator[str]:
+    """The lines of a unified diff of two texts in UTF-8, byte for byte; `was` and `now` say of each what it is.
+
+    Of a source that holds what hides others there is none, for it is refused; a file's name may hold anything.
+    """
+    name = visible(name)
+    for line in unified_diff(_lines(before.decode("utf-8")), _lines(after.decode("utf-8")), name, name, was, now):
+        yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
+
+
+def _lines(text: str) -> list[str]:
+    """The lines with their ends; only a line feed ends one."""
+    lines = text.split("\n")
+    return [f"{line}\n" for line in lines[:-1]] + lines[-1:] * bool(lines[-1])
+
+
+def _coloured(line: str) -> str:
+    head = next((colour for start, colour in _COLOURS.items() if line.startswith(start)), None)
+    return line if head is None else f"{head}{line[:-1]}{_END}\n"

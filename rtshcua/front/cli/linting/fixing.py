@@ -1,0 +1,83 @@
+"""`--fix`: rounds of fixes until nothing is left to fix, none of which may bring an error."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.front.cli.linting.gathered import Gathered
+from rtshcua.front.cli.linting.session import Session
+from rtshcua.ground.lint.fixes import fixed
+
+#: rounds after which it is given up: fixes that undo each other would go on for ever
+_MOST = 50
+_BOM = b"\xef\xbb\xbf"
+
+
+class Fixed(NamedTuple):
+    """The new bytes of files by name, those before, the findings then, and the files whose fixes would have brought an
+    error.
+    """
+
+    files: dict[str, bytes]
+    before: dict[str, bytes]
+    told: Gathered
+    refused: tuple[str, ...]
+
+
+def fix(
+    session: Session, told: Gathered, examine: Callable[[], Gathered], files: Sequence[str], *, suggested: bool
+) -> Fixed:
+    """Fix the `files` that were asked for, in memory: `session` then holds the new texts."""
+    before = {name: session.read(name) for name in files if name in told.sources}
+    writable = [name for name in before if _is_text(before[name])]
+    refused: dict[str, None] = {}
+    for _ in range(_MOST):
+        texts = fixed(told.found, told.sources, [name for name in writable if name not in refused], suggested=suggested)
+        if not texts:
+            break
+        told = _round(session, told, examine, texts, refused)
+    now = {name: session.read(name) for name in writable}
+    return Fixed({name: data for name, data in now.items() if data != before[name]}, before, told, tuple(refused))
+
+
+def _round(
+    session: Session, told: Gathered, examine: Callable[[], Gathered], texts: dict[str, str], refused: dict[str, None]
+) -> Gathered:
+    """Put new texts in place, all at once, or else one after the other; those that bring an error are refused."""
+    after = _tried(session, told, examine, texts)
+    if after is not None:
+        return after
+    for name, text in texts.items():
+        after = _tried(session, told, examine, {name: text}) if len(texts) > 1 else None
+        if after is None:
+            refused[name] = None
+        else:
+            told = after
+    return told
+
+
+def _tried(session: Session, told: Gathered, examine: Callable[[], Gathered], texts: dict[str, str]) -> Gathered | None:
+    """The findings with these texts; None where there are new errors among them, and all is as before."""
+    kept = {name: session.read(name) for name in texts}
+    for name, text in texts.items():
+        mark = _BOM if kept[name].startswith(_BOM) else b""
+        session.put(name, mark + text.encode("utf-8"))
+    after = examine()
+    if not _errors(after) - _errors(told):
+        return after
+    for name, data in kept.items():
+        session.put(name, data)
+    return None
+
+
+def _errors(told: Gathered) -> Counter[tuple[str, str]]:
+    return Counter((each.code.id, each.message) for each in told.found if each.severity is Severity.ERROR)
+
+
+def _is_text(data: bytes) -> bool:
+    try:
+        data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return False
+    return True

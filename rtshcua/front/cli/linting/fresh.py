@@ -1,0 +1,127 @@
+"""Examines programs: loads, checks, proves, and looks for habits. Importing this brings the whole compiler."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from rtshcua import library
+from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
+from rtshcua.front.cli.linting.examined import Examined, Result
+from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.pipeline.program import examine_program
+from rtshcua.mavlink import dialect
+
+
+class SourceFiles(Protocol):
+    """What reads sources, and knows their digests: a `session.Session`."""
+
+    def read(self, name: str) -> bytes:
+        """The octets of a source. Raises OSError, and ValueError for a name that leads nowhere."""
+        ...
+
+    def digest(self, name: str) -> str | None:
+        """The digest of a source; None where it cannot be read."""
+        ...
+
+    def folder(self, pack: str) -> str | None:
+        """The folder of an installed pack."""
+        ...
+
+    def listing(self, name: str) -> list[str]:
+        """The names in a folder, for suggestions. Raises OSError."""
+        ...
+
+
+class Fresh:
+    """The programs of one run."""
+
+    def __init__(self, session: SourceFiles, asked: Mapping[str, int | None]) -> None:
+        self._session = session
+        self._asked = asked
+        self._programs: dict[Path, tuple[Program, _Reads]] = {}
+
+    def loaded(self, path: Path, further: Sequence[Path]) -> Examined:
+        """The program of a file, not examined."""
+        program, reads = self._load(path, further)
+        return reads.examined(program, self._asked, None)
+
+    def examined(self, wanted: Sequence[tuple[Path, Sequence[Path]]]) -> list[Examined]:
+        """The programs of files, examined."""
+        done = []
+        for path, further in wanted:
+            program, reads = self._load(path, further)
+            done.append(reads.examined(program, self._asked, _result(program, self._asked)))
+        return done
+
+    def _load(self, path: Path, further: Sequence[Path]) -> "tuple[Program, _Reads]":
+        found = self._programs.get(path)
+        if found is None:
+            reads = _Reads(self._session)
+            names = [str(path), *map(str, further)]
+            program = load(names, reads.read, str(library.root()), self._session.listing, packs=reads.folder)
+            found = self._programs[path] = program, reads
+        return found
+
+
+class _Reads:
+    """Remembers what was read for one program."""
+
+    def __init__(self, session: SourceFiles) -> None:
+        self._session = session
+        self._names: dict[str, str | None] = {}
+        self._packs: dict[str, str | None] = {}
+
+    def read(self, name: str) -> bytes:
+        self._names[name] = self._session.digest(name)
+        return self._session.read(name)
+
+    def folder(self, pack: str) -> str | None:
+        self._packs[pack] = self._session.folder(pack)
+        return self._packs[pack]
+
+    def examined(self, program: Program, asked: Mapping[str, int | None], result: Result | None) -> Examined:
+        members = tuple(unit.file for unit in program.units)
+        mine = {name: asked[name] for name in members if name in asked}
+        return Examined(members, self._names, self._packs, mine, result)
+
+
+def examine_specification(
+    session: SourceFiles, files: Sequence[Path], further: Sequence[Path], asked: Mapping[str, int | None]
+) -> Examined:
+    """A mission specification with the sources of its policy, as one program."""
+    from rtshcua.ground.agent.specification import load_specification
+
+    reads = _Reads(session)
+    rest = [str(path) for path in (*files[1:], *further)]
+    program, read = load_specification(
+        str(files[0]), rest, reads.read, str(library.root()), session.listing, reads.folder
+    )
+    return reads.examined(program, asked, _result(program, asked, read.pointed))
+
+
+def _result(
+    program: Program,
+    asked: Mapping[str, int | None],
+    pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]] = tuple,
+) -> Result:
+    checked = examine_program(program, dialect.load())
+    found = pointed(checked.diagnostics)
+    if has_errors(found):
+        return Result(found, ())
+    return Result(found, (*lint(program, asked, checked.grounds), *_layouts(program, asked)))
+
+
+def _layouts(program: Program, asked: Mapping[str, int | None]) -> Iterator[Diagnostic]:
+    """What is not laid out in the one style, where that is looked at."""
+    for unit in program.units:
+        width = asked.get(unit.file)
+        if width is not None:
+            from rtshcua.ground.format.finding import not_formatted
+            from rtshcua.ground.format.format import formatted
+
+            source = program.sources[unit.file]
+            text = formatted(source, width).text
+            found = None if text is None else not_formatted(source, text)
+            if found is not None:
+                yield found

@@ -1,0 +1,109 @@
+"""Which files a run is about, and the configuration of each."""
+
+import os
+from collections.abc import Mapping, Sequence
+from os.path import lexists, normpath
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.adapters.store.checkout import checkout_of, lies_in
+from rtshcua.adapters.store.folders import cache_folder
+from rtshcua.adapters.store.lint_cache import LintCache
+from rtshcua.adapters.store.project import Project, Projects
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.asked import SOURCE, unfolded
+from rtshcua.front.cli.linting.options import Options
+from rtshcua.ground.language.paths import shown
+from rtshcua.ground.project.settings import Ignored, misconfigured
+
+
+class Scope(NamedTuple):
+    """The files, and of each its project, further sources and cache; `left_out` is how many are excluded."""
+
+    files: tuple[Path, ...]
+    projects: Mapping[Path, Project]
+    further: Mapping[Path, Sequence[Path]]
+    caches: Mapping[Path, LintCache | None]
+    left_out: int
+    widths: Mapping[Path, int]  # of the files whose layout is looked at
+
+    def configured(self) -> dict[str, tuple[Ignored, ...]]:
+        """What the configuration of each file ignores in it, by the file's name."""
+        return {shown(str(path)): _ignored(self.projects[path], path) for path in self.files}
+
+
+def scope(options: Options) -> Scope | Refusal:
+    """The files that are asked for, but for those that their configuration excludes; what is wrong with either ends the
+    run.
+    """
+    files = unfolded(options.paths)
+    if isinstance(files, Refusal):
+        return files
+    projects = Projects(options.config, isolated=options.isolated)
+    found: dict[Path, Project] = {}
+    looked_at: set[tuple[Path | None, Path]] = set()
+    for path in files:
+        project = projects.of(path)
+        if isinstance(project, Refusal):
+            return project
+        if (project.file, project.root) not in looked_at and not options.with_:
+            looked_at.add((project.file, project.root))
+            wrong = _no_further(project)
+            if wrong is not None:
+                return wrong
+        if not project.excludes(path, project.settings.lint.exclude):
+            found[path] = project
+    kept = tuple(found)
+    caches = {} if options.no_cache else _caches(tuple(found.items()), fresh=options.fixes)
+    return Scope(
+        kept,
+        found,
+        {path: options.with_ or _further(project) for path, project in found.items()},
+        {path: caches.get(path) for path in found},
+        len(files) - len(kept),
+        {path: project.settings.format.width for path, project in found.items() if _looks_at_layout(project, path)},
+    )
+
+
+def _looks_at_layout(project: Project, path: Path) -> bool:
+    settings = project.settings
+    return settings.lint.format and path.suffix == SOURCE and not project.excludes(path, settings.format.exclude)
+
+
+def _ignored(project: Project, path: Path) -> tuple[Ignored, ...]:
+    return tuple(
+        each for each in project.settings.lint.ignored if each.pattern is None or project.means(each.pattern, path)
+    )
+
+
+def _further(project: Project) -> tuple[Path, ...]:
+    here = Path(normpath(Path().absolute()))
+    placed = [Path(normpath(project.root / each)) for each in project.settings.lint.further]
+    return tuple(each.relative_to(here) if each.is_relative_to(here) else each for each in placed)
+
+
+def _no_further(project: Project) -> Refusal | None:
+    """The first further source of a configuration that is no file, as a fault of the configuration."""
+    for name, place in zip(project.settings.lint.further, _further(project), strict=True):
+        edge = os.path.realpath(checkout_of(project.file or project.root) or project.root)
+        if not lies_in(os.path.realpath(place), edge):
+            help = "`--with` on the command line takes any source"
+            return misconfigured(shown(str(project.file)), f"`{name}` in `with` lies outside of the project", help)
+        if not place.is_file():
+            what = "is a folder" if place.is_dir() else "is no file" if lexists(place) else "is not there"
+            help = "accepted: a list of sources (.rts)"
+            return misconfigured(shown(str(project.file)), f"`{name}` in `with` {what}", help)
+    return None
+
+
+def _caches(files: Sequence[tuple[Path, Project]], *, fresh: bool) -> dict[Path, LintCache]:
+    """The cache of each file, one for each project, where its configuration does not say that there is none."""
+    opened: dict[Path, LintCache] = {}
+    found: dict[Path, LintCache] = {}
+    user = cache_folder()
+    for path, project in files:
+        if project.settings.lint.cache:
+            if project.root not in opened:
+                opened[project.root] = LintCache(user, project.root, fresh=fresh)
+            found[path] = opened[project.root]
+    return found

@@ -1,0 +1,146 @@
+"""A run of `lint` over files: what is remembered is taken from the cache, the rest examined, and kept for next time.
+
+Nothing here imports a parser: `fresh` does, and is imported where something must be examined.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+
+from rtshcua import library
+from rtshcua.adapters.store.lint_cache import LintCache
+from rtshcua.adapters.store.readable import Readable
+from rtshcua.diagnostics.span import Source
+from rtshcua.front.cli.asked import SPECIFICATION, roots
+from rtshcua.front.cli.linting.examined import Examined, decoded, encoded
+from rtshcua.front.cli.linting.mark import mark
+from rtshcua.ground.language.paths import shown
+
+
+class Session:
+    """Files as they were first read, or as they are to be (`put`), and what was found in their programs."""
+
+    def __init__(self, asked: Iterable[Path] = ()) -> None:
+        self._readable = Readable(str(library.root()), asked)
+        self._data: dict[str, bytes | OSError | ValueError] = {}
+        self._digests: dict[str, str | None] = {}
+        self._sources: dict[str, Source] = {}
+        self._mark: str | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The files that were read so far."""
+        return tuple(self._data)
+
+    def read(self, name: str) -> bytes:
+        """A file's bytes, at most one more than the parser takes. Raises as the system did when it was first read."""
+        found = self._data.get(name)
+        if found is None:
+            try:
+                found = self._readable.read(name)
+            except (OSError, ValueError) as error:
+                found = error
+            self._data[name] = found
+        if isinstance(found, bytes):
+            return found
+        raise found
+
+    def put(self, name: str, data: bytes) -> None:
+        """From now on a file has this content, for this run alone."""
+        self._data[name] = data
+        self._digests.pop(name, None)
+        self._sources.pop(name, None)
+
+    def digest(self, name: str) -> str | None:
+        """The digest of a file's bytes; None of one that cannot be had."""
+        if name not in self._digests:
+            try:
+                self._digests[name] = sha256(self.read(name)).hexdigest()
+            except (OSError, ValueError):
+                self._digests[name] = None
+        return self._digests[name]
+
+    def folder(self, pack: str) -> str | None:
+        """The folder of an installed pack."""
+        return self._readable.pack(pack)
+
+    def listing(self, name: str) -> list[str]:
+        """The names in a folder, for suggestions. Raises OSError."""
+        return self._readable.listing(name)
+
+    def sources(self, names: Sequence[str]) -> dict[str, Source]:
+        """The texts of files; what cannot be had, or is no text, is left out or made as legible as it can be."""
+        return {name: source for name in names if (source := self._source(name)) is not None}
+
+    def _source(self, name: str) -> Source | None:
+        if name not in self._sources:
+            try:
+                text = self.read(name).decode("utf-8-sig", errors="replace")
+            except (OSError, ValueError):
+                return None
+            self._sources[name] = Source(name, text)
+        return self._sources[name]
+
+    def _length(self, name: str) -> int | None:
+        source = self._source(name)
+        return None if source is None else len(source.text)
+
+    def examine(
+        self,
+        files: Sequence[Path],
+        further: Mapping[Path, Sequence[Path]],
+        caches: Mapping[Path, LintCache | None],
+        widths: Mapping[Path, int],
+    ) -> list[Examined]:
+        """What is found in the programs that files make, in order; `cli.programs` says which these are. Each file has
+        further sources, a cache to be remembered in, and, if its layout is to be looked at, the width of its lines.
+        """
+        names = [shown(str(path)) for path in files]
+        asked = {name: widths.get(path) for name, path in zip(names, files, strict=True)}
+        if files[0].suffix.lower() == SPECIFICATION:
+            from rtshcua.front.cli.linting.fresh import examine_specification
+
+            return [examine_specification(self, files, further[files[0]], asked)]
+        entries = [_entry(name, further[path]) for name, path in zip(names, files, strict=True)]
+        known = [self._known(caches[path], entry, asked) for path, entry in zip(files, entries, strict=True)]
+        missing = [number for number, each in enumerate(known) if each is None]
+        loaded: dict[int, Examined] = {}
+        if missing:
+            from rtshcua.front.cli.linting.fresh import Fresh
+
+            fresh = Fresh(self, asked)
+            loaded = {number: fresh.loaded(files[number], further[files[number]]) for number in missing}
+        every = [known[number] or loaded[number] for number in range(len(files))]
+        chosen = roots(names, [each.members for each in every])
+        waiting = [number for number in chosen if every[number].result is None]
+        if waiting:
+            from rtshcua.front.cli.linting.fresh import Fresh
+
+            fresh = fresh if missing else Fresh(self, asked)
+            results = fresh.examined([(files[number], further[files[number]]) for number in waiting])
+            loaded |= dict(zip(waiting, results, strict=True))
+        for number, each in loaded.items():
+            every[number] = each
+            cache = caches[files[number]]
+            if cache is not None and each.lasting:
+                cache.put(entries[number], encoded(each, self._marked(entries[number])))
+        return [every[number] for number in chosen]
+
+    def _known(self, cache: LintCache | None, entry: str, asked: Mapping[str, int | None]) -> Examined | None:
+        data = None if cache is None else cache.get(entry)
+        if data is None:
+            return None
+        return decoded(data, self._marked(entry), asked, self.digest, self.folder, self._length)
+
+    def _marked(self, entry: str) -> str:
+        """The mark of an entry, which is of its name too: one that was moved to another's place is none."""
+        if self._mark is None:
+            self._mark = mark()
+        return f"{self._mark} {entry}"
+
+
+def _entry(name: str, further: Sequence[Path]) -> str:
+    """The name of the entry of a file's program: names of files are relative to the working folder."""
+    about = [str(Path.cwd()), name, [shown(str(path)) for path in further]]
+    return sha256(json.dumps(about).encode("utf-8", "surrogatepass")).hexdigest()[:40]

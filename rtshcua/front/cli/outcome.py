@@ -1,0 +1,81 @@
+"""Which file is meant by a log, and how its verification ends for the shell."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rtshcua.adapters.store.logs import START
+from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.runs import LOG, lines_below, logs_of
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.report import Report, Verdict
+
+_MARK = b'"format":"rtshcua/log"'
+_HEAD = 1 << 26
+
+#: of a log whose first record is not whole, in every command
+CUT_AT_FIRST = "the log is cut inside its first record, or that record is damaged"
+
+#: where a file is no log
+NO_LOG_HELP = "accepted: a log, the folder of a run, or a folder of these"
+
+_EXITS = {
+    "trust": ExitCode.UNTRUSTED,
+    "decision": ExitCode.DECISION,
+    "document": ExitCode.DECISION,
+    "dispatch": ExitCode.DECISION,
+    "preparation": ExitCode.DECISION,
+    "frames": ExitCode.DECISION,
+    "anchor": ExitCode.ANCHOR,
+    "boundary": ExitCode.BOUNDARY,
+}
+
+
+def log_of(given: Path) -> Path:
+    """The log that is meant: itself, or that in the folder of a run."""
+    return given / LOG if given.is_dir() else given
+
+
+def logs_meant(given: Iterable[Path]) -> list[Path]:
+    """The logs that are meant by files, folders of runs and folders of these; where there is none, the missing one."""
+    return [log for path in given for log in logs_of(path) or [path / LOG]]
+
+
+def logs_and_others(given: Iterable[Path]) -> tuple[list[Path], list[Path]]:
+    """The logs that are meant, of folders all that lie there or below, whatever they are called; and what lies there
+    that has a log's suffix, and is none. What cannot be read is taken for a log: whoever opens it says why.
+    """
+    logs, others = list[Path](), list[Path]()
+    for path in given:
+        found = lines_below(path) if path.is_dir() else [path]
+        mine = [each for each in found if each.name == LOG or not path.is_dir() or _may_be_log(each)]
+        logs += mine or [path / LOG]
+        others += [each for each in found if each not in mine]
+    return logs, others
+
+
+def _may_be_log(path: Path) -> bool:
+    try:
+        return path.stat().st_size > 0 and is_log(path)
+    except OSError:
+        return True
+
+
+def is_log(path: Path) -> bool:
+    """Whether a file looks like a log, or is empty, as one is of which all was cut off; its first line may be cut."""
+    with open_regular(path) as file:
+        line = file.readline(_HEAD)
+    return not line or line.startswith(START) or _MARK in line
+
+
+def exit_code(report: Report) -> ExitCode:
+    """The exit code for a report."""
+    if report.failure is None:
+        return ExitCode.OK if report.verdict is Verdict.VERIFIED else ExitCode.INCOMPLETE
+    return exit_code_of(report.failure.slug)
+
+
+def exit_code_of(slug: str) -> ExitCode:
+    """The exit code for what makes a log fail."""
+    if slug == "genesis/format":
+        return ExitCode.UNTRUSTED
+    return _EXITS.get(slug.partition("/")[0], ExitCode.EVIDENCE)

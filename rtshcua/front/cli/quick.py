@@ -1,0 +1,122 @@
+"""Reads plain command lines of `check`, `lint` and `recall` without typer, whose start takes longer than they do.
+
+A command line that holds anything else than the options listed here, in their usual forms, is left to typer: help,
+mistakes, abbreviations, and whatever is not understood.
+
+Fast twin of these commands by typer. Goal: 20 files are linted within 80 times `python -c pass` (bench/lint.py), a
+mission is checked within 90 (bench/startup.py); on a busy machine 96 and 45 with it, 104 and 56 without
+(docs/adr/0037). A recall is with the vehicle within 0.3 s (bench/recall.py). tests/unit/front/cli/test_quick.py holds
+the lists against the commands that typer knows, and what is read here against what typer reads.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.linting.options import Options
+
+Kind = Literal["flag", "text", "path", "paths"]
+
+LINT: Mapping[str, tuple[str, Kind]] = {
+    "--format": ("format", "text"),
+    "--output": ("output", "path"),
+    "-o": ("output", "path"),
+    "--fail-on": ("fail_on", "text"),
+    "--with": ("with_", "paths"),
+    "--changed": ("changed", "flag"),
+    "--base": ("base", "text"),
+    "--fix": ("fix", "flag"),
+    "--unsafe-fixes": ("unsafe_fixes", "flag"),
+    "--diff": ("diff", "flag"),
+    "--config": ("config", "path"),
+    "--isolated": ("isolated", "flag"),
+    "--no-cache": ("no_cache", "flag"),
+    "--statistics": ("statistics", "flag"),
+    "--json": ("json", "flag"),
+}
+
+CHECK: Mapping[str, tuple[str, Kind]] = {
+    "--since": ("since", "path"),
+    "--with": ("with_", "paths"),
+    "--map": ("map_", "path"),
+    "--at": ("at", "text"),
+    "--deny-warnings": ("deny_warnings", "flag"),
+    "--json": ("as_json", "flag"),
+}
+
+RECALL: Mapping[str, tuple[str, Kind]] = {
+    "--policy": ("policy", "flag"),
+    "--to": ("to", "path"),
+    "--output": ("output", "path"),
+    "-o": ("output", "path"),
+    "--send": ("send", "path"),
+    "--root": ("root", "path"),
+    "--flight": ("flight", "text"),
+    "--as": ("person", "text"),
+    "--approval-key": ("approval_key", "path"),
+    "--passphrase-file": ("passphrase_file", "path"),
+    "--json": ("as_json", "flag"),
+}
+
+
+def read(words: Sequence[str], known: Mapping[str, tuple[str, Kind]]) -> tuple[tuple[Path, ...], dict[str, Any]] | None:
+    """The paths of a command line and its options by name; None where typer must read it."""
+    paths: list[Path] = []
+    options: dict[str, Any] = {}
+    left = iter(words)
+    for word in left:
+        if not word or word == "--":
+            return None
+        if not word.startswith("-"):
+            paths.append(Path(word))
+            continue
+        option, equals, value = word.partition("=")
+        if option not in known or (equals and not option.startswith("--")):
+            return None
+        name, kind = known[option]
+        if kind == "flag":
+            if equals:
+                return None
+            options[name] = True
+            continue
+        if not equals:
+            value = next(left, "-")
+        if not value or (value.startswith("-") and not equals):
+            return None
+        made = value if kind == "text" else Path(value)
+        options[name] = (*options.get(name, ()), made) if kind == "paths" else made
+    return tuple(paths), options
+
+
+def lint(words: Sequence[str]) -> ExitCode | None:
+    """`rtshcua lint`; None where typer must read the command line."""
+    found = read(words, LINT)
+    if found is None or not found[0]:
+        return None
+    from rtshcua.front.cli.linting.run import run
+
+    return run(Options(found[0], **found[1]))
+
+
+def check(words: Sequence[str]) -> ExitCode | None:
+    """`rtshcua check`; None where typer must read the command line."""
+    found = read(words, CHECK)
+    if found is None or not found[0]:
+        return None
+    from rtshcua.front.cli.checked import check_sources
+
+    return check_sources(found[0], **found[1])
+
+
+def recall(words: Sequence[str]) -> ExitCode | None:
+    """`rtshcua recall`; None where typer must read the command line."""
+    found = read(words, RECALL)
+    if found is None or len(found[0]) > 1:
+        return None
+    from rtshcua.front.cli import recalling
+
+    return recalling.recall(next(iter(found[0]), None), **found[1])
+
+
+QUICK: Mapping[str, Callable[[Sequence[str]], ExitCode | None]] = {"lint": lint, "check": check, "recall": recall}

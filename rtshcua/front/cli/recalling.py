@@ -1,0 +1,91 @@
+"""Calling a flight home: signing a recall, and handing in one that was signed before. Without typer: it hurries."""
+
+import time
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
+from rtshcua.front.cli.faults import fail, refuse, untrusted
+from rtshcua.wire import names
+from rtshcua.wire.bundle import Bundle
+from rtshcua.wire.document import MAX_DOCUMENT, kind_of
+from rtshcua.wire.keys import SigningKey
+from rtshcua.wire.recall import RecallDocument, sign_recall
+from rtshcua.wire.untrusted import Untrusted
+
+#: how long a recall is good for, in s, where nobody says
+GOOD_S: Final = 300
+#: where another mission flies: one that an agent handed in has a bundle of its own
+HELP: Final = {"other-mission": "`--policy` calls home whatever flies under the policy of this bundle"}
+_SENT_HELP: Final = HELP | {"expired": "sign another one: `rtshcua recall BUNDLE --to SOCKET`"}
+
+
+class Recalled(NamedTuple):
+    """What is called home: the bundle that flies, the id of the flight, or empty for all under the policy."""
+
+    flying: Bundle
+    flight: bytes
+
+    @property
+    def name(self) -> str:
+        """What a person calls it."""
+        flying = self.flying
+        what = f"`{flying.mission.name}`" if self.flight else f"all under `{flying.policy.name}`"
+        return f"{what} on `{flying.policy.vehicle.identity}`"
+
+    def sign(self, key: SigningKey, now_us: int, seconds: int) -> bytes:
+        """The signed recall, good from now on for so many seconds. Raises `Untrusted`."""
+        flying = self.flying
+        digests = (flying.mission_digest, b"") if self.flight else (b"", flying.policy_digest)
+        vehicle = flying.policy.vehicle.identity
+        said = RecallDocument(vehicle, self.flight, *digests, now_us, now_us + seconds * 1_000_000)
+        return sign_recall(said, key)
+
+
+def recall(
+    bundle: Path | None, *, policy: bool = False, seconds: int = GOOD_S, to: Path | None = None,
+    output: Path | None = None, send: Path | None = None, root: Path | None = None, flight: str | None = None,
+    person: str | None = None, approval_key: Path | None = None, passphrase_file: Path | None = None,
+    as_json: bool = False,
+) -> ExitCode:  # fmt: skip
+    """`rtshcua recall`. Raises OSError."""
+    if send is not None:
+        return _send(send, to, alone=bundle is None and output is None, as_json=as_json)
+    if bundle is None:
+        return fail(ExitCode.USAGE, "which flight is called home?", "give its bundle, or `--send` one signed before")
+    if to is None and output is None:
+        return fail(ExitCode.USAGE, "the recall has to go somewhere", WHERE)
+    now_us = time.time_ns() // 1000
+    from rtshcua.adapters.store.keystore import KeyStore  # loads what opens keys, which `--send` does without
+    from rtshcua.front.cli.unlock import unlock_person
+
+    try:
+        flying = subject(bundle, [], root, now_us, stops=True)
+        named = b"" if policy else flight_id(flight, to)
+        if named is None:
+            return fail(ExitCode.USAGE, "the recall of a mission is for one flight", f"{WHOSE}, or `--policy`")
+        recalled = Recalled(flying, named)
+        key = unlock_person(KeyStore(data_folder()), person, None, path=approval_key, passphrase_file=passphrase_file)
+        document = recalled.sign(key, now_us, seconds)
+    except Untrusted as error:
+        return refuse(untrusted(error))
+    return deliver(document, f"recalled {recalled.name}", to=to, output=output, as_json=as_json, help=HELP)
+
+
+def _send(path: Path, to: Path | None, *, alone: bool, as_json: bool) -> ExitCode:
+    """Hand in a recall that was signed before. The flight verifies it: here it is only looked at."""
+    if not alone or to is None:
+        text = "`--send` hands in a recall that was signed before"
+        return fail(ExitCode.USAGE, text, "it goes with `--to SOCKET`, without a bundle and without `--output`")
+    document = read_regular(path, MAX_DOCUMENT)
+    try:
+        kind = kind_of(document)
+    except Untrusted as error:
+        return refuse(untrusted(error))
+    if kind is not names.RECALL:
+        text = f"`{path}` is no recall"
+        return fail(ExitCode.INPUT, text, "`rtshcua recall BUNDLE --flight ID -o FILE` signs one")
+    return deliver(document, f"sent `{path}`", to=to, output=None, as_json=as_json, help=_SENT_HELP)

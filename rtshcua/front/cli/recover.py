@@ -1,0 +1,178 @@
+"""`rtshcua recover`: end the log of a flight that broke off."""
+
+import json
+import secrets
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.store.folders import data_folder, state_folder
+from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.adapters.store.last_log import known_end
+from rtshcua.adapters.store.recovery import InUse, Recovered, Signer, examine, recover
+from rtshcua.adapters.utc import UtcWatch
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.finding import Finding
+from rtshcua.evidence.recovery import RECOVERABLE, Examined, State
+from rtshcua.front.cli.faults import fail, of_each, tell
+from rtshcua.front.cli.outcome import is_log, logs_meant
+from rtshcua.front.cli.recognising import no_log
+from rtshcua.front.cli.stdout import out, out_json
+from rtshcua.front.cli.unlock import unlock
+from rtshcua.wire.keys import SEED_BYTES, Duty, SigningKey
+
+app = typer.Typer(add_completion=False)
+
+_CODES = {
+    State.CLOSED: ExitCode.OK,
+    State.WHOLE: ExitCode.INCOMPLETE,
+    State.TORN: ExitCode.INCOMPLETE,
+    State.UNBEGUN: ExitCode.EVIDENCE,
+    State.TAMPERED: ExitCode.EVIDENCE,
+    State.FOREIGN: ExitCode.UNTRUSTED,
+}
+_KEPT = "nothing was changed: every byte of it is where it was"
+_HELPS = {
+    State.TAMPERED: f"{_KEPT}; `rtshcua verify-log` says more",
+    State.FOREIGN: f"{_KEPT}; `--log-key` takes the key that the flight was made with",
+    State.UNBEGUN: f"{_KEPT}; the flight broke off before it began",
+}
+
+
+@app.command("recover")
+def recover_logs(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, folders of runs, or folders of these")],
+    log_key: Annotated[Path | None, typer.Option(help="the key that signs logs (the key store's)")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="say what would be kept and discarded; no key needed")]
+    = False,
+    state_dir: Annotated[Path | None, typer.Option(help="where it is kept which logs were closed (the data folder)")]
+    = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object a log on the standard output")] = False,
+) -> ExitCode:  # fmt: skip
+    """End the log of a flight that broke off: keep what is whole, sign it, and close it as `recovered`.
+
+    What a crash left behind the last whole record is moved to `log.discarded`. A log that was tampered with, that was
+    closed before and has lost its end since, or of which a witness saw more (`*.anchors` beside it), is left as it
+    is. It is safe to interrupt, and to repeat. With several logs the exit code is the first that is not 0.
+    """
+    signer = None
+    if not dry_run:
+        key = unlock(KeyStore(data_folder()), Duty.LOG, path=log_key, passphrase_file=passphrase_file)
+        signer = signer_of(key)
+    state = state_dir or state_folder()
+    return of_each(logs_meant(logs), lambda path, _: _recover(path, signer, state, as_json=as_json))
+
+
+def signer_of(log_key: SigningKey) -> Signer:
+    """Who ends logs with this key, by this machine's clock, in no more time than a flight can wait."""
+
+    def certify(text: bytes) -> bytes:
+        return log_key.sign(text, duty=Duty.LOG)
+
+    clock = SystemClock()
+    UtcWatch(clock)  # the kernel may vouch for it; nobody else is there
+    return Signer(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), clock.now)
+
+
+def _recover(path: Path, signer: Signer | None, state: Path, *, as_json: bool) -> ExitCode:
+    if not is_log(path):
+        return fail(ExitCode.INPUT, *no_log(path, path, _KEPT))
+    try:
+        cut = _cut(path, state)
+        if cut is not None:
+            done = cut
+        elif signer is None:
+            found = examine(path, None)
+            done = Recovered(found, False, None, found.head.prev)
+        else:
+            done = recover(path, signer)
+    except InUse as busy:
+        return fail(ExitCode.INPUT, str(busy), "a flight ends its log itself", slug="in-use")
+    code = ExitCode.OK if done.done else _code(done.found)
+    if as_json:
+        out_json(json.dumps(_object(path, done, code), ensure_ascii=False), flush=True)
+    elif done.done or done.found.state in (*RECOVERABLE, State.CLOSED):
+        out(*_told(path, done), flush=True)
+    if done.found.state in _HELPS:
+        return tell(code, f"`{path}`: {_why(done.found)}", _HELPS[done.found.state])
+    return code
+
+
+def _cut(path: Path, state: Path) -> Recovered | None:
+    """What is told of a log of which this machine knows that it was closed, and not as it ends now."""
+    end = known_end(state, path)
+    if end is None:
+        return None
+    found = examine(path, None)
+    if found.head.prev == end:
+        return None
+    text = "it was closed once, and what stands at its end now is not that: its end was cut off or written anew"
+    reason = Finding("close/missing", found.records, text, found.head.prev, end, found.kept)
+    return Recovered(found._replace(state=State.TAMPERED, reason=reason), False, None, found.head.prev)
+
+
+def _code(found: Examined) -> ExitCode:
+    slug = "" if found.reason is None else found.reason.slug
+    if slug == "genesis/format":
+        return ExitCode.UNTRUSTED
+    if slug.startswith("anchor/"):
+        return ExitCode.ANCHOR
+    if found.state is State.UNBEGUN and slug.startswith("record/"):
+        return ExitCode.INPUT  # a whole line, and none of ours
+    return _CODES[found.state]
+
+
+def _why(found: Examined) -> str:
+    reason = found.reason
+    where = "" if reason is None else f"record {reason.record}, octet {reason.offset}: {reason.text}"
+    match found.state:
+        case State.TAMPERED:
+            return f"this was no crash, and it is not signed: {where}"
+        case State.FOREIGN:
+            return "its flight was made with another log key"
+        case _:
+            none = "it is not a log of this program" if _code(found) is ExitCode.INPUT else ""
+            return f"{none or 'there is no first record to go on from'}: {where or 'it is empty'}"
+
+
+def _told(path: Path, done: Recovered) -> list[str]:
+    found = done.found
+    if found.state is State.CLOSED:
+        return [f"{path}: closed, {_many(found.records)}; nothing to recover"]
+    loose = found.records - found.sealed
+    said = [f"{path}: {'recovered' if done.done else 'can be recovered'}, {_many(found.records)} kept"]
+    if loose:
+        said.append(f"  the last {loose} were not sealed yet: nothing but the chain speaks for them before this")
+    if found.reason is not None:
+        where = "" if done.discarded is None else f" are in {done.discarded.name}"
+        said.append(f"  {found.discarded} octets behind them{where}: {found.reason.text}")
+    return said
+
+
+def _object(path: Path, done: Recovered, code: ExitCode) -> dict[str, object]:
+    found = done.found
+    return {
+        "log": str(path),
+        "state": found.state.value,
+        "recovered": done.done,
+        "exit_code": int(code),
+        "records": found.records,
+        "unsealed": found.records - found.sealed,
+        "kept_bytes": found.kept,
+        "discarded_bytes": found.discarded,
+        "discarded_sha256": found.discarded_digest.hex(),
+        "discarded": None if done.discarded is None else str(done.discarded),
+        "reason": _finding(found.reason),
+        "last": done.last,
+    }
+
+
+def _finding(reason: Finding | None) -> dict[str, object] | None:
+    return None if reason is None else reason._asdict()
+
+
+def _many(records: int) -> str:
+    return f"{records} record{'' if records == 1 else 's'}"

@@ -1,0 +1,126 @@
+"""How commands read sources and compile them: the file system, the shipped library and the dialect, put together."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua import library
+from rtshcua.adapters.store.readable import Readable
+from rtshcua.adapters.store.reading import open_regular
+from rtshcua.diagnostics.codes import DUPLICATE_NAME
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.elaborate.settings import parse_settings
+from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.language.paths import shown
+from rtshcua.ground.pipeline.pins import PROPOSED, Pins, policies_of
+from rtshcua.ground.pipeline.program import Checked, Compiled, compile_program, examine_program
+from rtshcua.mavlink import dialect
+from rtshcua.wire.names import BUNDLE
+
+
+class Reading(NamedTuple):
+    """A program, and how findings on it are shown to whoever wrote it."""
+
+    program: Program
+    pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]]
+
+
+def read_sources(paths: Sequence[Path], pins: Pins = PROPOSED) -> Reading:
+    """Sources and all that they import. The first may be a mission specification (.json), as an agent proposes it;
+    what it claims beyond `pins` is a finding.
+    """
+    first, shipped = paths[0], str(library.root())
+    readable = Readable(shipped, paths)
+    rest = [str(path) for path in paths[1:]]
+    if first.suffix.lower() == ".json":
+        from rtshcua.ground.agent.specification import load_specification  # brings pydantic
+
+        program, specification = load_specification(
+            str(first), rest, readable.read, shipped, readable.listing, readable.pack, pins
+        )
+        return Reading(program, specification.pointed)
+    return Reading(load([str(first), *rest], readable.read, shipped, readable.listing, packs=readable.pack), tuple)
+
+
+def read_text(name: str, text: str) -> Reading:
+    """A source that is not written yet, as if it were in the file `name`, and all that it imports."""
+    readable = Readable(str(library.root()), [name])
+
+    def read(path: str) -> bytes:
+        return text.encode("utf-8") if path == shown(name) else readable.read(path)
+
+    return Reading(load([name], read, str(library.root()), readable.listing, packs=readable.pack), tuple)
+
+
+def compile_sources(
+    paths: Sequence[Path],
+    *,
+    mission: str | None,
+    issued_at_us: int,
+    values: Sequence[str] = (),
+    pins: Pins | None = None,
+) -> tuple[Compiled, Mapping[str, Source]]:
+    """Compile the mission in the first of `paths`; gives the sources too, for showing what was found in them.
+
+    `values` are those of the mission's parameters, `name=value` each. With `pins` it is to be signed: what it claims
+    beyond them is a finding; the source of a specification is `agent` where they do not name one, and its policy is one
+    of those in the sources after the first.
+    """
+    given = pins
+    if paths[0].suffix.lower() == ".json":
+        given = PROPOSED if pins is None else pins._replace(source=pins.source or PROPOSED.source)
+    reading = read_sources(paths, given or PROPOSED)
+    if pins is not None and given is not None and given is not pins and pins.policies is None:
+        named = frozenset(shown(str(path)) for path in paths[1:])
+        given = given._replace(policies=policies_of(reading.program, named))
+    compiled = compile_program(
+        reading.program,
+        dialect.load(),
+        mission=mission,
+        issued_at_us=issued_at_us,
+        settings=parse_settings(values),
+        pins=given,
+    )
+    return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics)), compiled.sources
+
+
+def examine(reading: Reading, issued_at_us: int = 0) -> Checked:
+    """Everything that is wrong with a program, and what its missions take at most."""
+    checked = examine_program(reading.program, dialect.load(), issued_at_us)
+    return replace(checked, diagnostics=reading.pointed(checked.diagnostics))
+
+
+def meant(found: Iterable[Diagnostic], sources: Mapping[str, Source], given: Sequence[Path]) -> tuple[Diagnostic, ...]:
+    """Findings of a mission with what was handed in beside it: where both declare one name, say which is meant how."""
+    beside = {shown(str(path)): path for path in given[1:]}
+    return tuple(_which(each, sources, beside, given[0]) for each in found)
+
+
+def _which(found: Diagnostic, sources: Mapping[str, Source], beside: Mapping[str, Path], mission: Path) -> Diagnostic:
+    files = [found.span.file if found.span else "", *(label.span.file for label in found.labels)]
+    own = next((each for each in files if each in beside), None)
+    other = next((each for each in files if each not in beside), None)
+    if found.code is not DUPLICATE_NAME or own is None or not other:
+        return found
+    alike = other in sources and own in sources and sources[own].text == sources[other].text
+    what = f"`{own}` is a copy of `{other}`" if alike else f"`{own}` is not what `{mission}` imports"
+    help = f"{what}: leave out `--with {own}` if `{other}` is meant; else take that out of the imports of `{mission}`"
+    return replace(found, help=help)
+
+
+def no_source(path: Path) -> Refusal | None:
+    """Why a path cannot be the source of a mission: it is a folder, or a compiled bundle, of whatever version. None
+    where it may be one, and where it cannot be read, which is told of where it is read.
+    """
+    if path.is_dir():
+        return Refusal("no-source", f"`{path}` is a folder, and no source", "name the file with the mission")
+    try:
+        with open_regular(path) as file:
+            compiled = BUNDLE.name.encode() in file.read(2 * len(BUNDLE.name))
+    except OSError:
+        return None
+    help = "give the source that it was compiled from (.rts), or the specification (.json)"
+    return Refusal("usage", f"`{path}` is a bundle, and no source", help) if compiled else None

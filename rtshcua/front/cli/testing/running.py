@@ -1,0 +1,157 @@
+"""Runs the tests and flies the scenarios of files: each file is a program of its own with what it imports."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from time import perf_counter_ns
+from typing import Final, NamedTuple
+
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
+from rtshcua.diagnostics.span import Source
+from rtshcua.front.cli.progress import watched
+from rtshcua.front.cli.sources import Reading, examine, read_sources
+from rtshcua.ground.language.paths import shown
+from rtshcua.ground.pipeline.suite import scenarios as scenarios_of
+from rtshcua.ground.pipeline.suite import suite
+from rtshcua.ground.testing.case import Case, Suite, Tested
+from rtshcua.ground.testing.coverage.tally import Covered, Tally
+from rtshcua.ground.testing.flown import Flown
+from rtshcua.ground.testing.run import Ran, run_case
+from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.mavlink import dialect
+from rtshcua.virtual.flight import LATER_US
+
+#: when missions of scenarios are issued, unless they say it: a Monday in June, 10:00 UTC
+ISSUED_AT_US: Final = 1_780_308_000_000_000
+
+
+class Results(NamedTuple):
+    """What was run and flown, in the order of the files and their text; what is wrong with sources, each finding once;
+    the texts; the coverage, where it was asked for; and how many cases and scenarios there are that were not chosen,
+    of all there are the names.
+    """
+
+    ran: tuple[Ran, ...]
+    flown: tuple[Flown, ...]
+    diagnostics: tuple[Diagnostic, ...]
+    sources: dict[str, Source]
+    covered: tuple[Covered, ...] | None
+    left_out: int
+    names: frozenset[str]
+
+
+class _Work(NamedTuple):
+    """A file, by its name, and its program."""
+
+    name: str
+    reading: Reading
+
+
+def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool, quiet: bool) -> Results:
+    """Run the cases and fly the scenarios whose name has `chosen` in it, in whatever case; empty: all. `quiet`: nothing
+    is shown meanwhile.
+    """
+    work = [_Work(shown(str(path)), read_sources([path])) for path in files]
+    found: dict[tuple[object, ...], Diagnostic] = {}
+    sources: dict[str, Source] = {}
+    ran: list[Ran] = []
+    tally = Tally() if with_coverage else None
+    left_out = 0
+    names: set[str] = set()
+    scenarios: list[ScenarioFlight] = []
+    tested: set[tuple[str, int]] = set()  # where policies are declared that some test is under
+    for each in watched(work):
+        made = _suite(each.reading)
+        sources |= {**each.reading.program.sources, **made.sources}
+        for diagnostic in made.diagnostics:  # a file that two programs share has its findings once
+            found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        cases = [case for case in made.cases if chosen.casefold() in case.name.casefold()]
+        left_out += len(made.cases) - len(cases)
+        names |= {case.name for case in made.cases}
+        tested |= {_declared(one) for one in made.policies}
+        _count_policies(tally, made.policies, each.reading)
+        ran += [_run(case, tally) for case in cases]
+        of_file = _scenarios(each.reading, found, sources)
+        named = [one for one in of_file if chosen.casefold() in one.scenario.name.casefold()]
+        left_out += len(of_file) - len(named)
+        names |= {one.scenario.name for one in of_file}
+        tested |= {_declared(one.policy) for one in of_file}
+        _count_policies(tally, [one.policy for one in of_file], each.reading)
+        scenarios += named
+    flown = tuple(_fly(scenarios, tally, quiet=quiet)) if scenarios else ()
+    if tally is not None:
+        for each in work:
+            policies, wrong = _untested(each, tested)
+            _count_policies(tally, policies, each.reading)
+            for diagnostic in wrong:
+                found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        sources |= tally.sources
+    covered = None if tally is None else tally.all()
+    return Results(tuple(ran), flown, tuple(found.values()), sources, covered, left_out, frozenset(names))
+
+
+def _suite(reading: Reading) -> Suite:
+    """The cases of a program's first file. One that declares no tests is not looked at any closer: that is for `check`;
+    but tests in what cannot be read would not be seen.
+    """
+    program = reading.program
+    if not program.units or not program.units[0].tests:
+        return Suite((), program.diagnostics if has_errors(program.diagnostics) else (), sources=program.sources)
+    return suite(program, dialect.load())
+
+
+def _scenarios(
+    reading: Reading, found: dict[tuple[object, ...], Diagnostic], sources: dict[str, Source]
+) -> tuple[ScenarioFlight, ...]:
+    """The scenarios of a program's first file; what is wrong with the program is added to `found`."""
+    program = reading.program
+    if not program.units or not program.units[0].scenarios:
+        return ()
+    made = scenarios_of(program, dialect.load(), ISSUED_AT_US, LATER_US)
+    sources |= {**program.sources, **made.sources}
+    for diagnostic in made.diagnostics:
+        found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+    return made.found
+
+
+def _fly(scenarios: Sequence[ScenarioFlight], tally: Tally | None, *, quiet: bool) -> Iterator[Flown]:
+    from rtshcua.front.cli.testing.flying import Flying  # the simulated vehicle is behind it
+
+    for flown in Flying(with_coverage=tally is not None, quiet=quiet).fly(scenarios):
+        if tally is not None:
+            tally.flights(flown.scenario.policy, [one for flight in flown.flights for one in flight.reached])
+        yield flown
+
+
+def _run(case: Case, tally: Tally | None) -> Ran:
+    began_ns = perf_counter_ns()
+    ran = run_case(case)
+    ran = ran._replace(took_us=(perf_counter_ns() - began_ns) // 1_000)
+    if tally is not None:
+        tally.case(ran)
+    return ran
+
+
+def _count_policies(tally: Tally | None, policies: Iterable[Tested], reading: Reading) -> None:
+    if tally is not None:
+        for policy in policies:
+            tally.policy(policy, reading.program.units, reading.program.sources)
+
+
+def _untested(work: _Work, tested: set[tuple[str, int]]) -> tuple[list[Tested], list[Diagnostic]]:
+    """The policies that a file declares and no test is under, of which nothing is covered; and the errors for which
+    there are none.
+    """
+    units = work.reading.program.units
+    declared = units[0].policies if units and units[0].file == work.name else ()
+    if all((policy.name.span.file, policy.name.span.start) in tested for policy in declared):
+        return [], []
+    checked = examine(work.reading)
+    each = [Tested(ground.lowered, ground.prepared) for ground in checked.grounds]
+    wrong = [found for found in checked.diagnostics if found.severity is Severity.ERROR]
+    return [one for one in each if _declared(one)[0] == work.name and _declared(one) not in tested], wrong
+
+
+def _declared(tested: Tested) -> tuple[str, int]:
+    span = tested.lowered.declaration.name.span
+    return span.file, span.start

@@ -1,0 +1,111 @@
+"""What tests found, for a person: a line a test, what they cover by clause, and a line that sums it up."""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from rtshcua.diagnostics.excerpt import visible
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.front.cli.shown import many, shorten
+from rtshcua.ground.testing.coverage.coverage import share
+from rtshcua.ground.testing.coverage.tally import Covered
+from rtshcua.ground.testing.coverage.universe import Goal
+from rtshcua.ground.testing.flown import Flown
+from rtshcua.ground.testing.report import named, summary_json, told
+from rtshcua.ground.testing.run import Ran
+
+_GREEN, _RED, _BOLD, _END = "\033[32m", "\033[1;31m", "\033[1m", "\033[0m"
+_WIDTH = 100
+
+
+class Told:
+    """Writes lines, coloured where the standard output is a terminal."""
+
+    def __init__(self, sources: dict[str, Source]) -> None:
+        self._sources = sources
+        terminal = sys.stdout is not None and sys.stdout.isatty()
+        self._colours = terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+    def tests(self, ran: Sequence[Ran], *, verbose: bool) -> Iterator[str]:
+        """A line a test, below its file; with `verbose` also one for each row."""
+        for file, of_file in groupby(ran, lambda each: each.case.span.file):
+            yield self._painted(visible(file), _BOLD)
+            for _, group in groupby(of_file, lambda each: each.case.test.span):
+                cases = list(group)
+                yield self._line(cases)
+                if verbose and cases[0].case.row is not None:
+                    yield from (f"      {self._word(each.met)}  {visible(_row(each))}" for each in cases)
+
+    def scenarios(self, flown: Sequence[Flown], *, verbose: bool) -> Iterator[str]:
+        """A line a scenario, below its file; with `verbose` also how its flights ended, and what was excused."""
+        for file, of_file in groupby(flown, lambda each: each.scenario.declaration.span.file):
+            yield self._painted(visible(file), _BOLD)
+            for each in of_file:
+                flights = many(len(each.flights), "flight")
+                counted = f"{each.failed} of {flights}" if each.failed else flights
+                yield f"  {self._word(not each.failed)}  {visible(each.scenario.scenario.name)} ({counted})"
+                if verbose:
+                    yield "      " + ", ".join(f"{count} {ending}" for ending, count in each.endings.items())
+                    excused = sorted({text for flight in each.flights for text in flight.excused})
+                    yield from (f"      excused: {visible(text)}" for text in excused)
+
+    def coverage(self, covered: Sequence[Covered], *, verbose: bool) -> Iterator[str]:
+        """What is missing, clause by clause; with `verbose` also what is not."""
+        for one in covered:
+            yield from self._policy(one, verbose=verbose)
+        if len(covered) > 1:
+            reached, total = sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered)
+            yield f"\ncoverage of all: {share(reached, total)}, {reached} of {total}"
+
+    def summary(self, ran: Sequence[Ran], flown: Sequence[Flown], left_out: int) -> str:
+        """How many there were, and how they ended."""
+        found = summary_json(ran)
+        counts = [many(found["tests"], "test")] if ran or not flown else []
+        if found["cases"] != found["tests"]:
+            counts.append(many(found["cases"], "case"))
+        if flown:
+            counts.append(many(len(flown), "scenario"))
+            counts.append(many(sum(len(each.flights) for each in flown), "flight"))
+        counted = ", ".join(counts)
+        failed = found["failed"] + sum(bool(each.failed) for each in flown)
+        ended = f"{failed} failed" if failed else "all passed"
+        others = f"; {many(left_out, 'case')} not chosen" if left_out else ""
+        return self._painted(f"{counted}: {ended}", _RED if failed else _GREEN) + others
+
+    def _line(self, cases: Sequence[Ran]) -> str:
+        failed = sum(not each.met for each in cases)
+        title = visible(cases[0].case.test.name.text)
+        rows = "" if cases[0].case.row is None else f" ({many(len(cases), 'row')})"
+        if failed and cases[0].case.row is not None:
+            rows = f" ({failed} of {many(len(cases), 'row')})"
+        return f"  {self._word(not failed)}  {title}{rows}"
+
+    def _word(self, met: bool) -> str:
+        return self._painted("ok  ", _GREEN) if met else self._painted("FAIL", _RED)
+
+    def _policy(self, one: Covered, *, verbose: bool) -> Iterator[str]:
+        found = one.coverage
+        head = f"coverage of {named(found.policy)} on {found.policy.vehicle.name}: {share(found.covered, found.total)}"
+        counted = f"{found.covered} of {found.total} by {many(found.decisions, 'case')}"
+        yield f"\n{self._painted(visible(head), _BOLD)}, {counted}"
+        for line, span in zip(found.lines, one.spans, strict=True):
+            if line.missing or verbose:
+                yield f"  {visible(self._place(span))}  {visible(shorten(told(line.item), _WIDTH))}"
+                missing = ["never decided" if goal is Goal.DECIDED else f"never {goal.value}" for goal in line.missing]
+                yield f"      {', '.join(missing)}" if missing else "      covered"
+        if found.undecided:
+            yield f"  {many(len(found.undecided), 'clause')} never decided: no test would notice if they said otherwise"
+
+    def _place(self, span: Span | None) -> str:
+        if span is None or span.file not in self._sources:
+            return "-"
+        return f"{span.file}:{self._sources[span.file].position(span.start).line}"
+
+    def _painted(self, text: str, colour: str) -> str:
+        return f"{colour}{text}{_END}" if self._colours else text
+
+
+def _row(ran: Ran) -> str:
+    """The cells of a row, which stand behind the name of its test."""
+    return ran.case.name.removeprefix(ran.case.test.name.text).strip()

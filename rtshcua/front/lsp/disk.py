@@ -1,0 +1,59 @@
+"""Files as the server has them: their URIs and names, and what it reads of the disk. It writes nothing."""
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from urllib.parse import quote, unquote, urlsplit
+
+from rtshcua.adapters.store.readable import Readable
+from rtshcua.adapters.store.reading import walk
+from rtshcua.ground.editor.desk import Desk
+from rtshcua.ground.language.paths import shown
+
+SOURCE = ".rts"
+MOST = 2_000
+"""Sources of a workspace that are looked through for references."""
+_DRIVE = re.compile(r"/[A-Za-z]:(?=/|\Z)")
+
+
+def desk(library: str, readable: Readable) -> Desk:
+    """An empty desk over what may be read of the disk."""
+    return Desk(readable.read, library, readable.listing, readable.pack)
+
+
+def sources(folders: Iterable[str]) -> Iterator[str]:
+    """The sources below folders, but for hidden ones, as far as they are not too many."""
+    found = 0
+    for top in folders:
+        for place, below, files in walk(top):
+            below[:] = sorted(name for name in below if not name.startswith(".") and name != "node_modules")
+            for name in sorted(files):
+                if name.endswith(SOURCE) and not name.startswith("."):
+                    found += 1
+                    if found > MOST:
+                        return
+                    yield str(Path(place, name))
+
+
+def name_of(uri: str) -> str:
+    """The name of a text, as `shown` gives it. What is no file gets a name in the working folder that tells the URI."""
+    return shown(path_of(uri) or re.sub(r"[\\/\0]+", "_", unquote(uri)))
+
+
+def path_of(uri: str) -> str | None:
+    """The path of a `file:` URI, also of Windows (`file:///c%3A/x.rts`); None for any other."""
+    try:
+        scheme, host, path, _, _ = urlsplit(uri)
+    except ValueError:
+        return None
+    if scheme != "file" or "\0" in unquote(path):
+        return None
+    path = unquote(path)
+    if _DRIVE.match(path):
+        return path[1].lower() + path[2:]
+    return f"//{host}{path}" if host and host != "localhost" else path
+
+
+def uri_of(name: str) -> str:
+    """The URI of a file by its name."""
+    return "file://" + quote(Path(name).absolute().as_posix())

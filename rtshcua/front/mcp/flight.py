@@ -1,0 +1,123 @@
+"""The vehicle as its agent socket tells of it, followed in a thread: only its first word is waited for."""
+
+import json
+import socket
+import threading
+from collections import deque
+from pathlib import Path
+from typing import Any, Final
+
+from rtshcua.front.mcp.flight_lines import understood
+from rtshcua.ground.language.size import values_of, without_texts
+
+#: how long until it is tried again to follow, in seconds
+AGAIN_S: Final = 0.3
+#: how long the first answer about it waits for its first word, in seconds
+FIRST_S: Final = 1.0
+#: how many lines are kept, and how much they may weigh, in octets and for each value some more; the oldest let go first
+MOST_LINES: Final = 5_000
+MOST_KEPT: Final = 16 << 20
+VALUE: Final = 128
+#: a line that is longer, in octets, or has more values, is none of a flight's: a replacement's has 350 KB
+LONGEST: Final = 2 << 20
+MOST_VALUES: Final = 1 << 16
+
+
+class Following:
+    """What was told since the connection that stands, or the last one that did. Every field is replaced, never changed.
+
+    `turn` counts the lines, and wakes whoever waits.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.turn = threading.Condition()
+        self.heard = 0
+        self.connected = False
+        self._tried = False
+        self.hello: dict[str, Any] = {}
+        self.waiting: dict[str, Any] = {}
+        self.vehicle: dict[str, Any] = {}
+        self.mission: dict[str, Any] = {}
+        self.close: dict[str, Any] = {}
+        self.records: deque[dict[str, Any]] = deque(maxlen=MOST_LINES)
+        self._weights: deque[int] = deque()  # of these
+        self._kept = 0  # and their sum
+        self._ended = threading.Event()
+        self._link: socket.socket | None = None
+        threading.Thread(target=self._follow, daemon=True).start()
+
+    @property
+    def stage(self) -> str:
+        """Where it stands, in a word."""
+        if self.close:
+            return "ended"
+        if not self.connected:
+            return "unreachable"
+        return "flying" if self.mission else "waiting"
+
+    def await_first(self) -> None:
+        """Wait until it told who it is, or cannot be reached, for a short time."""
+        with self.turn:
+            self.turn.wait_for(lambda: self.connected or self._tried, FIRST_S)
+
+    def end(self) -> None:
+        """Follow no more."""
+        self._ended.set()
+        if self._link is not None:
+            self._link.close()
+
+    def _follow(self) -> None:
+        while not self._ended.is_set():
+            try:
+                with socket.socket(socket.AF_UNIX) as link:
+                    link.connect(str(self._path))
+                    self._link = link
+                    self._read(link)
+            except (OSError, ValueError, RecursionError):
+                pass  # it is gone, or says what no flight says
+            with self.turn:
+                self.connected, self._tried = False, True
+                self.turn.notify_all()
+            self._ended.wait(AGAIN_S)
+
+    def _read(self, link: socket.socket) -> None:
+        with link.makefile("rb") as lines:
+            while line := lines.readline(LONGEST):
+                bare = without_texts(line, MOST_VALUES)
+                if bare is None:
+                    raise ValueError("no line of a flight")
+                told = understood(json.loads(line))
+                with self.turn:
+                    self._take(told, len(line) + VALUE * values_of(bare))
+                    self.turn.notify_all()
+
+    def _take(self, told: dict[str, Any], weight: int) -> None:
+        self.heard += 1
+        match told.get("type"):
+            case "hello":
+                if told.get("flight") != self.hello.get("flight"):
+                    self.mission, self.close, self.vehicle = {}, {}, {}
+                    self.records = deque(maxlen=MOST_LINES)
+                    self._weights, self._kept = deque(), 0
+                self.hello, self.connected = told, True
+            case "waiting":
+                self.waiting = told
+            case "vehicle":
+                self.vehicle = told
+            case "mission":
+                self.mission = told
+            case "close":
+                self.close = told
+                self._keep(told, weight)
+            case "decision" | "effect" | "seal" | "recover":
+                self._keep(told, weight)
+
+    def _keep(self, told: dict[str, Any], weight: int) -> None:
+        self._weights.append(weight)
+        self._kept += weight
+        while len(self._weights) > MOST_LINES or self._kept > MOST_KEPT:
+            self._kept -= self._weights.popleft()
+            if self.records:
+                self.records.popleft()
+        self.records.append(told)

@@ -1,0 +1,95 @@
+"""Which log a vehicle wrote last, and what is told of it."""
+
+import json
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from reference.crashed import signer, unverified, writes
+from rtshcua.adapters.store.last_log import Earlier, LastLog
+from rtshcua.adapters.store.recovery import InUse, Recovered, recover
+
+
+@pytest.fixture
+def last(tmp_path: Path) -> LastLog:
+    return LastLog(tmp_path / "state", "quad 07/é")
+
+
+def mend(path: Path) -> Recovered:
+    return recover(path, signer(Random(1)))
+
+
+def unfinished(folder: Path, more: bytes = b"") -> tuple[Path, list[bytes]]:
+    path, log = folder / "log.jsonl", writes(Random(3))
+    lines = [next(log)[0] for _ in range(20)]
+    path.write_bytes(b"".join(lines) + more)
+    return path, lines
+
+
+def test_the_first_log_has_none_before_it(last: LastLog) -> None:
+    assert last.settle(mend) == Earlier(None)
+
+
+def test_a_closed_log_is_remembered_and_not_read_again(last: LastLog, tmp_path: Path) -> None:
+    last.begin(tmp_path / "gone", None)
+    last.end(tmp_path / "gone", None, "ab" * 32)
+    assert last.settle(mend) == Earlier("ab" * 32, log=tmp_path / "gone")
+    assert [entry.name for entry in last.path.parent.iterdir()] == ["vehicle-quad%2007%2F%C3%A9"]
+
+
+@pytest.mark.parametrize(("more", "told"), [(b"", "20 records of it are kept"), (b"x", "1 octets discarded")])
+def test_a_log_that_broke_off_is_recovered(last: LastLog, tmp_path: Path, more: bytes, told: str) -> None:
+    path, lines = unfinished(tmp_path, more)
+    last.begin(path, None)
+    earlier = last.settle(mend)
+    assert earlier.last == recover(path, signer(Random(2))).last
+    assert told in earlier.note
+    assert unverified(path, lines, len(lines)) == ""
+    assert last.settle(mend) == Earlier(earlier.last, broken_off=path, log=path)
+
+
+def test_a_log_that_never_began_is_passed_over(last: LastLog, tmp_path: Path) -> None:
+    (tmp_path / "log.jsonl").write_bytes(b'{"_prev":"000')
+    last.begin(tmp_path / "log.jsonl", "cd" * 32)
+    assert last.settle(mend) == Earlier("cd" * 32, broken_off=tmp_path / "log.jsonl")
+
+
+def test_a_log_that_was_tampered_with_is_told_and_named_as_far_as_it_goes(last: LastLog, tmp_path: Path) -> None:
+    path, lines = unfinished(tmp_path)
+    path.write_bytes(b"".join(lines[:4] + lines[5:]))
+    last.begin(path, None)
+    earlier = last.settle(mend)
+    assert earlier.last == json.loads(lines[4])["_prev"]
+    assert "was tampered with and is left as it is (record 4: " in earlier.note
+
+
+def test_a_log_that_is_not_there_any_more_is_told(last: LastLog, tmp_path: Path) -> None:
+    last.begin(tmp_path / "gone", "cd" * 32)
+    earlier = last.settle(mend)
+    assert earlier.last is None
+    assert earlier.broken_off == tmp_path / "gone"
+    assert earlier.gone
+    assert earlier.note.endswith("is no longer there: whether its flight ended is not known")
+
+
+def test_a_log_that_is_still_written_is_told(last: LastLog, tmp_path: Path) -> None:
+    def busy(path: Path) -> Recovered:
+        raise InUse(f"`{path.name}` is still being written")
+
+    last.begin(tmp_path / "log.jsonl", None)
+    earlier = last.settle(busy)
+    assert earlier.note.endswith("`log.jsonl` is still being written")
+    assert earlier.broken_off is None
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"x", b"[]", b"{}", b'{"log":1}', b'{"log":"a","last":1}', b'{"log":"a","before":"AB"}', b"\xff"]
+)
+def test_what_nobody_wrote_is_told(last: LastLog, data: bytes) -> None:
+    last.path.parent.mkdir(parents=True)
+    last.path.write_bytes(data)
+    earlier = last.settle(mend)
+    assert earlier.last is None
+    assert "it is not known which log came before" in earlier.note
+    assert earlier.note.endswith("it is damaged")

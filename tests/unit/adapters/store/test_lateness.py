@@ -1,0 +1,42 @@
+"""When a disk is told to be late, and to hang: not for the time in which the whole process stood still."""
+
+import pytest
+
+from rtshcua.adapters.store.writer import STUCK_S, Lateness
+from rtshcua.model.durability import SYNCED
+
+
+@pytest.fixture
+def lateness() -> Lateness:
+    """One that watches a line which is not on the disk yet, from second 100 on."""
+    made = Lateness()
+    made.given(1, SYNCED)
+    assert made.late(0, 100.0) is None
+    return made
+
+
+def looked(lateness: Lateness, from_s: float, to_s: float) -> str | None:
+    """What is told in that time by who looks ten times a second."""
+    told = None
+    for tenths in range(int(from_s * 10), int(to_s * 10)):
+        told = told or lateness.stuck(0, tenths / 10)
+    return told
+
+
+def test_a_disk_that_does_not_answer_hangs(lateness: Lateness) -> None:
+    assert looked(lateness, 100, 100 + STUCK_S) is None
+    assert looked(lateness, 100 + STUCK_S, 101 + STUCK_S) == "the disk has not answered for 5 s"
+
+
+def test_a_process_that_stood_still_says_nothing_of_its_disk(lateness: Lateness) -> None:
+    """Both threads were stopped, and the one that looks may go on first."""
+    assert looked(lateness, 100, 101) is None
+    assert lateness.stuck(0, 131.0) is None
+    assert lateness.late(0, 131.0) is None
+    assert looked(lateness, 131, 134) is None
+    assert looked(lateness, 134, 136) == "the disk has not answered for 5 s", "if it goes on not to"
+
+
+def test_a_line_that_is_on_the_disk_when_it_goes_on_was_never_late(lateness: Lateness) -> None:
+    assert lateness.stuck(0, 160.0) is None
+    assert lateness.kept(1)

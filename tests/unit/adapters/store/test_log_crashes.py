@@ -1,0 +1,132 @@
+"""Processes and power that fail while a log is written and while it is recovered: what was acknowledged is kept."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import pytest
+
+from reference.crashed import LOG_KEY, signer, unverified, writes
+from reference.power import Died, PowerDisk
+from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.recovery import examine, recover
+from rtshcua.adapters.store.writer import Keeper
+from rtshcua.evidence.recovery import State
+
+KINDS = ("died", "torn", "late", "failed", "short", "refused")
+
+
+class Crashed(NamedTuple):
+    """A log that was written until the process or the power failed: its lines, how many were written, and synced."""
+
+    path: Path
+    lines: list[bytes]
+    written: int
+    synced: int
+
+
+def crashed(folder: Path, chance: Random, disk: PowerDisk, *, most: int = 80) -> Crashed:
+    path, lines = folder / "log.jsonl", list[bytes]()
+    keeper: Keeper | None = None
+    log, at_s = writes(chance, seals=12), 0.0
+    with suppress(Died, OSError):
+        keeper = Keeper(EvidenceFile(path, disk))
+        for _ in range(most):
+            batch = [next(log) for _ in range(chance.choice((1, 1, 2, 5)))]
+            lines += [line for line, _ in batch]
+            at_s += chance.choice((0.0, 0.001, 0.3))
+            keeper.take(batch, at_s)
+            if chance.random() < 0.05:
+                keeper.take([], at_s)
+    return Crashed(path, lines, keeper.written if keeper else 0, keeper.synced if keeper else 0)
+
+
+def campaign(folder: Path, seed: int) -> str:
+    """One crash and its recovery, which may crash too; what is wrong with the outcome, or nothing."""
+    chance = Random(seed)
+    when, kind = chance.randint(2, 260), chance.choice(KINDS)
+    more = chance.random() < 0.3  # it does not stay at one
+
+    def fault(number: int, name: str) -> str:
+        return kind if number == when or (more and number > when and number % 7 == 0) else ""
+
+    disk = PowerDisk(fault)
+    cut = chance.random() < 0.7
+    log = crashed(folder, chance, disk)
+    if cut:
+        disk.cut_power(chance)
+    for _ in range(chance.choice((0, 0, 1, 3))):
+        when = chance.randint(0, 9)
+        again = PowerDisk(lambda number, name, when=when: kind if number == when else "")
+        with suppress(Died, OSError):
+            recover(log.path, signer(chance), disk=again)
+        if cut and kind in ("died", "torn", "late"):
+            again.cut_power(chance)
+    wrong = outcome(log, chance, cut=cut, doubtful=disk.doubtful)
+    return f"seed {seed}: {wrong}" if wrong else ""
+
+
+def outcome(log: Crashed, chance: Random, *, cut: bool, doubtful: bool) -> str:
+    """What is wrong with a log once it was recovered, or nothing. After a power cut only what was synced must be there.
+
+    `doubtful`: a sync had failed; if the power then goes, what is lost may stand before a signed record.
+    """
+    if not log.path.exists() or examine(log.path, LOG_KEY.public).state is State.UNBEGUN:
+        return "" if log.synced == 0 and (cut or log.written == 0) else "the beginning is lost"
+    done = recover(log.path, signer(chance))
+    if cut and doubtful and done.found.state is State.TAMPERED:
+        return ""
+    if done.found.state not in (State.TORN, State.WHOLE, State.CLOSED):
+        return f"{done.found.state} {done.found.reason}"
+    return unverified(log.path, log.lines, log.synced if cut else log.written)
+
+
+def campaigns(seeds: range) -> list[str]:
+    wrong = []
+    for seed in seeds:
+        with TemporaryDirectory() as folder:
+            wrong.append(campaign(Path(folder), seed))
+    return [text for text in wrong if text]
+
+
+def each_operation(kinds: Sequence[str], step: int) -> list[str]:
+    """Every fault at every operation (or each so many) of a writer, with and without a power cut; what is wrong."""
+    wrong, number = [], 0
+    over = False
+    while not over:
+        for kind in kinds:
+            for cut in (False, True):
+                with TemporaryDirectory() as folder:
+                    disk = PowerDisk(lambda now, name, number=number, kind=kind: kind if now == number else "")
+                    log = crashed(Path(folder), Random(4), disk, most=30)
+                    if cut:
+                        disk.cut_power(Random(number))
+                    text = outcome(log, Random(number), cut=cut, doubtful=disk.doubtful)
+                if text:
+                    wrong.append(f"{kind} at {number}, power {'cut' if cut else 'on'}: {text}")
+                over = disk.operations <= number
+        number += step
+    return wrong
+
+
+@pytest.mark.slow
+def test_what_was_acknowledged_is_kept_when_process_or_power_fail() -> None:
+    assert campaigns(range(25)) == []
+
+
+@pytest.mark.slow
+def test_what_was_acknowledged_is_kept_whatever_operation_fails() -> None:
+    assert each_operation(KINDS, 29) == []
+
+
+@pytest.mark.soak
+def test_what_was_acknowledged_is_kept_when_they_fail_again_and_again() -> None:
+    assert campaigns(range(1_000, 11_000)) == []
+
+
+@pytest.mark.soak
+def test_what_was_acknowledged_is_kept_whichever_operation_fails() -> None:
+    assert each_operation(KINDS, 1) == []

@@ -1,0 +1,31 @@
+"""docs/linting.md is true."""
+
+import re
+from pathlib import Path
+
+from rtshcua.diagnostics import codes
+from rtshcua.front.cli.linting.options import FORMATS
+from rtshcua.ground.project.settings import Settings, parse_settings
+
+
+def page(checkout: Path) -> str:
+    return (checkout / "docs" / "linting.md").read_text(encoding="utf-8")
+
+
+def test_the_table_has_every_rule(checkout: Path) -> None:
+    rows = re.findall(r"^\| (E\d+) \| `([a-z-]+)` \|", page(checkout), re.MULTILINE)
+    rules = [code for code in codes.REGISTRY.values() if code.id.startswith("E13")] + [codes.NOT_FORMATTED]
+    assert rows == [(code.id, code.slug) for code in rules]
+
+
+def test_the_configuration_that_it_shows_is_one(checkout: Path) -> None:
+    shown = re.search(r"^```toml\n(.*?)^```$", page(checkout), re.DOTALL | re.MULTILINE)
+    assert shown is not None
+    found = parse_settings(shown[1], "rtshcua.toml")
+    assert isinstance(found, Settings), found
+    assert [each.pattern for each in found.lint.ignored] == [None, "missions/**"]
+
+
+def test_the_formats_that_it_tells_of(checkout: Path) -> None:
+    told = page(checkout).split("| `--format` | is |")[1]
+    assert tuple(re.findall(r"^\| `(\w+)` \|", told, re.MULTILINE)) == FORMATS

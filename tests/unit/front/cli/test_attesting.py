@@ -1,0 +1,128 @@
+"""The boundary's key and its sessions, as a run has them."""
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.adapters.store.boundary import BoundaryStore
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import app
+from rtshcua.front.cli.attesting import BoundarySession, Elsewhere, boundary_key
+from rtshcua.front.cli.refused import Refused
+from rtshcua.wire.boundary_chain import START
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.trust import TrustRoot, open_root
+from virtual import case
+
+NOW_US = case.flat.ISSUED
+
+
+@pytest.fixture
+def store() -> KeyStore:
+    assert app.main(["keys", "init"]) == ExitCode.OK
+    return KeyStore(data_folder())
+
+
+def root(store: KeyStore) -> TrustRoot:
+    return open_root(store.root(), pinned=store.pin(), now_us=0)
+
+
+def slug(store: KeyStore, of: TrustRoot, path: Path | None = None) -> str:
+    with pytest.raises(Refused) as refused:
+        boundary_key(of, "quad-07", NOW_US, store, path, None)
+    return refused.value.slug
+
+
+def test_the_key_store_s_key_or_another_file(store: KeyStore) -> None:
+    own = store.signing_key(Duty.BOUNDARY)
+    path = store.key_path(Duty.BOUNDARY)
+    for given in (None, path):
+        found = boundary_key(root(store), "quad-07", NOW_US, store, given, None)
+        assert found is not None
+        assert found.kid == own.kid
+
+
+def test_a_root_that_names_none_asks_for_none(store: KeyStore) -> None:
+    of = root(store)
+    others = tuple(key for key in of.keys if key.duty is not Duty.BOUNDARY)
+    elsewhere = replace(store.signing_key(Duty.BOUNDARY).verification(vehicles=("quad-08",)))
+    for keys in (others, (*others, elsewhere)):
+        assert boundary_key(replace(of, keys=keys), "quad-07", NOW_US, store, None, None) is None
+
+
+def test_no_key_or_another_is_refused(store: KeyStore) -> None:
+    of = root(store)
+    stranger = replace(case.BOUNDARY_KEY.verification(vehicles=("*",)))
+    others = tuple(key for key in of.keys if key.duty is not Duty.BOUNDARY)
+    assert slug(store, replace(of, keys=(*others, stranger))) == "unknown-key"
+    assert slug(store, of, store.key_path(Duty.LOG)) == "wrong-duty"
+    store.key_path(Duty.BOUNDARY).unlink()
+    assert slug(store, of) == "no-boundary-key"
+
+
+def test_sessions_follow_one_another(tmp_path: Path) -> None:
+    store = BoundaryStore(tmp_path, "quad-07")
+    first = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    assert first.key == (case.BOUNDARY_KEY, 1, START)
+    first.begun(b"a" * 32, 1)
+    broken_off = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    assert broken_off.key == (case.BOUNDARY_KEY, 2, b"a" * 32)
+    first.ended(b"b" * 32)
+    assert BoundarySession(store, case.BOUNDARY_KEY, aloft=False).key == (case.BOUNDARY_KEY, 2, b"b" * 32)
+
+
+def test_a_state_folder_that_was_put_back_shows_where_the_boundary_counts_itself(tmp_path: Path) -> None:
+    store = BoundaryStore(tmp_path, "quad-07")
+    store.keep(2, b"a" * 32)
+    session = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    session.begun(b"b" * 32, 8)
+    assert "counts 2 sessions of the boundary, its own process 7" in session.note
+    assert store.kept() == (8, b"b" * 32), "and goes on from there"
+    same = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    same.begun(b"c" * 32, 9)
+    assert not same.note
+
+
+def test_a_key_that_the_boundary_has_is_not_held_here(tmp_path: Path) -> None:
+    session = BoundarySession(BoundaryStore(tmp_path, "quad-07"), Elsewhere(), aloft=False)
+    assert session.key == (None, 1, START)
+    session.begun(b"a" * 32, 1)
+    assert BoundaryStore(tmp_path, "quad-07").kept() == (1, b"a" * 32)
+
+
+def test_nothing_flies_where_a_session_was_to_begin_and_did_not(tmp_path: Path) -> None:
+    store = BoundaryStore(tmp_path, "quad-07")
+    with pytest.raises(OSError, match="cannot keep that its session begins"):
+        BoundarySession(store, case.BOUNDARY_KEY, aloft=False).begun(START, None)
+    BoundarySession(store, case.BOUNDARY_KEY, aloft=True).begun(START, None)
+
+
+def test_without_a_key_nothing_is_kept(tmp_path: Path) -> None:
+    session = BoundarySession(BoundaryStore(tmp_path, "quad-07"), None, aloft=False)
+    session.begun(b"a" * 32, None)
+    session.ended(b"b" * 32)
+    assert (session.key, list(tmp_path.iterdir())) == (None, [])
+
+
+def test_what_cannot_be_known_or_kept_holds_back_nothing_that_is_in_the_air(tmp_path: Path) -> None:
+    store = BoundaryStore(tmp_path, "quad-07")
+    store.keep(1, b"a" * 32)
+    store.path.write_bytes(b"x")
+    with pytest.raises(Refused, match="damaged"):
+        BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    session = BoundarySession(store, case.BOUNDARY_KEY, aloft=True)
+    assert session.key == (case.BOUNDARY_KEY, 0, START)
+    assert "brought down all the same" in session.note
+    session.begun(b"a" * 32, 0)
+    session.ended(b"b" * 32)
+    assert store.path.read_bytes() == b"x"
+    store.path.unlink()
+    sound = BoundarySession(store, case.BOUNDARY_KEY, aloft=True)
+    store.path.mkdir()
+    with pytest.raises(OSError, match="no regular file"):
+        BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    sound.begun(b"a" * 32, None)
+    sound.ended(b"b" * 32)

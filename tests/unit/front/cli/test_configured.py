@@ -1,0 +1,87 @@
+"""`--set`: which parameters an operator may name on a command line, and what is said of others."""
+
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict
+from rtshcua.adapters.store.owed import OwedParameters
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import app
+from rtshcua.front.cli.configured import settings_of, would_set
+from rtshcua.front.cli.doctor import _owed
+from rtshcua.mavlink.parameters import value_of
+from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed, unsettable
+from rtshcua.simulation.process import config_of, main, parser
+from virtual.rows import rows
+
+REFUSED = [
+    (["FENCE_RADIUS"], "is not NAME=VALUE"),
+    (["FENCE_RADIUS=wide"], "is not NAME=VALUE"),
+    (["FENCE_RADIUS=nan"], "is not NAME=VALUE"),
+    (["FENCE_RADIUS=1e60"], "is not NAME=VALUE"),
+    (["FENCE_RADIUS=5"], "is set from 30 to 10000, and not to 5"),
+    (["ARMING_CHECK=0"], "is none of the parameters that are set for a flight"),
+    (["FENCE_TYPE=3"], "is set to 4, 5, 6, 7, 12, 13, 14, 15, and not to 3"),
+    (["GF_ACTION=0"], "is set to 2, 3, 5, and not to 0"),
+    (["FENCE_RADIUS=50", "FENCE_RADIUS=60"], "`FENCE_RADIUS` is given twice"),
+]
+
+
+@pytest.mark.parametrize("command", [["run", "x.bundle"], ["doctor", "--connect", "udpin:127.0.0.1:9"]])
+def test_what_may_not_be_set_is_said_before_anything_else(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for words, says in REFUSED:
+        assert app.main([*command, *(f"--set={word}" for word in words)]) == ExitCode.USAGE
+        assert says in capsys.readouterr().err, words
+
+
+def test_nothing_is_set_of_a_vehicle_that_is_much_faster_than_life(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["run", "x.bundle", "--set=FENCE_RADIUS=50"]
+    assert app.main([*words, "--speed=6"]) == ExitCode.USAGE
+    assert "`--set` goes with a `--speed` of 5 at most" in capsys.readouterr().err
+    for more in (["--speed=5"], ["--speed=6", "--dry-run"]):
+        assert app.main([*words, *more]) == ExitCode.INPUT, "there is no such bundle"
+
+
+def test_what_may_be_set_is_read_as_a_number() -> None:
+    read = settings_of(["FENCE_RADIUS=250", "FENCE_ALT_MAX=80.5"])
+    assert {name: value_of(bits) for name, bits in read.items()} == {"FENCE_RADIUS": 250.0, "FENCE_ALT_MAX": 80.5}
+    assert would_set(read) == [
+        "a flight would set FENCE_RADIUS to 250, FENCE_ALT_MAX to 80.5, and is judged so; nothing is set here"
+    ]
+    assert settings_of(None) == {}
+    assert would_set({}) == []
+
+
+@rows("name", sorted(SETTABLE))
+def test_the_bounds_of_each_are_its_own(name: str) -> None:
+    accepted = SETTABLE[name]
+    low, high = float(accepted[0]), float(accepted[-1])
+    for value, good in ((low, True), (high, True), (low - 1, False), (high + 1, False)):
+        (bits,) = settings_of([f"{name}={value}"]).values()
+        assert (unsettable(name, bits) is None) == good
+
+
+def test_the_doctor_says_what_a_run_that_broke_off_has_left(tmp_path: Path) -> None:
+    debts = OwedParameters(tmp_path, "quad")
+    assert _owed(debts) == []
+    fifty, wide = settings_of(["A=50"])["A"], settings_of(["A=300"])["A"]
+    debts.keep({"FENCE_RADIUS": Owed(fifty, wide)})
+    (found,) = _owed(OwedParameters(tmp_path, "quad"))
+    assert found.verdict is MissionVerdict.WARN
+    assert "FENCE_RADIUS from 300 to 50" in found.found
+    (tmp_path / "parameters" / "vehicle-quad").write_text("?")
+    (found,) = _owed(OwedParameters(tmp_path, "quad"))
+    assert "is damaged" in found.found
+
+
+def test_the_simulated_vehicle_takes_what_its_owner_set(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--port", "9", "--flavour", "ardupilot", "--parameter", "FENCE_RADIUS=50", "--parameter=RTL_ALT=3000"]
+    assert config_of(parser().parse_args(words)).parameters == (("FENCE_RADIUS", 50.0), ("RTL_ALT", 3_000.0))
+    assert main([*words, "--parameter", "GF_ACTION=1"]) == 2
+    assert "this vehicle has no parameter `GF_ACTION`" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        parser().parse_args([*words, "--parameter", "FENCE_RADIUS=wide"])
+    assert "is not NAME=VALUE" in capsys.readouterr().err

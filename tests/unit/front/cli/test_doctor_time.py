@@ -1,0 +1,91 @@
+"""By which time of day `doctor` judges: the one that a run would take, whoever decides."""
+
+from pathlib import Path
+from struct import Struct
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from reference.flat_case import MISSION, POLICY
+from reference.world import START
+from rtshcua.adapters.boundary_process import BoundaryError
+from rtshcua.adapters.utc import TimeOfDay
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import doctor
+from rtshcua.front.cli.app import main
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.isolated import TIME
+from rtshcua.wire.clock import Source
+
+SOCKET = Path("run/quad-07")
+TOLD = Struct(">BqqqQ")
+
+
+@pytest.mark.parametrize(
+    ("apart", "keyed", "counts"), [(True, False, False), (True, True, True), (False, False, True), (False, True, True)]
+)
+def test_of_a_run_on_this_machine(monkeypatch: pytest.MonkeyPatch, apart: bool, keyed: bool, counts: bool) -> None:
+    monkeypatch.setattr(doctor, "kernel_error_us", lambda: None)
+    assert doctor._time_of_day(None, 500_000, keyed=keyed, apart=apart) == TimeOfDay(None, counts, 500_000)
+
+
+@pytest.mark.parametrize(
+    ("source", "linked", "found"),
+    [
+        (Source.KERNEL, False, TimeOfDay(7, vehicle=False, listens=True)),
+        (Source.OPERATOR, False, TimeOfDay(None, vehicle=False, stated_us=7, listens=True)),
+        (Source.UNKNOWN, False, TimeOfDay(None, vehicle=False, listens=True)),
+        (Source.UNKNOWN, True, TimeOfDay(None, vehicle=True, listens=True)),
+        (Source.SHARED, True, TimeOfDay(9, vehicle=True, listens=True)),
+    ],
+)
+def test_of_a_boundary_that_listens(
+    monkeypatch: pytest.MonkeyPatch, source: Source, linked: bool, found: TimeOfDay
+) -> None:
+    """It is asked as a run asks that waits for no more, and let go."""
+    asked: list[bytes] = []
+
+    def call(octets: bytes) -> bytes:
+        asked.append(octets)
+        return b"\0" + TOLD.pack(source, 5, 6, 7, 0)
+
+    def close() -> None:
+        asked.append(b"closed")
+
+    made: Any = SimpleNamespace(link_name=b"name" if linked else None, call=call, close=close)
+    monkeypatch.setattr(doctor, "ListeningBoundary", lambda path: made)
+    monkeypatch.setattr(doctor, "kernel_error_us", lambda: 9)
+    assert doctor._time_of_day(SOCKET, None, keyed=False, apart=True) == found
+    assert asked == [bytes([TIME, True]), b"closed"]
+
+
+def test_of_one_that_does_not_answer_is_said_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nobody(path: Path) -> None:
+        raise BoundaryError("not-begun", "nobody answers", "start it")
+
+    monkeypatch.setattr(doctor, "ListeningBoundary", nobody)
+    monkeypatch.setattr(doctor, "kernel_error_us", lambda: 9)
+    assert doctor._time_of_day(SOCKET, None, keyed=False, apart=True) == TimeOfDay(9, listens=True)
+
+
+def test_a_boundary_that_listens_is_told_in_its_own_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["doctor", "--connect", "udpin:127.0.0.1:1", "--utc-error", "1s", "--boundary-socket", str(SOCKET)]
+    assert main(words) == ExitCode.USAGE
+    assert "its own command line" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("time", "stops"),
+    [
+        (TimeOfDay(20_000), True),
+        (TimeOfDay(None, stated_us=500_000), True),
+        (TimeOfDay(20_000, stated_us=1 << 50), True),
+        (TimeOfDay(None), False),
+    ],
+)
+def test_a_mission_that_expired_stops_where_the_time_is_known(time: TimeOfDay, stops: bool) -> None:
+    later = Now(START.monotonic_us, START.utc_us + (1 << 40), START.utc_error_us)
+    found = doctor._expired(POLICY, MISSION, later, time)
+    assert [each.slug for each in found] == ["mission/expired"] * stops
+    assert doctor._expired(POLICY, MISSION, START, time) == []

@@ -1,0 +1,120 @@
+"""`run --dry-run` while it waits: it says what for, ends when asked to, and its own wait ages nothing."""
+
+import json
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from reference.flat_case import LINK
+from reference.world import START, FakeVehicle, loaded
+from rtshcua.adapters.vehicle.px4 import PX4
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import dry_run
+from rtshcua.front.cli.interrupts import Wish
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.ports import Event, Readings, Ready
+
+SECOND = 1_000_000
+
+
+class Told:
+    """The parameters of a vehicle that has one only."""
+
+    values = {"RTL_RETURN_ALT": 30.0}  # noqa: RUF012
+
+    def read(self, name: str) -> None:
+        """It is asked for."""
+
+    def is_known(self, name: str) -> bool:
+        return name in self.values
+
+
+class World:
+    """A vehicle that becomes ready after so many seconds of the machine; its clock runs `speed` times as fast."""
+
+    def __init__(self, ready_s: float, *, speed: int = 1, wish_s: float = 1e9, missing: int | None = None) -> None:
+        self.s = 0.0
+        self.said: list[str] = []
+        self._ready_s, self._speed, self._wish_s, self._missing = ready_s, speed, wish_s, missing
+        self.driver = SimpleNamespace(unready="its own checks before arming fail", flavour=PX4, settings=Told())
+
+    def monotonic(self) -> float:
+        return self.s
+
+    def now(self) -> Now:
+        passed_us = round(self.s * SECOND) * self._speed
+        return Now(START.monotonic_us + passed_us, START.utc_us + passed_us, START.utc_error_us)
+
+    def us_in(self, seconds: float) -> int:
+        return round(seconds * SECOND) * self._speed
+
+    def wish(self) -> Wish | None:
+        return Wish.LAND if self.s >= self._wish_s else None
+
+    def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
+        self.s += 0.5
+        values = FakeVehicle().values.items()
+        now_us = self.now().monotonic_us
+        events: list[Event] = [Readings(now_us, tuple(each for each in values if each[0] != self._missing))]
+        if self.s >= self._ready_s and self.driver.unready is not None:
+            self.driver.unready = None
+            events.append(Ready(now_us))
+        return events
+
+
+def rehearsed(
+    world: World, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], **words: Any
+) -> tuple[ExitCode, dict[str, Any]]:
+    monkeypatch.setattr(dry_run, "time", world)
+    code = dry_run.dry_run(
+        loaded(), world, world, world, [], as_json=True, say=world.said.append, **words  # type: ignore[arg-type]
+    )  # fmt: skip
+    said: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert said["exit_code"] == code
+    return code, said
+
+
+def test_it_says_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    world = World(12)
+    code, said = rehearsed(world, monkeypatch, capsys, notes=["the radio"])
+    assert (code, said["ready"], said["notes"]) == (ExitCode.OK, True, ["the radio"])
+    waits = "waiting for the vehicle: its own checks before arming fail; until 60 s"
+    assert world.said == ["note: the radio", waits]
+
+
+def test_interrupted_it_says_how_it_stands(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = rehearsed(World(1e9, wish_s=7), monkeypatch, capsys)
+    assert code is ExitCode.INTERRUPTED
+    assert (said["interrupted"], said["ready"], len(said["steps"])) == (True, False, 4)
+
+
+def test_its_own_wait_makes_nothing_stale(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = rehearsed(World(59, speed=50), monkeypatch, capsys)
+    assert {step["reason"] for step in said["steps"]} == {"admitted"}
+    assert code is ExitCode.OK
+
+
+def test_what_it_does_not_tell_is_not_set_and_would_not_begin(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert rehearsed(World(1), monkeypatch, capsys, sets=["RTL_RETURN_ALT"])[0] is ExitCode.OK
+    world = World(1)
+    code, said = rehearsed(world, monkeypatch, capsys, sets=["RTL_RETURN_ALT", "FENCE_RADIUS"])
+    assert code is ExitCode.REFUSED
+    untold = "it does not tell `FENCE_RADIUS`, which is to be set"
+    assert said["refusal"] == f"{untold}; `FENCE_RADIUS` is a parameter of ArduPilot, and this is PX4"
+    assert dry_run.SETTINGS_S <= world.s <= dry_run.SETTINGS_S + 1
+
+
+def test_what_flew_before_would_not_begin(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = rehearsed(World(1), monkeypatch, capsys, refusal="a bundle flies once")
+    assert (code, said["refusal"]) == (ExitCode.REFUSED, "a bundle flies once")
+
+
+def test_a_signal_that_cannot_come_is_not_waited_for_in_hope(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert rehearsed(World(1, missing=LINK), monkeypatch, capsys)[0] is ExitCode.OK
+    assert rehearsed(World(1, missing=LINK), monkeypatch, capsys, unheard=frozenset({LINK}))[0] is ExitCode.REFUSED

@@ -1,0 +1,28 @@
+"""A program that fails in the air says that the vehicle may be flying, and what brings it down."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from rtshcua.front.cli.flight import Flight
+
+
+@pytest.mark.parametrize("error", [RuntimeError("bug"), KeyboardInterrupt(), MemoryError(), OSError(5, "gone")])
+@pytest.mark.parametrize("aloft", [True, False])
+def test_a_failure_is_told_with_what_the_vehicle_may_do(error: BaseException, aloft: bool) -> None:
+    said: list[str] = []
+    closed: list[Any] = []
+
+    def follow() -> None:
+        raise error
+
+    flight: Any = Flight.__new__(Flight)
+    flight._runtime = SimpleNamespace(aloft=aloft)
+    flight._feed = SimpleNamespace(post=lambda note: said.append(note.text))
+    flight._follow, flight._close = follow, closed.append
+    flight._witnesses = SimpleNamespace(finish=lambda note, closed: None)
+    with pytest.raises(type(error)):
+        flight.fly()
+    assert closed == [None], "the log stays unsigned, for recovery"
+    assert [("may be flying" in text, "rtshcua run" in text) for text in said] == [(True, True)] * aloft

@@ -1,0 +1,136 @@
+"""What goes wrong in one run by a scenario: which runs may have it, when it happens, and what is told of it."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from rtshcua.adapters.simulator import SimulatorError
+from rtshcua.decision.prepare import PreparedPolicy, prepare
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.incidents import Incidents, chosen
+from rtshcua.front.cli.refused import Refused
+from rtshcua.model.flat.situation import Now
+
+S = 1_000_000
+ISSUED_US = 1_780_300_800 * S
+SOURCE = """import "lib:missions/short.rts"
+
+scenario "gusts and a lost fix" {
+  flies  short
+  start  battery = 80 %, wind(speed = 3 m/s, from = 270 deg)
+  at 2 s gps_loss(for = 1 s)
+  at 1 s link_silence(for = 2 s)
+  expect ends completed
+}
+
+scenario "killed" {
+  flies  short
+  at 4 s runtime_killed(for = 2 s)
+  expect ends aborted
+}
+
+scenario "at its own time" {
+  flies  short
+  aboard px4
+  start  at "2026-06-01T08:00:00Z"
+  expect ends completed
+}
+"""
+
+
+class Vehicle:
+    """Remembers what it is told; `gone`: nothing listens any more."""
+
+    def __init__(self, *, gone: bool = False) -> None:
+        self.told: list[str] = []
+        self.gone = gone
+
+    def inject(self, fault: str) -> None:
+        if self.gone:
+            raise SimulatorError("the simulated vehicle is gone: broken pipe")
+        self.told.append(fault)
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "flights.rts"
+    path.write_text(SOURCE)
+    return path
+
+
+def incidents(source: Path, name: str, **options: str | int | None) -> Incidents:
+    return Incidents(
+        chosen(f"{source}:{name}" if name else str(source), ISSUED_US), options.get("flavour"), options.get("seed")
+    )  # type: ignore[arg-type]
+
+
+def prepared(source: Path) -> PreparedPolicy:
+    made = prepare(chosen(f"{source}:killed", ISSUED_US).policy.lowered.policy)
+    assert isinstance(made, PreparedPolicy)
+    return made
+
+
+def refused(source: Path, name: str, **options: str | int | None) -> str:
+    with pytest.raises(Refused) as caught:
+        incidents(source, name, **options)
+    assert caught.value.code == ExitCode.USAGE
+    return str(caught.value)
+
+
+def test_what_a_vehicle_starts_with_goes_to_its_process(source: Path) -> None:
+    assert incidents(source, "gusts and a lost fix", seed=9).words == [
+        "--flavour", "px4", "--seed", "9", "--estimate", "real", "--battery", "80", "--wind", "3,270,0",
+    ]  # fmt: skip
+
+
+def test_a_file_that_is_not_there_is_bad_input(source: Path) -> None:
+    source.rename(source.with_name("flight.rts"))
+    with pytest.raises(Refused) as caught:
+        incidents(source, "")
+    assert (caught.value.code, str(caught.value)) == (
+        ExitCode.INPUT,
+        f"cannot read `{source}`: there is no such file",
+    )
+
+
+def test_what_no_run_can_have_is_refused_by_name(source: Path) -> None:
+    assert "`at 4 s runtime_killed(for = 2 s)` goes wrong in virtual time alone" in refused(source, "killed")
+    assert "the scenario says at what time it begins" in refused(source, "at its own time")
+    assert "no scenario `nobody`" in refused(source, "nobody")
+    assert "3 scenarios" in refused(source, "")
+
+
+def test_it_goes_wrong_when_the_scenario_says_so_and_no_sooner(source: Path) -> None:
+    made, vehicle = incidents(source, "gusts and a lost fix"), Vehicle()
+    made.begin(prepared(source), chosen(f"{source}:killed", ISSUED_US).mission, vehicle)  # type: ignore[arg-type]
+    turns: list[int] = []
+    watch = made.around(lambda now, _, __: turns.append(now.monotonic_us), 100 * S)
+    for at_us in (100 * S, 101 * S - 1, 101 * S, 102 * S + 1):
+        watch(Now(at_us, ISSUED_US, 0), [], [])
+        if at_us < 101 * S:
+            assert vehicle.told == []
+    assert [each.split(",")[0] for each in vehicle.told] == ["link-silence", "gps-loss"]
+    assert made.happened == ["1.00 s: at 1 s link_silence(for = 2 s)", "2.00 s: at 2 s gps_loss(for = 1 s)"]
+    assert len(turns) == 4
+
+
+def test_a_vehicle_that_is_gone_does_not_end_the_run(source: Path) -> None:
+    made, vehicle = incidents(source, "gusts and a lost fix"), Vehicle(gone=True)
+    made.begin(prepared(source), chosen(f"{source}:killed", ISSUED_US).mission, vehicle)  # type: ignore[arg-type]
+    made.around(lambda *_: None, 0)(Now(1 * S, ISSUED_US, 0), [], [])
+    assert made.happened == ["1.00 s: at 1 s link_silence(for = 2 s): the simulated vehicle is gone: broken pipe"]
+
+
+def test_another_mission_than_the_scenarios_is_refused(source: Path) -> None:
+    made, mission = incidents(source, "gusts and a lost fix"), chosen(f"{source}:killed", ISSUED_US).mission
+    first, *others = mission.invocations
+    higher = msgspec.structs.replace(first, arguments=(first.arguments[0] + 1, *first.arguments[1:]))
+    for wrong in (
+        msgspec.structs.replace(mission, name="long"),
+        msgspec.structs.replace(mission, invocations=tuple(others)),
+        msgspec.structs.replace(mission, invocations=(higher, *others)),
+    ):
+        with pytest.raises(Refused) as caught:
+            made.begin(prepared(source), wrong, Vehicle())  # type: ignore[arg-type]
+        assert "flies another mission" in str(caught.value)

@@ -1,0 +1,102 @@
+"""What each Ctrl-C asks for."""
+
+import os
+import signal
+import threading
+from typing import Any
+
+import pytest
+
+from rtshcua.front.cli import interrupts
+from rtshcua.front.cli.interrupts import Interrupts, Stopped, StopRequest, Wish
+
+
+@pytest.fixture
+def at(monkeypatch: pytest.MonkeyPatch) -> Any:
+    moment = [100.0]
+    monkeypatch.setattr(interrupts.time, "monotonic", lambda: moment[0])
+    return moment
+
+
+def press(number: signal.Signals = signal.SIGINT) -> None:
+    os.kill(os.getpid(), number)
+
+
+def test_land_then_know_then_leave(at: Any) -> None:
+    with Interrupts() as requests:
+        assert requests.wish() is None
+        press()
+        assert requests.wish() is Wish.LAND
+        press()
+        assert requests.wish() is Wish.KNOW
+        at[0] += 2
+        press()
+        assert requests.wish() is Wish.LEAVE
+        assert requests.wish() is None
+
+
+def test_slow_ones_only_ask(at: Any) -> None:
+    with Interrupts() as requests:
+        press(signal.SIGTERM)
+        assert requests.wish() is Wish.LAND
+        for _ in range(4):
+            at[0] += 10
+            press(signal.SIGHUP)
+            assert requests.wish() is Wish.KNOW
+
+
+def test_none_is_lost_when_they_come_at_once(at: Any) -> None:
+    with Interrupts() as requests:
+        for _ in range(3):
+            press()
+        assert [requests.wish() for _ in range(4)] == [Wish.LAND, Wish.KNOW, Wish.LEAVE, None]
+
+
+def test_the_handlers_before_are_put_back() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with Interrupts():
+        assert signal.getsignal(signal.SIGINT) != before
+    assert signal.getsignal(signal.SIGINT) == before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_request_to_stop_raises_where_it_is_looked_at_and_nowhere_else(number: signal.Signals) -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        with StopRequest() as stop:
+            stop.look()
+            press(number)
+            assert stop.asked
+            for _ in range(2):
+                with pytest.raises(Stopped):
+                    stop.look()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_what_is_started_with_ctrl_c_ignored_goes_on_ignoring_it() -> None:
+    """As a shell starts what runs in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with StopRequest() as stop:
+            press()
+            assert not stop.asked
+            press(signal.SIGTERM)
+            assert stop.asked
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_a_thread_that_is_not_the_main_one_gets_no_signals() -> None:
+    seen = []
+
+    def work() -> None:
+        with StopRequest() as stop:
+            seen.append(stop.asked)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [False]

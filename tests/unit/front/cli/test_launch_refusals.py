@@ -1,0 +1,277 @@
+"""What `run` refuses between loading a bundle and flying it."""
+
+import os
+import shutil
+from errno import ENOSPC
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+from msgspec.structs import replace
+
+from reference.flat_case import MISSION, POLICY
+from reference.world import START, VEHICLE, loaded
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.store import replay
+from rtshcua.adapters.store.owed import OwedParameters
+from rtshcua.adapters.store.replay import FileReplayStore
+from rtshcua.adapters.store.signing import LinkStore, write_link_key
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import launch, opening
+from rtshcua.front.cli.configured import settings_of
+from rtshcua.front.cli.past import Past
+from rtshcua.mavlink.signing import SignedLink
+from rtshcua.model.flat.signal import SignalSource
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
+from rtshcua.onboard.enforcement.preparation import Owed
+
+LATER = 1 << 52  # us
+START_CLOCK: Any = SimpleNamespace(now=lambda: START)
+
+
+def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
+    FileReplayStore(tmp_path, VEHICLE).open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
+    with pytest.raises(launch.Refused, match="a later version of `bridge_inspection` than 7") as refused:
+        opening.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), [])
+    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "old-policy")
+
+
+@pytest.mark.parametrize(
+    ("armed", "landed_state", "resumes"),
+    [(False, 1, False), (True, 1, True), (True, 2, True), (True, 0, True), (False, 0, False)],
+)
+def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_about_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, armed: bool, landed_state: int, resumes: bool
+) -> None:
+    """On the ground and armed, it may have been told to take off by a run that was killed."""
+    monkeypatch.setattr(opening, "AIR_S", 0.01)
+    of = loaded()
+    opening.mark_opened(tmp_path, of, SystemClock(), cast("Any", Grounded()))
+    seen = ObservedVehicle(armed=armed, landed_state=landed_state)
+    vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
+    if resumes:
+        assert opening.broke_off(tmp_path, of, vehicle, SystemClock(), [])
+        return
+    with pytest.raises(launch.Refused) as refused:
+        opening.broke_off(tmp_path, of, vehicle, SystemClock(), [])
+    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "replayed")
+
+
+@pytest.mark.parametrize("damage", ["empty", "no-versions", "pipe", "no-folder", "gone", "full"])
+@pytest.mark.parametrize("armed", [False, True])
+def test_whatever_the_state_folder_says_what_flies_comes_down(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str, armed: bool
+) -> None:
+    monkeypatch.setattr(opening, "AIR_S", 0.01)
+    folder = FileReplayStore(tmp_path, VEHICLE).folder
+    if damage == "empty":
+        (folder / "floor").touch()
+    elif damage == "no-versions":
+        (folder / "floor-policies").write_bytes(b"[]")
+    elif damage == "pipe":
+        os.mkfifo(folder / "floor")
+    elif damage == "full":
+        monkeypatch.setattr(replay, "write_new", full)
+    else:
+        folder.rmdir()
+        if damage == "gone":  # and cannot be made again
+            folder.parent.rmdir()
+            folder = folder.parent
+        folder.touch()
+    seen = ObservedVehicle(armed=armed, landed_state=2 if armed else 1)
+    vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
+    if armed:
+        assert opening.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+        return
+    with pytest.raises((launch.Refused, OSError)) as refused:
+        opening.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+    if damage in ("empty", "no-versions"):
+        assert isinstance(refused.value, launch.Refused)
+        assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "damaged")
+        flight = Grounded()
+        with pytest.raises(launch.Refused, match="damaged"):
+            opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
+        assert flight.refused
+
+
+def full(path: Path, *_: object, **__: object) -> None:
+    raise OSError(ENOSPC, "no space left on device", str(path))
+
+
+def test_that_a_mark_could_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
+    store = FileReplayStore(tmp_path, VEHICLE)
+    store.expect_room()
+    assert [*store.folder.iterdir()] == []
+
+
+@pytest.mark.parametrize("damage", ["damaged", "no-folder"])
+@pytest.mark.parametrize("resumed", [False, True])
+def test_a_link_whose_timestamps_are_not_known_brings_home_what_flies(
+    tmp_path: Path, damage: str, resumed: bool
+) -> None:
+    key_file = tmp_path / "link.key"
+    write_link_key(key_file, bytes(range(32)))
+    store = LinkStore(tmp_path, VEHICLE, bytes(range(32)))
+    store.close()
+    if damage == "damaged":
+        store.path.write_bytes(b"{")
+    else:
+        shutil.rmtree(tmp_path / "link")
+        (tmp_path / "link").touch()
+    order: Any = SimpleNamespace(
+        signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False, unbuilt=False
+    )
+    of = loaded()
+    signing = launch._sign(order, of, SystemClock())
+    assert isinstance(signing.verifier, SignedLink), "it can be heard whether it flies"
+    if resumed:
+        launch._expect_kept(signing, resumed=True)
+        assert any("brought down all the same" in note for note in signing.notes)
+    else:
+        with pytest.raises((launch.Refused, OSError)) as refused:
+            launch._expect_kept(signing, resumed=False)
+        if damage == "damaged":
+            assert isinstance(refused.value, launch.Refused)
+            assert (refused.value.code, refused.value.slug) == (ExitCode.UNTRUSTED, "link-key-damaged")
+    signing.close()
+
+
+class Grounded:
+    """A flight that is told not to be."""
+
+    refused = False
+
+    def refuse(self) -> None:
+        self.refused = True
+
+
+def test_a_bundle_is_marked_once_and_of_two_runs_at_a_time_one_flies(tmp_path: Path) -> None:
+    first, second = Grounded(), Grounded()
+    assert opening.flown_before(tmp_path, loaded()) is None
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", first))
+    assert not first.refused
+    with pytest.raises(launch.Refused, match="a bundle flies once"):
+        opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", second))
+    assert second.refused, "and its log is closed"
+    assert opening.flown_before(tmp_path, loaded()) is not None
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_a_simulated_flight_and_a_real_one_use_up_no_bundle_of_each_other(tmp_path: Path, own: bool) -> None:
+    """Nor does the policy that flew on the one forbid an older one on the other."""
+    orders: list[Any] = [
+        SimpleNamespace(state=tmp_path, link=link, wait_s=None) for link in (None, "udpin:127.0.0.1:1")
+    ]
+    flew, other = orders if own else reversed(orders)
+    of = loaded()
+    opening.mark_opened(launch._left_in(flew), of, SystemClock(), cast("Any", Grounded()))
+    assert "a bundle flies once" in (launch._not_begun(flew, of, START_CLOCK) or "")
+    assert launch._not_begun(other, of, START_CLOCK) is None
+    assert (launch._may_have_flown(flew, of), launch._may_have_flown(other, of)) == (True, False)
+    older = FileReplayStore(launch._left_in(flew), VEHICLE)
+    older.open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
+    assert launch._not_begun(other, of, START_CLOCK) is None
+
+
+def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -> None:
+    (tmp_path / "replay").write_bytes(b"")
+    flight = Grounded()
+    with pytest.raises(OSError, match=r"exists|Not a directory"):
+        opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
+    assert flight.refused
+
+
+def test_a_policy_that_reads_what_no_vehicle_sends() -> None:
+    (first, *others) = POLICY.signals
+    signals = (replace(first, sources=(SignalSource("BATTERY_STATUS", ("nope",), 1, 1, ()),)), *others)
+    order: Any = SimpleNamespace(sortie=None, fence=True, dry_run=False, system=None)
+    signing: Any = SimpleNamespace(verifier=None)
+    with pytest.raises(launch.Refused, match=r"`BATTERY_STATUS\.nope`") as refused:
+        launch._driver(order, loaded(replace(POLICY, signals=signals), MISSION), 1, signing)
+    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "unknown-source")
+
+
+class Over:
+    """A flight that ended."""
+
+    def __init__(self, used_up: bool) -> None:
+        self.used_up = used_up
+
+
+def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Path) -> None:
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
+    assert told == "no command was sent: the bundle can be run again"
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    assert opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True)), START) is None
+    assert opening.flown_before(tmp_path, loaded()) is not None
+
+
+def test_a_flight_whose_log_is_gone_is_not_said_to_have_broken_off(tmp_path: Path) -> None:
+    """Whoever clears `runs/` away is not told to bring a vehicle down by a file that is not there."""
+    log = tmp_path / "runs" / "1" / "log.jsonl"
+    log.parent.mkdir(parents=True)
+    log.touch()
+    first = Past(tmp_path, VEHICLE, None)
+    first.begin(log)
+    first._held.close()
+    before = Past(tmp_path, VEHICLE, None)
+    assert "before broke off" in launch._hanging(before, loaded())
+    shutil.rmtree(log.parent)
+    told = launch._hanging(Past(tmp_path, VEHICLE, None), loaded())
+    assert "is no longer there: whether its flight ended is not known" in told
+    assert "broke off" not in told
+
+
+def test_what_a_simulated_flight_leaves_is_not_the_connected_vehicles(tmp_path: Path) -> None:
+    """Its log, and the parameters that it set: neither is brought down or put back on the real one."""
+    simulated, real = (launch._left_in(cast("Any", SimpleNamespace(state=tmp_path, link=link))) for link in (None, 1))
+    log = tmp_path / "log.jsonl"
+    log.touch()
+    Past(simulated, VEHICLE, None).begin(log)
+    owed = OwedParameters(simulated, VEHICLE, sets=True)
+    owed.keep(
+        {"FENCE_RADIUS": Owed(*settings_of(["FENCE_RADIUS=50"]).values(), *settings_of(["FENCE_RADIUS=300"]).values())}
+    )
+    owed.close()
+    assert OwedParameters(simulated, VEHICLE).left
+    assert not OwedParameters(real, VEHICLE).left
+    assert Past(simulated, VEHICLE, None).broken_off == tmp_path
+    assert (Past(real, VEHICLE, None).note, Past(real, VEHICLE, None).broken_off) == ("", None)
+
+
+def late(us: int) -> Now:
+    """So long after the first moment at which a step of the mission may not begin any more."""
+    end_us = min(each.invocation.issued_at_us + each.invocation.contract.validity_us for each in loaded().invocations)
+    return Now(START.monotonic_us, end_us + START.utc_error_us + us, START.utc_error_us)
+
+
+def test_a_bundle_that_expired_is_said_to_have_and_may_not_be_handed_in_again(tmp_path: Path) -> None:
+    refusal = opening.expired(loaded(), late(1))
+    assert refusal is not None
+    assert refusal.slug == "bundle-expired"
+    assert "the bundle expired at 2" in refusal.text
+    assert "compile the mission again" in refusal.help
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), late(1))
+    assert told == f"no command was sent, and {refusal.text}; {refusal.help}"
+
+
+def test_a_bundle_that_may_be_fresh_still_is_no_expired_one() -> None:
+    assert opening.expired(loaded(), late(0)) is None
+    unknown = replace(late(1 << 40), utc_error_us=UTC_UNKNOWN_US)
+    assert opening.expired(loaded(), unknown) is None, "nobody knows the time of day"
+
+
+def test_a_disk_that_does_not_give_a_bundle_back_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+
+    def fails(store: FileReplayStore, digest: bytes) -> None:
+        raise OSError(30, "read-only file system")
+
+    monkeypatch.setattr(FileReplayStore, "give_back", fails)
+    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
+    assert told == "no command was sent, but the bundle counts as flown: read-only file system"
+    assert opening.flown_before(tmp_path, loaded()) is not None

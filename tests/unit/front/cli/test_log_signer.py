@@ -1,0 +1,39 @@
+"""The log's key is in the hands of one: this process, or the boundary that it was handed over to."""
+
+import gc
+
+import pytest
+
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.log_signer import LogSigner
+from rtshcua.front.cli.refused import Refused
+from rtshcua.wire.keys import Duty, SigningKey
+
+SEED, TEXT = bytes(range(32)), b"a checkpoint"
+
+
+def key() -> SigningKey:
+    return SigningKey.from_seed(SEED, duty=Duty.LOG)
+
+
+@pytest.mark.slow
+def test_this_process_signs_until_the_key_is_handed_over() -> None:
+    signer = LogSigner(key())
+    assert signer.sign(TEXT) == key().sign(TEXT, duty=Duty.LOG)
+    signer.hand_over(lambda text: text + b" signed")
+    assert signer.sign(TEXT) == b"a checkpoint signed"
+    assert (signer.kid, signer.public) == (key().kid, key().public)
+    with pytest.raises(LookupError):
+        signer.key()
+    gc.collect()
+    assert not [each for each in gc.get_referrers(signer.public) if isinstance(each, SigningKey)], "it was let go"
+    signer.use(key())
+    assert signer.sign(TEXT) == key().sign(TEXT, duty=Duty.LOG)
+
+
+def test_what_the_boundary_does_not_sign_does_not_fly() -> None:
+    signer = LogSigner(key())
+    signer.hand_over(lambda _: Refusal("not-its-log", "the boundary refuses it"))
+    with pytest.raises(Refused, match="does not sign the log") as refused:
+        signer.sign(TEXT)
+    assert refused.value.slug == "boundary-not-its-log"

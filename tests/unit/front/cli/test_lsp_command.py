@@ -1,0 +1,27 @@
+"""The door to the language server: what is wrong with the command line is said, and nothing is started."""
+
+import sys
+
+import pytest
+
+from rtshcua.front.cli.app import main
+
+
+def test_without_the_extra_it_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "pygls", None)
+    for name in [each for each in sys.modules if each.startswith("rtshcua.front.lsp")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "lsprotocol", None)
+    assert main(["lsp"]) == 2
+    captured = capsys.readouterr()
+    assert "the language server is not installed" in captured.err
+    assert ".[editor]" in captured.err
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("words", [["--tcp", "0"], ["--tcp", "70000"], ["--tcp", "5007", "--stdio"], ["--tcp", "x"]])
+def test_a_port_is_a_port(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lsp", *words]) == 2
+    assert "Traceback" not in capsys.readouterr().err

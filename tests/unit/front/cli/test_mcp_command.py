@@ -1,0 +1,35 @@
+"""The door to the MCP server: what is wrong with the command line is said, and nothing is served."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from rtshcua.front.cli.app import main
+
+
+def test_without_the_extra_it_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, "rtshcua.front.mcp.server", raising=False)
+    monkeypatch.setitem(sys.modules, "mcp", None)
+    monkeypatch.setitem(sys.modules, "anyio", None)
+    assert main(["mcp", "b", "--to", "s", "--with", "p.rts"]) == 2
+    captured = capsys.readouterr()
+    assert "the MCP server is not installed" in captured.err
+    assert ".[mcp]" in captured.err
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("words", [["b"], ["b", "--to", "s"], ["--to", "s", "--with", "p.rts"]])
+def test_bundle_socket_and_sources_are_all_needed(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["mcp", *words]) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_what_is_no_bundle(tmp_path: Path, own_world: None, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
+    (tmp_path / "b").write_bytes(b"no bundle")
+    assert main(["mcp", str(tmp_path / "b"), "--to", "s", "--with", "p.rts"]) in (3, 4)
+    assert main(["mcp", str(tmp_path / "none"), "--to", "s", "--with", "p.rts"]) == 3
+    assert "Traceback" not in capsys.readouterr().err

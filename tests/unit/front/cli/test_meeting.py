@@ -1,0 +1,133 @@
+"""Before a flight the vehicle's time of day is waited for, and not before what hangs in the air is brought down."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from rtshcua.adapters.clock import PacedClock, SystemClock
+from rtshcua.adapters.utc import UtcWatch
+from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.adapters.vehicle.source_time import SourceTime
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import meeting
+from rtshcua.front.cli.refused import Refused
+from rtshcua.simulation.simulated_mark import marked
+
+
+class Silent:
+    """A vehicle that tells no time of day."""
+
+    def __init__(self, *, armed: bool) -> None:
+        link = SimpleNamespace(crowd=None)
+        self.driver: Any = SimpleNamespace(
+            flavour=None, seen=ObservedVehicle(armed=armed), asks_utc=True, issued_from_us=0, link=link,
+            source=SourceTime(),
+        )  # fmt: skip
+        self.polls = 0
+        #: from when on it could have been ready, at each look
+        self.ready_from_us: list[int] = []
+
+    def poll(self, now_us: int, timeout_us: int) -> list[Any]:
+        self.polls += 1
+        self.ready_from_us.append(self.driver.issued_from_us)
+        self.driver.flavour = SimpleNamespace(name="px4")
+        return []
+
+
+@pytest.mark.parametrize(("hurried", "armed", "waits"), [(True, True, False), (True, False, True), (False, True, True)])
+def test_what_hangs_in_the_air_does_not_wait_for_the_time_of_day(
+    hurried: bool, armed: bool, waits: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """3 s of each restart on a machine whose clock nobody sets, where the operator said how far it is off."""
+    monkeypatch.setattr(meeting, "UTC_S", 0.05)
+    clock, vehicle = SystemClock(), Silent(armed=armed)
+    utc = UtcWatch(clock, 500_000, kernel_us=lambda: None)
+    meeting.await_utc(utc, vehicle, clock, 0, patient=True, hurried=hurried)  # type: ignore[arg-type]
+    assert (vehicle.polls > 0) == waits
+    assert utc.bound.source == "operator"
+
+
+def test_it_is_not_ready_before_all_that_is_asked_of_it_first_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine it had all else while a second vehicle was waited for: its first step was deferred as
+    uncertain, until the deadline of that was over.
+    """
+    monkeypatch.setattr(meeting, "UTC_S", 0.05)
+    monkeypatch.setattr(meeting, "ANOTHER_S", 0.05)
+    clock, vehicle = SystemClock(), Silent(armed=False)
+    utc = UtcWatch(clock, 500_000, kernel_us=lambda: None)
+    now = clock.now()
+    link: Any = object()
+    never: Any = SimpleNamespace(wish=lambda: None)
+    meeting.meet(link, None, vehicle, clock, never, signing=never, hurried=False)  # type: ignore[arg-type]
+    meeting.await_utc(utc, vehicle, clock, now.utc_us, patient=True)  # type: ignore[arg-type]
+    assert vehicle.polls > 2
+    assert min(vehicle.ready_from_us) > now.monotonic_us + 10**15
+    wait_us = vehicle.driver.issued_from_us - now.monotonic_us
+    assert 0 <= wait_us <= 600_000, "issued now, by a clock that is true to 0.5 s"
+
+
+#: what PX4 1.16 has there: a hash of its sources, and one of its operating system
+PX4_HASHES = [0x6A, 0x0F, 0xC1, 0x33, 0x91, 0, 0, 0], [0x12, 0xFE, 0x44, 0x09, 0x5B, 0, 0, 0]
+
+
+class Telling(Silent):
+    """A vehicle that answers what it is asked first with these custom versions; None: not at all."""
+
+    def __init__(self, custom: tuple[list[int], list[int]] | None) -> None:
+        super().__init__(armed=False)
+        self.driver.asks_first, self.driver.system = None, 1
+        self.custom = custom
+        self.asked_before_ready = False
+
+    def poll(self, now_us: int, timeout_us: int) -> list[Any]:
+        first = self.driver.asks_first
+        if first is not None and first.due(1, now_us) and self.custom is not None:
+            self.asked_before_ready = self.driver.issued_from_us > now_us + 10**15
+            middleware, system = self.custom
+            told = SimpleNamespace(middleware_custom_version=middleware, os_custom_version=system)
+            first.take("AUTOPILOT_VERSION", told)
+        return super().poll(now_us, timeout_us)
+
+
+def met_at(speed: float, custom: tuple[list[int], list[int]] | None, monkeypatch: pytest.MonkeyPatch) -> Telling:
+    monkeypatch.setattr(meeting, "ANOTHER_S", 0)
+    monkeypatch.setattr(meeting, "SPEED_S", 0.02)
+    vehicle, link = Telling(custom), object()
+    never: Any = SimpleNamespace(wish=lambda: None)
+    clock = PacedClock(speed)
+    meeting.meet(link, None, vehicle, clock, never, never, hurried=False, speed=speed)  # type: ignore[arg-type]
+    return vehicle
+
+
+@pytest.mark.parametrize("speed", [10, 1.01, 0.5, 2])
+@pytest.mark.parametrize(
+    ("custom", "slug"),
+    [
+        (PX4_HASHES, "not-simulated"),
+        (([0] * 8, [0] * 8), "not-simulated"),
+        (None, "not-simulated"),
+        (marked(100), "other-speed"),
+    ],
+)
+def test_another_speed_than_that_of_life_is_believed_of_no_vehicle_that_does_not_live_so(
+    speed: float, custom: Any, slug: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An autopilot behind a router at 127.0.0.1 was flown with `--speed 10` on a machine whose time nobody knew: as
+    simulated, with a time of day that was true to 0.1 s.
+    """
+    with pytest.raises(Refused) as refused:
+        met_at(speed, custom, monkeypatch)
+    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, slug)
+
+
+@pytest.mark.parametrize("speed", [10, 1.01, 0.5, 2])
+def test_a_simulated_vehicle_is_met_at_the_speed_that_it_says(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    vehicle = met_at(speed, marked(round(speed * 100)), monkeypatch)
+    assert vehicle.asked_before_ready, "nothing begins before it is known"
+    assert vehicle.driver.asks_first is None
+    assert vehicle.driver.issued_from_us == 0
+
+
+def test_at_the_speed_of_life_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not met_at(1, None, monkeypatch).asked_before_ready

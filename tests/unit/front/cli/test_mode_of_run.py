@@ -1,0 +1,75 @@
+"""Where `run` decides: in a process of its own before a vehicle of others, where there is a program for it."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from reference.world import loaded
+from rtshcua.adapters.boundary_process import UNBUILT, Measure
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import connection, doctor, launch
+from rtshcua.front.cli.app import main
+from rtshcua.library import root as library
+from rtshcua.onboard.enforcement.load import Mode
+
+BUILT = Path("/usr/lib/rtshcua-boundary")
+
+
+@pytest.mark.parametrize(
+    ("asked", "own", "named", "built", "found"),
+    [
+        (None, True, False, True, (Mode.SOFTWARE, False)),
+        (None, True, False, False, (Mode.SOFTWARE, False)),
+        (None, False, False, True, (Mode.PROCESS, False)),
+        (None, False, False, False, (Mode.SOFTWARE, True)),
+        (None, False, True, False, (Mode.PROCESS, False)),  # and it is refused: its user was asked for
+        (None, True, True, True, (Mode.PROCESS, False)),
+        (Mode.SOFTWARE, False, False, True, (Mode.SOFTWARE, False)),
+        (Mode.SOFTWARE, False, False, False, (Mode.SOFTWARE, False)),
+        (Mode.PROCESS, True, False, False, (Mode.PROCESS, False)),
+        (Mode.NONE, True, False, True, (Mode.NONE, False)),
+    ],
+)
+def test_the_mode_that_counts(
+    asked: Mode | None, own: bool, named: bool, built: bool, found: tuple[Mode, bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connection, "program", lambda: BUILT if built else None)
+    assert connection.mode_of(asked, own=own, named=named) == found
+
+
+@pytest.mark.parametrize("unbuilt", [True, False])
+def test_a_run_says_that_there_is_no_program(tmp_path: Path, unbuilt: bool) -> None:
+    order: Any = SimpleNamespace(
+        signing_key=None, state=tmp_path, unsigned_radio=False, link=None, dry_run=False, unbuilt=unbuilt
+    )
+    assert any(UNBUILT in note for note in launch._sign(order, loaded(), SystemClock()).notes) == unbuilt
+
+
+@pytest.mark.parametrize("built", [True, False])
+def test_the_doctor_says_whether_there_is_one(built: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (doctor, connection):
+        monkeypatch.setattr(module, "program", lambda: BUILT if built else None)
+    monkeypatch.setattr(doctor, "measures_here", lambda user: ~Measure(0))
+    mode, _ = connection.mode_of(None, own=False, named=False)
+    finding, *_ = doctor._boundary(mode)
+    assert finding.verdict is (MissionVerdict.OK if built else MissionVerdict.WARN)
+    assert (finding.found == UNBUILT) != built
+
+
+def test_a_process_that_was_asked_for_is_not_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("rtshcua.adapters.boundary_process.program", lambda: None)
+    assert main(["keys", "init"]) == ExitCode.OK
+    assert main(["compile", str(library() / "missions" / "short.rts"), "-o", "short.bundle"]) == ExitCode.OK
+    words = ["run", "short.bundle", "--mode", "process", "--connect", "udpin:127.0.0.1:14550", "--vehicle", "quad-07"]
+    capsys.readouterr()
+    assert main(words) == ExitCode.REFUSED
+    said = capsys.readouterr().err
+    assert "the boundary's program was not built" in said
+    assert "`make setup` builds it" in said

@@ -1,0 +1,71 @@
+"""Plain command lines are read without typer, and to the same effect."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.main import get_command
+
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import check, lint, quick, recall
+from rtshcua.front.cli.app import main
+from rtshcua.front.cli.linting.options import Options
+from rtshcua.front.cli.table import COMMANDS
+
+COMMAND = {"lint": (lint, quick.LINT), "check": (check, quick.CHECK), "recall": (recall, quick.RECALL)}
+#: what the quick reader leaves to typer
+LEFT = {"recall": {"--for"}}
+
+
+@pytest.mark.parametrize("name", COMMAND)
+def test_both_know_the_same_options(name: str) -> None:
+    module, known = COMMAND[name]
+    declared: dict[str, Any] = {}
+    for parameter in get_command(module.app).params:
+        kind = "flag" if getattr(parameter, "is_flag", False) else "paths" if parameter.multiple else "value"
+        declared |= {option: (parameter.name, kind) for option in parameter.opts if option.startswith("-")}
+    for option in {"--help", *LEFT.get(name, ())}:
+        declared.pop(option, None)
+    plain = {"text": "value", "path": "value"}
+    names = {"json": "as_json"} if name == "lint" else {}
+    assert declared == {each: (names.get(to, to), plain.get(kind, kind)) for each, (to, kind) in known.items()}
+
+
+def test_the_table_says_which_are_read_quickly() -> None:
+    assert {row.name for row in COMMANDS if row.quick} == set(quick.QUICK)
+
+
+WORDS = st.one_of(
+    st.sampled_from([*quick.LINT, "--", "-", "", "--help", "-h", "--fixx", "--no-fix", "-ox", "--output=", "--json=1"]),
+    st.sampled_from(["a.rts", "b", "--format=json", "--with=c", "--base=x", "human", "--output=-x", "-o=1"]),
+)
+
+
+@given(st.lists(WORDS, max_size=6))
+def test_what_is_read_quickly_typer_reads_so(words: list[str]) -> None:
+    found = quick.read(words, quick.LINT)
+    if found is None or not found[0]:
+        return
+    given: list[Options] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lint, "run", lambda options: given.append(options) or ExitCode.OK)
+        command = get_command(lint.app)
+        with command.make_context("rtshcua lint", list(words), help_option_names=["-h", "--help"]) as context:
+            command.invoke(context)
+    assert given == [Options(found[0], **found[1])]
+    assert all(isinstance(path, Path) for path in found[0])
+
+
+def test_what_is_left_to_typer(capsys: pytest.CaptureFixture[str]) -> None:
+    assert quick.lint([]) is quick.lint(["--fix"]) is quick.check(["--json"]) is None
+    for words in (
+        ["--help"],
+        ["a.rts", "--formt", "json"],
+        ["a.rts", "--format"],
+        ["a.rts", "--json=1"],
+    ):
+        assert quick.read(words, quick.LINT) is None, words
+    assert main(["check", "--since"]) == ExitCode.USAGE
+    assert "requires an argument" in capsys.readouterr().err.lower()

@@ -1,0 +1,227 @@
+"""A run that waits: what is handed in is admitted or refused, a recall and Ctrl-C end it, and who follows is told."""
+
+import json
+import socket
+import tempfile
+import threading
+from base64 import b64encode
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from reference.documents import approval, low, recall, replacement
+from reference.world import START
+from rtshcua.adapters.agent_socket import flight_at, hand_in
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli import waiting
+from rtshcua.front.cli.agents import Agents
+from rtshcua.front.cli.interrupts import Interrupts, Wish
+from rtshcua.front.cli.refused import Refused
+from rtshcua.front.cli.waiting import Admitted, Waiting
+from rtshcua.model.flat.situation import Now
+from rtshcua.onboard.enforcement.load import Loaded
+from rtshcua.onboard.ports import Event, Presented, Readings
+
+BUNDLE = b"the bundle of a test"
+
+
+class Clock(SystemClock):
+    """The machine's, but for the day, which is that of the documents."""
+
+    def now(self) -> Now:
+        return Now(super().now().monotonic_us, START.utc_us, 0)
+
+
+class Wished(Interrupts):
+    """Ctrl-C, once `asked` is set."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked = threading.Event()
+
+    def wish(self) -> Wish | None:
+        return Wish.LAND if self.asked.is_set() else None
+
+
+class Vehicle:
+    """On the ground, and ready once it was polled a few times."""
+
+    def __init__(self, base: Loaded) -> None:
+        self.polls = 0
+        self.announced: list[str] = []
+        self.slot = next(each.slot for each in base.bundle.policy.signals if each.name == "battery")
+        self.driver = SimpleNamespace(unready="GPS", seen=SimpleNamespace(armed=False, airborne=None))
+
+    def poll(self, now_us: int, timeout_us: int) -> list[Event]:
+        threading.Event().wait(0.001)
+        self.polls += 1
+        self.driver.unready = "GPS" if self.polls < 4 else None
+        return [Readings(now_us, ((self.slot, 8_000),))]
+
+    def announce(self, severity: int, text: str) -> None:
+        self.announced.append(text)
+
+
+class World:
+    """A wait in a thread of its own, and its socket."""
+
+    def __init__(self, folder: Path, base: Loaded, most_s: float) -> None:
+        self.base, self.path = base, folder / "s"
+        self.agents = Agents(self.path, base, waits=True)
+        self.vehicle, self.interrupts = Vehicle(base), Wished()
+        self.tried: list[bytes] = []
+        self.superseded: Refused | None = None
+        self.flies = low()
+        vehicle: Any = self.vehicle
+        self.waiting = Waiting(
+            base, self.admit, self.expect, vehicle, Clock(), self.interrupts, self.agents,
+            most_s=most_s, as_json=True, notes=["a note"],
+        )  # fmt: skip
+        self.ended: Admitted | Refused | None = None
+        self.thread = threading.Thread(target=self.run)
+
+    def admit(self, data: bytes) -> Loaded | Refusal:
+        self.tried.append(data)
+        return self.flies if data == BUNDLE else Refusal("untrusted", "not to be trusted")
+
+    def expect(self) -> None:
+        if self.superseded is not None:
+            raise self.superseded
+
+    def run(self) -> None:
+        try:
+            self.ended = self.waiting.follow([])
+        except Refused as refused:
+            self.ended = refused
+
+    def hand(self, document: bytes) -> str:
+        return hand_in(self.path, document).slug
+
+    def end(self) -> Any:
+        self.thread.join(30)
+        assert not self.thread.is_alive()
+        return self.ended
+
+
+@pytest.fixture
+def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., World]]:
+    monkeypatch.setattr(waiting, "TOLD_S", 0.01)
+    made: list[World] = []
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+
+        def start(most_s: float = 60) -> World:
+            made.append(World(Path(name), low(), most_s))
+            made[-1].thread.start()
+            return made[-1]
+
+        yield start
+        for each in made:
+            each.interrupts.asked.set()
+            each.thread.join(30)
+            each.agents.__exit__(None, None, None)
+
+
+def lines_of(world: World, count: int) -> list[dict[str, Any]]:
+    """The first lines that a reader is told."""
+    with socket.socket(socket.AF_UNIX) as link:
+        link.connect(str(world.path))
+        file = link.makefile("rb")
+        return [json.loads(file.readline()) for _ in range(count)]
+
+
+def test_a_bundle_that_is_admitted_flies_as_the_flight_that_was_told_of(
+    begin: Callable[..., World], capfd: pytest.CaptureFixture[str]
+) -> None:
+    world = begin()
+    assert flight_at(world.path) == world.base.in_force.flight
+    assert world.hand(BUNDLE) == "accepted"
+    assert world.end() == Admitted(BUNDLE, world.flies)
+    hello = world.agents._greeting().splitlines()
+    assert [json.loads(each)["type"] for each in hello] == ["hello", "mission"]
+    told = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    assert [each["event"] for each in told if each["event"] != "vehicle"] == ["note", "waiting", "admitted"]
+    assert world.vehicle.announced == [waiting.ANNOUNCED]
+
+
+def test_what_comes_in_with_the_bundle_that_flies_is_for_the_flight(
+    begin: Callable[..., World], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was dropped, a recall too, and never answered."""
+    world = begin()
+    beside: list[Event] = [Presented(0, BUNDLE, 1), Presented(0, recall(world.base), 2)]
+    monkeypatch.setattr(world.agents, "events", lambda now: [beside.pop(0) for _ in beside[:]])
+    assert world.end() == Admitted(BUNDLE, world.flies)
+    assert [cast("Presented", event).sender for event in Agents.events(world.agents, Clock().now())] == [2]
+
+
+def test_what_is_no_bundle_to_be_trusted_changes_nothing(
+    begin: Callable[..., World], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(waiting, "SAID_S", 3600)
+    world = begin()
+    assert world.hand(approval(world.base)) == "not-flying"
+    assert world.hand(replacement(world.base)) == "not-flying"
+    assert world.hand(b"") == "untrusted"
+    assert world.hand(bytes(200_000)) == "untrusted"
+    assert world.hand(recall(world.base, vehicle="quad-08")) == "wrong-vehicle"
+    assert world.tried == [b"", bytes(200_000)]
+    assert world.ended is None
+    told = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    assert [each["slug"] for each in told if each["event"] == "not-admitted"] == ["not-flying"], "once in SAID_S"
+
+
+def test_who_follows_is_told_that_nothing_flies_and_how_the_vehicle_is(begin: Callable[..., World]) -> None:
+    world = begin()
+    hello, waits, *vehicle = lines_of(world, 12)
+    assert (hello["type"], waits["type"], waits["policy"]) == ("hello", "waiting", "bridge_inspection@7")
+    assert waits["policy_digest"] == world.base.bundle.policy_digest.hex()
+    assert {each["type"] for each in vehicle} == {"vehicle"}
+    last = vehicle[-1]
+    assert (last["ready"], last["unready"], last["armed"]) == (True, None, False)
+    (battery,) = (each for each in last["signals"] if each["name"] == "battery")
+    assert (battery["value"], battery["stale"]) == ("80 %", False)
+    assert next(each["value"] for each in last["signals"] if each["name"] != "battery") == "unknown"
+
+
+def test_a_recall_ends_it(begin: Callable[..., World]) -> None:
+    world = begin()
+    assert world.hand(recall(world.base)) == "accepted"
+    refused = cast("Refused", world.end())
+    assert (refused.code, refused.slug) == (ExitCode.ABORTED, "recalled")
+
+
+def test_ctrl_c_ends_it(begin: Callable[..., World]) -> None:
+    world = begin()
+    world.interrupts.asked.set()
+    refused = cast("Refused", world.end())
+    assert (refused.code, refused.slug) == (ExitCode.INTERRUPTED, "interrupted")
+
+
+def test_it_does_not_wait_for_ever(begin: Callable[..., World]) -> None:
+    refused = cast("Refused", begin(most_s=0.05).end())
+    assert (refused.code, refused.slug) == (ExitCode.REFUSED, "nothing-handed-in")
+
+
+def test_lines_that_are_none_are_answered(begin: Callable[..., World]) -> None:
+    world = begin()
+    with socket.socket(socket.AF_UNIX) as link:
+        link.connect(str(world.path))
+        link.sendall(b'{"id": 3, "document": 7}\n{"id": 4, "document": "' + b64encode(b"x") + b'"}\n')
+        file = link.makefile("rb")
+        answers: list[dict[str, Any]] = []
+        while len(answers) < 2:
+            said = json.loads(file.readline())
+            answers += [said] if said["type"] == "answer" else []
+    assert [(each["id"], each["slug"]) for each in answers] == [(3, "malformed"), (4, "untrusted")]
+
+
+def test_once_the_vehicle_has_another_root_the_wait_is_over(begin: Callable[..., World]) -> None:
+    world = begin()
+    world.superseded = Refused(ExitCode.UNTRUSTED, "root-superseded", "the trust root changed meanwhile")
+    assert world.end() is world.superseded
+    assert world.tried == []

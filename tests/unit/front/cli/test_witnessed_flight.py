@@ -1,0 +1,77 @@
+"""What `run --witness` does around a flight: refusals before it, and nothing at all without witnesses."""
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.vehicle.address import Address
+from rtshcua.adapters.witness_link import Anchor, Trouble
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import witnessed
+from rtshcua.front.cli.refused import Refused
+from rtshcua.front.cli.witnessed import Witnessing, addresses
+from rtshcua.onboard.ports import Anchored, Noted
+
+THERE = Address("udpout", "127.0.0.1", 14_600)
+KEYS = frozenset({bytes(32)})
+
+
+class Client:
+    """What the thread would say."""
+
+    waited: list[tuple[object, ...]]
+
+    def __init__(self, *given: object) -> None:
+        self.given = given
+        Client.waited = []
+
+    def news(self) -> list[Anchor | Trouble]:
+        return [Anchor("a note"), Trouble("a word")]
+
+    def finish(self, *last: object) -> list[Trouble]:
+        Client.waited.append(last)
+        return [Trouble("the end")]
+
+
+def test_addresses() -> None:
+    assert addresses(["udpout:127.0.0.1:14600"]) == (THERE,)
+    for text in ("udpin:127.0.0.1:14600", "x"):
+        with pytest.raises(ValueError, match=r"is no (way|kind)"):
+            addresses([text])
+
+
+def test_without_witnesses_there_is_nothing(tmp_path: Path) -> None:
+    nobody = Witnessing((), frozenset())
+    nobody.begin(tmp_path / "none", lambda: 0)
+    assert nobody.events(0) == []
+    nobody.finish(pytest.fail, closed=True)
+
+
+def test_a_root_that_names_none() -> None:
+    with pytest.raises(Refused) as refused:
+        Witnessing([THERE], frozenset())
+    assert (refused.value.code, refused.value.slug) == (ExitCode.UNTRUSTED, "no-witness")
+
+
+def test_a_host_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(host: str) -> str:
+        raise socket.gaierror(-2, "Name or service not known")
+
+    monkeypatch.setattr(witnessed.socket, "gethostbyname", unknown)
+    with pytest.raises(Refused) as refused:
+        Witnessing([Address("udpout", "nowhere", 1)], KEYS)
+    assert (refused.value.code, refused.value.slug) == (ExitCode.LINK, "witness-address")
+
+
+def test_what_comes_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(witnessed, "WitnessClient", Client)
+    for closed, waited in ((True, ()), (False, (0,))):
+        made = Witnessing([THERE], KEYS)
+        made.begin(tmp_path / "log.jsonl", lambda: 0)
+        assert made.events(7) == [Anchored(7, "a note"), Noted(7, "a word")]
+        said: list[str] = []
+        made.finish(said.append, closed=closed)
+        made.finish(said.append, closed=closed)
+        assert (said, Client.waited) == (["the end"], [waited])
+        assert made.events(8) == []

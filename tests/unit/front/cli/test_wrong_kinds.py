@@ -1,0 +1,82 @@
+"""Files that are not what a command takes: pipes for sources, pages for bundles, logs, proofs and keys."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.store.keystore import KeyStoreError, read_key
+from rtshcua.adapters.store.signing import LinkKeyError, open_link_key, read_link_key, write_link_key
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.app import main
+from rtshcua.front.cli.missing_file import missing
+from rtshcua.front.cli.recognising import no_bundle, no_log
+from rtshcua.wire.key_file import KeyFileError, dump_signing_key
+from rtshcua.wire.keys import Duty, SigningKey
+
+
+@pytest.mark.parametrize("command", ["check", "compile", "lint"])
+@pytest.mark.parametrize("name", ["-", "pipe.rts"])
+def test_a_source_that_is_no_file_is_told_as_that(
+    command: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe.rts")
+    assert main([command, name]) == ExitCode.INPUT
+    said = "".join(capsys.readouterr())
+    assert f"cannot read `{name}`: {'there is no such file' if name == '-' else 'no regular file'}" in said
+    assert "a source must be a file, because imports are found beside it: write it to one that ends in `.rts`" in said
+
+
+def test_the_standard_input_is_no_file_where_it_is_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
+    reads, writes = os.pipe()
+    try:
+        assert main(["check", f"/dev/fd/{reads}"]) == ExitCode.INPUT
+    finally:
+        os.close(reads)
+        os.close(writes)
+    said = "".join(capsys.readouterr())
+    assert "a source must be a file" in said
+    assert "did you mean" not in said
+
+
+def test_a_name_that_was_typed_is_never_suggested(tmp_path: Path) -> None:
+    (tmp_path / "log.rts").symlink_to("nowhere")
+    assert missing(tmp_path / "log.rts") is None
+
+
+def test_the_help_about_a_page_names_what_is_taken(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "README.md"
+    page.write_text("# A page\n")
+    mistaken = no_bundle(page)
+    assert mistaken is not None
+    assert mistaken.help == "accepted: a bundle, as `rtshcua compile` makes it"
+    assert no_log(page, page, "accepted: a log")[1] == "accepted: a log"
+    main(["check", str(page)])
+    assert "sources are plain text, in files that end in `.rts`" in "".join(capsys.readouterr())
+
+
+def test_what_is_no_key_is_told_as_that_and_a_key_by_its_mode(tmp_path: Path) -> None:
+    page, long, link, own = (tmp_path / name for name in ("page", "long", "link", "own"))
+    page.write_text("# A page\n")
+    long.write_text("# A page\n" * 1_000)
+    for each in (page, long):
+        each.chmod(0o644)
+        with pytest.raises(KeyFileError, match="not a key file"):
+            read_key(each, Duty.LOG, passphrase=None)
+        with pytest.raises(LinkKeyError, match="is no link key"):
+            read_link_key(each)
+    with pytest.raises(LinkKeyError, match="is no link key"):
+        open_link_key(long)
+    write_link_key(link, bytes(range(32)))
+    own.write_bytes(dump_signing_key(SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True), passphrase=None))
+    own.chmod(0o600)
+    assert read_link_key(link) == bytes(range(32))
+    assert read_key(own, Duty.LOG, passphrase=None).duty is Duty.LOG
+    for each in (link, own):
+        each.chmod(0o644)
+    with pytest.raises(KeyStoreError, match="others may read"):
+        read_key(own, Duty.LOG, passphrase=None)
+    for reads in (read_link_key, open_link_key):
+        with pytest.raises(LinkKeyError, match="others may read"):
+            reads(link)

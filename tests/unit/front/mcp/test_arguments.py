@@ -1,0 +1,65 @@
+"""Tools are called with what their schema asks, or are told what to write."""
+
+import json
+from typing import Any
+
+import pytest
+
+from rtshcua.front.mcp.arguments import Unfit, fitted
+from rtshcua.front.mcp.server import TOOLS
+
+SCHEMAS = {each.name: each.inputSchema for each in TOOLS}
+MISSION = {"format": "rtshcua/mission-spec", "phases": [{"name": "a"}]}
+
+
+@pytest.mark.parametrize(
+    ("tool", "given", "taken"),
+    [
+        ("describe_policy", {}, {}),
+        ("check_mission", {"mission": MISSION}, {"mission": MISSION}),
+        ("check_mission", {"mission": json.dumps(MISSION)}, {"mission": MISSION}),
+        ("mission_status", {"ticket": "t", "wait_s": 60}, {"ticket": "t", "wait_s": 60}),
+        ("mission_status", {"ticket": "t", "wait_s": 5.0}, {"ticket": "t", "wait_s": 5}),
+        *(("replan", each, each) for each in [{"mission": {}, "from_step_number": 1, "idempotency_key": ""}]),
+    ],
+)  # fmt: skip
+def test_taken(tool: str, given: dict[str, Any], taken: dict[str, Any]) -> None:
+    found = fitted(SCHEMAS[tool], given)
+    assert found == taken
+    assert {name: type(each) for name, each in found.items()} == {name: type(each) for name, each in taken.items()}
+
+
+@pytest.mark.parametrize(
+    ("tool", "given", "text", "repair"),
+    [
+        ("check_mission", {}, "the argument `mission` is missing", "give an object as `mission`"),
+        (
+            "check_mission",
+            {"mission": "fly home"},
+            "an object is asked as `mission`, and this is a text",
+            "give an object",
+        ),
+        ("check_mission", {"mission": "[1]"}, "an object is asked", "give an object"),
+        ("check_mission", {"mission": '{"a": 1, "a": 2}'}, "an object is asked", "give an object"),
+        ("check_mission", {"mission": "[" * 100_000}, "an object is asked", "give an object"),
+        ("check_mission", {"mission": None}, "this is null", "give an object"),
+        ("check_mission", {"mission": MISSION, "note": 1}, "there is no argument `note`", "there are: `mission`"),
+        ("describe_policy", {"x": 1}, "there is no argument `x`", "there are: none"),
+        ("mission_status", {"ticket": "t", "wait_s": "5"}, "a whole number is asked", "write 5 without quotes"),
+        ("mission_status", {"ticket": "t", "wait_s": 5.5}, "a whole number is asked", "give a whole number"),
+        ("mission_status", {"ticket": "t", "wait_s": True}, "this is true or false", "give a whole number"),
+        ("mission_status", {"ticket": "t", "wait_s": 61}, "`wait_s` is 61", "it goes from 0 to 60"),
+        ("mission_status", {"ticket": 7}, "a text is asked as `ticket`", 'write "7" as `ticket`'),
+        (
+            "replan",
+            {"mission": {}, "from_step_number": 0, "idempotency_key": "k"},
+            "`from_step_number` is 0",
+            "it goes from 1 on",
+        ),
+    ],
+)
+def test_told(tool: str, given: dict[str, Any], text: str, repair: str) -> None:
+    with pytest.raises(Unfit) as unfit:
+        fitted(SCHEMAS[tool], given)
+    assert text in str(unfit.value)
+    assert repair in unfit.value.repair

@@ -5,8 +5,8 @@ from math import isqrt
 from typing import Protocol
 
 from rtshcua.decision.outline import rings as outline
-from rtshcua.ground.geometry.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.geometry.shapes import Point, Region, Ring, bounds, shape_of
+from rtshcua.ground.geometry.polygons import Point, Ring
+from rtshcua.ground.geometry.shapes import Region, are_disjoint, bounds, lies_within, shape_of
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE, Zone
 
 #: how finely a zone is searched for a place before shapely is asked
@@ -50,7 +50,7 @@ class Plane:
 
     def apart(self, one: int, other: int) -> bool:
         """Whether it is proved that two zones have no place in common."""
-        return one != other and self._related(self._apart, min(one, other), max(one, other), have_nothing_in_common)
+        return one != other and self._related(self._apart, min(one, other), max(one, other), are_disjoint)
 
     def _related(
         self, known: dict[tuple[int, int], bool], one: int, other: int, holds: Callable[[Region, Region], bool]

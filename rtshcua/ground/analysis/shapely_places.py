@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import shapely
 
 from rtshcua.decision.outline import rings
-from rtshcua.ground.geometry.shapes import Point
+from rtshcua.ground.geometry.polygons import Point
 from rtshcua.model.flat.zone import CIRCLE, Zone
 
 #: straight pieces of a quarter circle

@@ -9,7 +9,7 @@ from rtshcua.decision.values import ABSENT, MISSING, PRESENT, TRUE, Truth, Value
 from rtshcua.ground.analysis.box import VEHICLE, Box, Cell, Who, clipped
 from rtshcua.ground.analysis.narrow import narrow
 from rtshcua.ground.analysis.space import Space
-from rtshcua.ground.geometry.shapes import Point
+from rtshcua.ground.geometry.polygons import Point
 
 #: how many values of a cell are tried where sums tie it to others
 _TRIES = 3

@@ -22,7 +22,7 @@ from rtshcua.diagnostics.kinds import GEOJSON, recognised
 from rtshcua.ground.checker.features import chosen
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.checker.unread import refuse_height
-from rtshcua.ground.geometry.polygons import Corner, contains, crossing, tangled
+from rtshcua.ground.geometry.polygons import Point, contains, crossing, touching_edges
 from rtshcua.ground.language.size import bare_of, values_of
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
@@ -52,7 +52,7 @@ _AS_BRACKETS = bytes.maketrans(b"{}", b"[]")
 _NO_BRACKETS = bytes(each for each in range(256) if each not in b"[]{}")
 
 #: corners of one ring as (longitude, latitude) in 1e-7 degree, not closed by a repeated corner
-GeoRing = tuple[Corner, ...]
+GeoRing = tuple[Point, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,7 +282,7 @@ def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:
 
 def _holes(rings: Sequence[GeoRing], pointer: str) -> None:
     """RFC 7946, 3.1.6, as for a polygon in a source: all holes lie within the exterior ring, apart from each other."""
-    met = tangled(rings)
+    met = touching_edges(rings)
     if met is not None:
         (one, i), (other, j) = met
         raise Refused(
@@ -341,7 +341,7 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
     return tuple(ring)
 
 
-def _position(numbers: Sequence[Any], pointer: str) -> Corner:
+def _position(numbers: Sequence[Any], pointer: str) -> Point:
     """RFC 7946, 3.1.1: longitude, latitude, and perhaps an altitude, which must be zero: a zone has its floor and its
     ceiling in the source. WGS 84 by section 4.
     """
@@ -380,7 +380,7 @@ def _array(value: Any, pointer: str) -> Sequence[Any]:
     raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` is not an array")
 
 
-def _written(corner: Corner) -> str:
+def _written(corner: Point) -> str:
     """A position as it stands in a file."""
     longitude, latitude = (Decimal(each) / _DEGREE for each in corner)
     return f"[{longitude}, {latitude}]"

@@ -1,30 +1,40 @@
-"""Grown and shrunk zones in whole millimetres, on the safe side.
+"""Grown and shrunk zones in whole millimetres, on the safe side; the same corners come out on every machine.
 
 `inner(shape, margin)` never has a point that the true set lacks, `outer` lacks none that it has; a positive margin
-grows, a negative one shrinks. Convex polygons have their edges moved (`convex`), and the result is proved; all others
-are grown and shrunk by a polygon that lies within the disc of the margin, or around it (`convolution`), by a few mm
-less or more than what rounding may have moved. What may fall into parts or enclose holes does.
+grows, a negative one shrinks. Most zones that people draw are convex: their edges are moved, and the result is proved.
+All others are grown and shrunk by a polygon that lies within the disc of the margin, or around it (a convolution), by
+a few mm less or more than what rounding may have moved. What may fall into parts or enclose holes does.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
+from fractions import Fraction
+from functools import cache, lru_cache
+from itertools import pairwise
+from math import isqrt
 
-from rtshcua.ground.geometry import convex, convolution
-from rtshcua.ground.geometry.arrangement import TooManyPieces
-from rtshcua.ground.geometry.distance import Edge, apart, within
-from rtshcua.ground.geometry.overlay import PULLED, ROUNDED, ROUNDS, Outlined, without_straight
-from rtshcua.ground.geometry.polygons import crossing, doubled_area
-from rtshcua.ground.geometry.rounds import COARSE, ROUGH, around_disc, within_disc
-from rtshcua.ground.geometry.shapes import (
-    Cornered,
-    Disc,
-    Outline,
-    Point,
-    Shape,
-    contains,
-    cornered,
-    edges,
+from rtshcua.ground.geometry.overlay import (
+    PULLED,
+    ROUNDED,
+    ROUNDS,
+    RoundedBoundary,
+    TooManyPieces,
+    Windings,
+    rounded_boundary,
+    without_straight,
 )
+from rtshcua.ground.geometry.polygons import (
+    Point,
+    Ring,
+    Segment,
+    are_apart,
+    crossing,
+    dot,
+    doubled_area,
+    is_beyond,
+    is_near,
+    scaled,
+)
+from rtshcua.ground.geometry.shapes import Disc, Polygonal, Shape, SimplePolygon, contains, edges, parts, polygonal
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
 #: rounding moves a corner by at most 0.71 mm, hence an edge too
@@ -34,7 +44,7 @@ MANY_CORNERS = 128
 _SLACKS = (ROUNDED + 1, PULLED + 1, ROUNDS * PULLED + 1)
 
 
-class Unshapely(Exception):
+class NoSuchOffset(Exception):
     """There is no such zone: `reason` is `nothing`, `unproved`, `corners`, or `far`."""
 
     def __init__(self, reason: str) -> None:
@@ -49,15 +59,15 @@ def inner(shape: Shape, margin: int) -> Shape:
         return shape
     if isinstance(shape, Disc):
         return _disc(shape, margin)
-    if _is_convex(shape):
+    if isinstance(shape, SimplePolygon) and is_convex(shape):
         return _convex_inner(shape, margin)
     fine = _fineness(shape)
     if margin > 0:
         if margin <= _SLACKS[-1]:
             return shape
-        return _made(lambda slack: convolution.grown(shape, within_disc((0, 0), margin - slack, fine)))
+        return _made(lambda slack: _convolved_grown(shape, within_disc((0, 0), margin - slack, fine)))
     return _made(
-        lambda slack: convolution.shrunk(shape, around_disc(slack - margin, fine)),
+        lambda slack: _convolved_shrunk(shape, around_disc(slack - margin, fine)),
         lambda made: _clear(made, shape, -margin),
     )
 
@@ -69,88 +79,86 @@ def outer(shape: Shape, margin: int) -> Shape:
         return shape
     if isinstance(shape, Disc):
         return _disc(shape, margin)
-    if _is_convex(shape):
+    if isinstance(shape, SimplePolygon) and is_convex(shape):
         return _convex_outer(shape, margin)
     fine = _fineness(shape)
     if margin > 0:
         return _made(
-            lambda slack: convolution.grown(shape, around_disc(margin + slack, fine)),
+            lambda slack: _convolved_grown(shape, around_disc(margin + slack, fine)),
             lambda made: _clear(shape, made, margin),
         )
     if -margin <= _SLACKS[-1]:
         return shape
-    return _made(lambda slack: convolution.shrunk(shape, within_disc((0, 0), -margin - slack, fine)))
+    return _made(lambda slack: _convolved_shrunk(shape, within_disc((0, 0), -margin - slack, fine)))
 
 
 def _disc(shape: Disc, margin: int) -> Disc:
     radius = shape.radius + margin
     if radius <= 0:
-        raise Unshapely("nothing")
+        raise NoSuchOffset("nothing")
     return Disc(shape.center, radius)
 
 
-def _fineness(shape: Cornered) -> int:
+def _fineness(shape: Polygonal) -> int:
     """How fine the margin's disc is drawn: every corner of a zone may get an arc of it."""
     return COARSE if sum(map(len, shape.rings)) <= MANY_CORNERS else ROUGH
 
 
-def _made(make: Callable[[int], Outlined | None], proved: Callable[[Cornered], bool] = lambda _: True) -> Cornered:
+def _made(
+    make: Callable[[int], RoundedBoundary | None], proved: Callable[[Polygonal], bool] = lambda _: True
+) -> Polygonal:
     """The first result that was moved by less than the slack that it was made with, and is proved."""
     for slack in _SLACKS:
         try:
             made = make(slack)
         except TooManyPieces as error:
-            raise Unshapely("unproved") from error
+            raise NoSuchOffset("unproved") from error
         if made is None or made.moved >= slack:
             continue
         if not made.rings:
-            raise Unshapely("nothing")
+            raise NoSuchOffset("nothing")
         if len(made.rings) > MAX_RINGS or sum(map(len, made.rings)) > MAX_VERTICES:
-            raise Unshapely("corners")
-        shape = cornered(made.rings)
+            raise NoSuchOffset("corners")
+        shape = polygonal(made.rings)
         if proved(shape):
             return shape
-    raise Unshapely("unproved")
+    raise NoSuchOffset("unproved")
 
 
 # --------------------------------------------------------------------------------------------------------- convex
 
 
-def _is_convex(shape: Cornered) -> bool:
-    return isinstance(shape, Outline) and convex.is_convex(shape)
-
-
-def _convex_inner(shape: Cornered, margin: int) -> Outline:
-    assert isinstance(shape, Outline)
+def _convex_inner(shape: SimplePolygon, margin: int) -> SimplePolygon:
     if margin > 0:
-        return _search(margin, lambda far: convex.rounded(shape, far), lambda made: _near(made, shape, margin), -1)
-    return _search(-margin, lambda far: convex.shrunk(shape, far), lambda made: _clear(made, shape, -margin), 1)
+        return _search(margin, lambda far: _convex_rounded(shape, far), lambda made: _near(made, shape, margin), -1)
+    return _search(-margin, lambda far: _convex_shrunk(shape, far), lambda made: _clear(made, shape, -margin), 1)
 
 
-def _convex_outer(shape: Cornered, margin: int) -> Outline:
-    assert isinstance(shape, Outline)
+def _convex_outer(shape: SimplePolygon, margin: int) -> SimplePolygon:
     if margin > 0:
-        return _search(margin, lambda far: convex.mitred(shape, far), lambda made: _clear(shape, made, margin), 1)
-    return _search(-margin, lambda far: convex.shrunk(shape, far), lambda made: _near(made, shape, -margin), -1)
+        return _search(margin, lambda far: _convex_mitred(shape, far), lambda made: _clear(shape, made, margin), 1)
+    return _search(-margin, lambda far: _convex_shrunk(shape, far), lambda made: _near(made, shape, -margin), -1)
 
 
-def _search(margin: int, make: Callable[[int], list[Point]], proved: Callable[[Outline], bool], sign: int) -> Outline:
+def _search(
+    margin: int, make: Callable[[int], list[Point]], proved: Callable[[SimplePolygon], bool], sign: int
+) -> SimplePolygon:
     """The first offset, of growing slack, that integers prove."""
     for slack in (SNAP_MM, SNAP_MM + margin // 64, SNAP_MM + margin // 16):
         kept = without_straight(make(margin + sign * slack))
         if not kept or doubled_area(kept) == 0:
-            raise Unshapely("nothing")
+            raise NoSuchOffset("nothing")
         first = kept.index(min(kept))
-        made = Outline((*kept[first:], *kept[:first]))
+        made = SimplePolygon((*kept[first:], *kept[:first]))
         if crossing(made.corners) is None and proved(made):
             return made
-    raise Unshapely("unproved")
+    raise NoSuchOffset("unproved")
 
 
 # ------------------------------------------------------------------------------------------------------- proofs
 
 
-def _clear(small: Cornered, large: Cornered, margin: int) -> bool:
+def _clear(small: Polygonal, large: Polygonal, margin: int) -> bool:
     """Whether `small` lies in `large` and their boundaries are at least `margin` apart everywhere.
 
     A ring that meets no boundary of the other area is all inside of it or all outside, so one corner of each tells.
@@ -159,23 +167,23 @@ def _clear(small: Cornered, large: Cornered, margin: int) -> bool:
         return False
     if any(contains(small, ring[0]) for ring in large.rings):
         return False
-    return all(apart(one, other, margin) for one, other in _close_pairs(edges(small), edges(large), margin))
+    return all(are_apart(one, other, margin) for one, other in _close_pairs(edges(small), edges(large), margin))
 
 
-def _near(made: Outline, shape: Outline, margin: int) -> bool:
+def _near(made: SimplePolygon, shape: SimplePolygon, margin: int) -> bool:
     """Whether each edge of `made` has both its ends within `margin` of one edge of `shape`, hence all of it."""
     ours, theirs = edges(made), edges(shape)
-    proved: set[Edge] = set()
+    proved: set[Segment] = set()
     for one, other in _close_pairs(ours, theirs, margin):
-        if one not in proved and within(one[0], other, margin) and within(one[1], other, margin):
+        if one not in proved and is_near(one[0], other, margin) and is_near(one[1], other, margin):
             proved.add(one)
     return len(proved) == len(set(ours))
 
 
-def _close_pairs(ours: Sequence[Edge], theirs: Sequence[Edge], margin: int) -> Iterator[tuple[Edge, Edge]]:
+def _close_pairs(ours: Sequence[Segment], theirs: Sequence[Segment], margin: int) -> Iterator[tuple[Segment, Segment]]:
     """The pairs of edges whose extents are at most `margin` apart: a sweep from west to east."""
     waiting = sorted(theirs, key=_west)
-    active: list[Edge] = []
+    active: list[Segment] = []
     at = 0
     for one in sorted(ours, key=_west):
         (ax, ay), (bx, by) = one
@@ -191,5 +199,244 @@ def _close_pairs(ours: Sequence[Edge], theirs: Sequence[Edge], margin: int) -> I
                 yield one, other
 
 
-def _west(edge: Edge) -> int:
+def _west(edge: Segment) -> int:
     return min(edge[0][0], edge[1][0])
+
+
+# ------------------------------------------------------------------------------------------ edges that are moved
+
+#: a polygon with more corners is convolved: cutting takes the square of their number
+MOST_CONVEX_CORNERS = 64
+
+#: a turn between two edges is rounded in steps of at most 22.5 degrees: the cosine, in thousandths
+_ARC_STEP = 924
+
+_Exact = tuple[Fraction, Fraction]
+
+
+def is_convex(outline: SimplePolygon) -> bool:
+    """Whether a counter-clockwise outline turns left at each corner, and is small enough for its edges to be moved."""
+    if len(outline.corners) > MOST_CONVEX_CORNERS:
+        return False
+    directions = [(b[0] - a[0], b[1] - a[1]) for a, b in edges(outline)]
+    turns = zip(directions, [*directions[1:], directions[0]], strict=True)
+    return all(u[0] * v[1] > u[1] * v[0] for u, v in turns)
+
+
+def _convex_rounded(outline: SimplePolygon, distance: int) -> list[Point]:
+    """Grown, with an inscribed arc around each corner."""
+    corners: list[Point] = []
+    for corner, before, after in _corner_normals(outline, distance):
+        corners += [(corner[0] + x, corner[1] + y) for x, y in (before, *_arc(before, after, distance), after)]
+    return corners
+
+
+def _convex_mitred(outline: SimplePolygon, distance: int) -> list[Point]:
+    """Grown, with the edges prolonged until they meet; a corner of less than 90 degrees is cut off across."""
+    corners: list[Point] = []
+    for corner, before, after in _corner_normals(outline, distance):
+        normals = [before, after]
+        if dot(before, after) < 0:
+            normals.insert(1, scaled((before[0] + after[0], before[1] + after[1]), distance))
+        for a, b in pairwise(normals):
+            share = Fraction(distance * distance, distance * distance + dot(a, b))
+            corners.append((corner[0] + round((a[0] + b[0]) * share), corner[1] + round((a[1] + b[1]) * share)))
+    return corners
+
+
+def _convex_shrunk(outline: SimplePolygon, distance: int) -> list[Point]:
+    """What is at least `distance` away from every edge; no corners where there is nothing."""
+    left: list[_Exact] = [(Fraction(x), Fraction(y)) for x, y in outline.corners]
+    for (ax, ay), (bx, by) in edges(outline):
+        dx, dy = bx - ax, by - ay
+        room = isqrt(distance * distance * (dx * dx + dy * dy) - 1) + 1
+        left = _cut(left, dx, dy, dx * ay - dy * ax + room)
+        if not left:
+            return []
+    return [(round(x), round(y)) for x, y in left]
+
+
+def _cut(corners: Sequence[_Exact], dx: int, dy: int, least: int) -> list[_Exact]:
+    """The part of a convex polygon where `dx * y - dy * x >= least`."""
+    kept: list[_Exact] = []
+    for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
+        over_a, over_b = dx * a[1] - dy * a[0] - least, dx * b[1] - dy * b[0] - least
+        if over_a >= 0:
+            kept.append(a)
+        if (over_a > 0 > over_b) or (over_a < 0 < over_b):
+            share = over_a / (over_a - over_b)
+            kept.append((a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share))
+    return kept
+
+
+def _corner_normals(outline: SimplePolygon, distance: int) -> Iterator[tuple[Point, Point, Point]]:
+    """Each corner with the outward normals, of length `distance`, of the edges before and after it."""
+    normals = [scaled((b[1] - a[1], a[0] - b[0]), distance) for a, b in edges(outline)]
+    return zip(outline.corners, [normals[-1], *normals[:-1]], normals, strict=True)
+
+
+def _arc(before: Point, after: Point, distance: int, halvings: int = 3) -> list[Point]:
+    """The vectors between two of length `distance`, at most a step apart."""
+    if not halvings or 1000 * dot(before, after) >= _ARC_STEP * distance * distance:
+        return []
+    middle = scaled((before[0] + after[0], before[1] + after[1]), distance)
+    left, right = _arc(before, middle, distance, halvings - 1), _arc(middle, after, distance, halvings - 1)
+    return [*left, middle, *right]
+
+
+# ----------------------------------------------------------------------------------------------- convolutions
+
+
+def _convolved_grown(shape: Polygonal, kernel: Ring) -> RoundedBoundary | None:
+    """All places that the kernel reaches from inside the shape; None where that has no outline in whole mm."""
+    groups: list[list[list[Point]]] = []
+    areas: list[tuple[int, list[int]]] = []
+    for outer, holes in parts(shape):
+        areas.append((len(groups), []))
+        groups.append([_convolution(outer, kernel)])
+        for hole in holes:
+            if _has_room(hole, kernel):
+                areas[-1][1].append(len(groups))
+                groups.append([_convolution(hole, kernel)])
+
+    def inside(windings: Windings) -> bool:
+        return any(windings[outer] > 0 and all(windings[hole] >= 0 for hole in holes) for outer, holes in areas)
+
+    return rounded_boundary(groups, inside)
+
+
+def _convolved_shrunk(shape: Polygonal, kernel: Ring) -> RoundedBoundary | None:
+    """All places around which the whole kernel lies in the shape; None as for `_convolved_grown`."""
+    groups: list[list[list[Point]]] = []
+    areas: list[tuple[int, list[int]]] = []
+    for outer, holes in parts(shape):
+        if _has_room(outer, kernel):
+            areas.append((len(groups), list(range(len(groups) + 1, len(groups) + 1 + len(holes)))))
+            groups += [[_convolution(ring[::-1], kernel)] for ring in (outer, *holes)]
+
+    def inside(windings: Windings) -> bool:
+        return any(windings[outer] < 0 and all(windings[hole] <= 0 for hole in holes) for outer, holes in areas)
+
+    return rounded_boundary(groups, inside)
+
+
+def _has_room(ring: Ring, kernel: Ring) -> bool:
+    """Whether the kernel might lie in a ring: nothing lies in what is smaller than itself."""
+    return abs(doubled_area(ring)) > doubled_area(kernel)
+
+
+def _convolution(ring: Ring, kernel: Ring) -> list[Point]:
+    """The convolution of a ring with a kernel K: a curve that runs along the ring, each edge moved by the corner of K
+    that lies furthest out, and at each corner along K's edges, forwards where the ring turns left and backwards where
+    it turns right.
+
+    Around a point x it winds as often as the ring's inside has parts in x - K (Guibas, Ramshaw, Stolfi: A kinetic
+    framework for computational geometry, 1983), the ring's inside being on its left. K is symmetric, so x - K is x + K:
+
+    - for a counter-clockwise ring, x + K meets its inside where the winding is above zero;
+    - for a clockwise ring, the winding is the number of parts of its *outside* in x + K, less one for all that is far
+      away. So x + K lies in the hole where the winding is below zero. Were the whole hole in x + K, the outside would
+      have a hole there and count the same; but then the hole has no room for K at all, and is left out.
+
+    A connected set that has no point in an area lies in one of its holes, or outside of all outer rings. So an area
+    meets x + K where x + K meets the inside of an outer ring and lies in none of that ring's holes. To shrink an area
+    is to grow what is around it: all rings are turned about.
+    """
+    count = len(kernel)
+    following = (*ring[1:], ring[0])
+    directions = [(b[0] - a[0], b[1] - a[1]) for a, b in zip(ring, following, strict=True)]
+    outermost = [_outermost(direction, kernel) for direction in directions]
+    points: list[Point] = []
+    for i, (x, y) in enumerate(ring):
+        (ux, uy), (vx, vy) = directions[i - 1], directions[i]
+        at, to = outermost[i - 1], outermost[i]
+        step = 1 if ux * vy > uy * vx else -1
+        points.append((x + kernel[at][0], y + kernel[at][1]))
+        while at != to:
+            at = (at + step) % count
+            points.append((x + kernel[at][0], y + kernel[at][1]))
+    return points
+
+
+def _outermost(direction: Point, kernel: Sequence[Point]) -> int:
+    """The corner of the kernel furthest to the right of a direction; of two, the one that comes first."""
+    dx, dy = direction
+    reach = [dy * x - dx * y for x, y in kernel]
+    first = reach.index(max(reach))
+    return len(kernel) - 1 if first == 0 and reach[-1] == reach[0] else first
+
+
+# -------------------------------------------------------------------------------------------- discs as polygons
+# The corners come from halving a quarter turn with integer roots: the same on every machine.
+
+#: halvings of a quarter turn: 128 corners, between which an arc is at most 0.031 % of the radius from its chord
+FINE = 5
+#: 64 corners: 0.121 %; 16 corners: 1.93 %
+COARSE, ROUGH = 4, 2
+_SCALE = 1 << 40
+
+
+def within_disc(center: Point, radius: int, halvings: int = FINE) -> Ring:
+    """A polygon within a disc, counter-clockwise; no edge is further than 0.031 % of the radius and 2 mm inside."""
+    return _moved(_hull([_shrunk(each, radius) for each in _unit_circle(halvings)]), center)
+
+
+@cache
+def around_disc(radius: int, halvings: int = COARSE) -> Ring:
+    """A polygon around a disc at the origin: its corners are 0.13 % of the radius and a few mm further out, 2 % if it
+    is rough.
+    """
+    reach = radius + radius // (800 if halvings > ROUGH else 50) + 2
+    while True:
+        ring = tuple(_hull([_shrunk(each, reach) for each in _unit_circle(halvings)]))
+        if all(is_beyond((0, 0), edge, radius) for edge in pairwise((*ring, ring[0]))):
+            return ring
+        reach += 1 + radius // 10_000
+
+
+def _shrunk(unit: Point, radius: int) -> Point:
+    """A corner on a circle, rounded towards its centre."""
+    x, y = abs(unit[0]) * radius // _SCALE, abs(unit[1]) * radius // _SCALE
+    return (x if unit[0] >= 0 else -x), (y if unit[1] >= 0 else -y)
+
+
+@cache
+def _unit_circle(halvings: int) -> tuple[Point, ...]:
+    """The corners of a regular polygon in a circle of radius `_SCALE`, counter-clockwise from east."""
+    quarter: list[Point] = [(_SCALE, 0), (0, _SCALE)]
+    for _ in range(halvings):
+        halved = [quarter[0]]
+        for a, b in pairwise(quarter):
+            halved += [scaled((a[0] + b[0], a[1] + b[1]), _SCALE), b]
+        quarter = halved
+    quarter.pop()
+    return (
+        *quarter,
+        *((-y, x) for x, y in quarter),
+        *((-x, -y) for x, y in quarter),
+        *((y, -x) for x, y in quarter),
+    )
+
+
+def _hull(points: Sequence[Point]) -> list[Point]:
+    """The strictly convex hull, counter-clockwise (Andrew's monotone chain); one point for a single place."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+    chains: list[list[Point]] = []
+    for each in (ordered, ordered[::-1]):
+        chain: list[Point] = []
+        for point in each:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
+                chain.pop()
+            chain.append(point)
+        chains.append(chain[:-1])
+    return chains[0] + chains[1]
+
+
+def _turn(a: Point, b: Point, c: Point) -> int:
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _moved(ring: Sequence[Point], by: Point) -> Ring:
+    return tuple((x + by[0], y + by[1]) for x, y in ring)

@@ -1,17 +1,211 @@
-"""What closed curves in the integer plane enclose together: unions, differences, and whatever else a rule on windings
-asks for, with whole millimetres for corners.
+"""What closed curves in the integer plane enclose together: unions, differences, and any other rule on windings, with
+corners in whole millimetres.
 
-The boundary is computed in exact fractions (`arrangement`). Rounding its corners moves it by less than 1 mm, hence no
-point further than that from it changes sides; where boundaries touch, the corners are drawn apart, and where rounding
-made edges meet, the result is laid over itself again. `Outlined.moved` bounds it all.
+Every curve belongs to a group; the *winding* of a group at a point is how often its curves go around the point,
+counter-clockwise. The *arrangement* of all curves cuts their edges where they meet, in exact fractions. Between the
+pieces lie *faces*, each with one winding of every group. Going around a node from piece to piece carries the windings
+on, so only one point of each connected drawing is located by a ray.
+
+The boundary of an overlay runs between faces inside and outside. Rounding its corners moves it by less than 1 mm, hence
+no point further than that from it changes sides. Where boundaries touch, the corners are drawn apart; where rounding
+made edges meet, the result is laid over itself again. `RoundedBoundary.moved` bounds it all. No float: the same comes
+out on every machine.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cmp_to_key
+from itertools import pairwise
 from math import isqrt
 
-from rtshcua.ground.geometry.arrangement import Key, Node, Ring, Windings, pieces_of, turned
-from rtshcua.ground.geometry.polygons import Corner, doubled_area, tangled
+from rtshcua.ground.geometry.polygons import Point, doubled_area, sides, touching_edges
+
+#: windings of the groups, in their order
+Windings = tuple[int, ...]
+Curve = Sequence[Point]
+#: a place where pieces meet: integers, or fractions where edges cross
+Node = tuple[int | Fraction, int | Fraction]
+#: a piece of an edge from its lexicographically lower end to the other
+Key = tuple[Node, Node]
+_Edge = tuple[Point, Point, int]
+
+#: curves that meet more often are no zone that anybody drew; they would take minutes
+MOST_MEETINGS = 1 << 18
+
+
+class _Crossing(Fraction):
+    """A coordinate of a place where edges cross; its hash, which is slow to compute, is asked for often."""
+
+    __slots__ = ("_hash",)
+
+    def __hash__(self) -> int:  # type: ignore[override]  # typeshed takes it from `Complex`, which has none
+        try:
+            return self._hash
+        except AttributeError:
+            self._hash: int = super().__hash__()
+            return self._hash
+
+
+class TooManyPieces(Exception):
+    """The curves meet more often than `MOST_MEETINGS`."""
+
+
+@dataclass(slots=True)
+class EdgePiece:
+    """`turns` is what crossing it from right to left adds to the windings, seen from its lower to its upper end."""
+
+    direction: Point
+    turns: list[int]
+    left: Windings = ()
+    right: Windings = ()
+
+
+def faces(groups: Sequence[Sequence[Curve]]) -> Iterator[Windings]:
+    """The windings of every face, some of them more than once."""
+    for piece in pieces_of(groups).values():
+        yield piece.left
+        yield piece.right
+
+
+def pieces_of(groups: Sequence[Sequence[Curve]]) -> dict[Key, EdgePiece]:
+    """The pieces that part faces of different windings, with the windings on both sides."""
+    edges = [(a, b, group) for group, rings in enumerate(groups) for ring in rings for a, b in sides(ring) if a != b]
+    pieces: dict[Key, EdgePiece] = {}
+    for (a, b, group), cuts in zip(edges, _cuts(edges), strict=True):
+        forward = a < b
+        direction = (b[0] - a[0], b[1] - a[1]) if forward else (a[0] - b[0], a[1] - b[1])
+        nodes: list[Node] = sorted({a, b, *cuts})
+        for key in pairwise(nodes):
+            piece = pieces.get(key)
+            if piece is None:
+                piece = pieces[key] = EdgePiece(direction, [0] * len(groups))
+            piece.turns[group] += 1 if forward else -1
+    pieces = {key: piece for key, piece in pieces.items() if any(piece.turns)}
+    _wind(pieces, edges, len(groups))
+    return pieces
+
+
+def _cuts(edges: Sequence[_Edge]) -> list[list[Node]]:
+    """Where each edge meets others: a sweep by their west ends."""
+    found: list[list[Node]] = [[] for _ in edges]
+    boxes = [(min(a[0], b[0]), max(a[0], b[0]), min(a[1], b[1]), max(a[1], b[1])) for a, b, _ in edges]
+    active: list[int] = []
+    met = 0
+    for i in sorted(range(len(edges)), key=lambda each: boxes[each][0]):
+        west, _, south, north = boxes[i]
+        active = [j for j in active if boxes[j][1] >= west]
+        for j in active:
+            if boxes[j][3] < south or boxes[j][2] > north:
+                continue
+            for node in _common(edges[i], edges[j]):
+                found[i].append(node)
+                found[j].append(node)
+                met += 1
+        if met > MOST_MEETINGS:
+            raise TooManyPieces
+        active.append(i)
+    return found
+
+
+def _common(one: _Edge, other: _Edge) -> list[Node]:
+    """The points that two segments have in common, but for shared ends; of a common stretch, its ends."""
+    a, b, _ = one
+    c, d, _ = other
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]
+    cross = ux * vy - uy * vx
+    wx, wy = c[0] - a[0], c[1] - a[1]
+    if cross == 0:
+        if ux * wy != uy * wx:
+            return []
+        low, high = max(min(a, b), min(c, d)), min(max(a, b), max(c, d))
+        return [low, high] if low <= high else []
+    if a in (c, d) or b in (c, d):
+        return []
+    t, s = wx * vy - wy * vx, wx * uy - wy * ux
+    if cross < 0:
+        cross, t, s = -cross, -t, -s
+    if not (0 <= t <= cross and 0 <= s <= cross):
+        return []
+    if t in (0, cross):
+        return [b if t else a]
+    if s in (0, cross):
+        return [d if s else c]
+    return [(_Crossing(a[0] * cross + ux * t, cross), _Crossing(a[1] * cross + uy * t, cross))]
+
+
+def _wind(pieces: dict[Key, EdgePiece], edges: Sequence[_Edge], groups: int) -> None:
+    """Give every piece the windings of both sides."""
+    at: dict[Node, list[Key]] = {}
+    for key in pieces:
+        at.setdefault(key[0], []).append(key)
+        at.setdefault(key[1], []).append(key)
+    for first, piece in pieces.items():
+        if piece.left:
+            continue
+        _locate(first, piece, edges, groups)
+        waiting: list[Node] = list(first)
+        seen = set(waiting)
+        while waiting:
+            node = waiting.pop()
+            keys = turned(node, at[node], pieces)
+            start = next(number for number, key in enumerate(keys) if pieces[key].left)
+            known = pieces[keys[start]]
+            here = known.left if keys[start][0] == node else known.right
+            for key in (*keys[start + 1 :], *keys[:start]):
+                away = key[0] == node
+                each = pieces[key]
+                there = tuple(w + t if away else w - t for w, t in zip(here, each.turns, strict=True))
+                each.left, each.right = (there, here) if away else (here, there)
+                here = there
+                other = key[1] if away else key[0]
+                if other not in seen:
+                    seen.add(other)
+                    waiting.append(other)
+
+
+def turned(node: Node, keys: list[Key], pieces: dict[Key, EdgePiece]) -> list[Key]:
+    """The pieces at a node in the order of their directions, counter-clockwise."""
+    if len(keys) <= 2:
+        return keys
+
+    def away(key: Key) -> Point:
+        x, y = pieces[key].direction
+        return (x, y) if key[0] == node else (-x, -y)
+
+    def compare(one: Key, other: Key) -> int:
+        (ux, uy), (vx, vy) = away(one), away(other)
+        upper, lower = (uy, ux) > (0, 0), (vy, vx) > (0, 0)
+        if upper != lower:
+            return -1 if upper else 1
+        cross = ux * vy - uy * vx
+        return (cross < 0) - (cross > 0)
+
+    return sorted(keys, key=cmp_to_key(compare))
+
+
+def _locate(key: Key, piece: EdgePiece, edges: Sequence[_Edge], groups: int) -> None:
+    """The windings on both sides of a piece, by a ray from its middle: upwards, or eastwards from a vertical one."""
+    (ax, ay), (bx, by) = key
+    x, y = Fraction(ax + bx) / 2, Fraction(ay + by) / 2
+    scale = x.denominator * y.denominator
+    px, py = int(x * scale), int(y * scale)
+    beyond = [0] * groups
+    upwards = piece.direction[0] != 0
+    for (cx, cy), (dx, dy), group in edges:
+        low, high, level = (cx, dx, px) if upwards else (cy, dy, py)
+        if (low * scale > level) == (high * scale > level):
+            continue
+        side = (dx - cx) * (py - cy * scale) - (dy - cy) * (px - cx * scale)  # above zero where the place lies left
+        rising = high > low
+        if side and (side < 0) == (rising if upwards else not rising):
+            beyond[group] += (-1 if rising else 1) if upwards else (1 if rising else -1)
+    near = tuple(beyond)
+    if upwards:  # the place just above is on the left of a piece that goes east
+        piece.left, piece.right = near, tuple(w - t for w, t in zip(near, piece.turns, strict=True))
+    else:  # the place just east is on the right of a piece that goes north
+        piece.left, piece.right = tuple(w + t for w, t in zip(near, piece.turns, strict=True)), near
+
 
 #: how often a result is laid over itself
 ROUNDS = 3
@@ -22,16 +216,16 @@ ROUNDED, PULLED = 1, 1 + PULL
 
 
 @dataclass(frozen=True, slots=True)
-class Outlined:
+class RoundedBoundary:
     """Simple rings without a common point: outer ones counter-clockwise, holes clockwise; and how far, in mm, their
     boundary may lie from the true one at most.
     """
 
-    rings: tuple[tuple[Corner, ...], ...]
+    rings: tuple[tuple[Point, ...], ...]
     moved: int
 
 
-def outlined(groups: Sequence[Sequence[Ring]], inside: Callable[[Windings], bool]) -> Outlined | None:
+def rounded_boundary(groups: Sequence[Sequence[Curve]], inside: Callable[[Windings], bool]) -> RoundedBoundary | None:
     """The boundary of the points whose windings `inside` accepts; None where it cannot be had in whole millimetres.
 
     Nothing that goes on for ever may be inside: `inside` refuses windings of 0.
@@ -40,13 +234,13 @@ def outlined(groups: Sequence[Sequence[Ring]], inside: Callable[[Windings], bool
     for _ in range(ROUNDS):
         rings, pulled = _apart([each for each in map(_rounded, _boundary(groups, inside)) if each])
         moved += PULLED if pulled else ROUNDED
-        if tangled(rings) is None and nested(rings):
-            return Outlined(tuple(sorted(_from_least(ring) for ring in rings)), moved)
+        if touching_edges(rings) is None and nested(rings):
+            return RoundedBoundary(tuple(sorted(_from_least(ring) for ring in rings)), moved)
         groups, inside = [rings], _enclosed
     return None
 
 
-def nested(rings: Sequence[Ring]) -> bool:
+def nested(rings: Sequence[Curve]) -> bool:
     """Whether simple rings without a common point are the boundary of an area: outer rings go counter-clockwise and
     holes clockwise, and each outer ring lies in a hole or in nothing, each hole in an outer ring.
     """
@@ -62,10 +256,10 @@ def nested(rings: Sequence[Ring]) -> bool:
     return True
 
 
-def _around(ring: Ring, x: int, y: int) -> int:
+def _around(ring: Curve, x: int, y: int) -> int:
     """The winding of a ring at a place that is not on it."""
     winding = 0
-    for (ax, ay), (bx, by) in zip(ring, [*ring[1:], ring[0]], strict=True):
+    for (ax, ay), (bx, by) in sides(ring):
         if (ay > y) != (by > y):
             side = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
             if (side > 0) == (by > ay):
@@ -77,12 +271,12 @@ def _enclosed(windings: Windings) -> bool:
     return windings[0] > 0
 
 
-def _box(ring: Ring) -> tuple[int, int, int, int]:
+def _box(ring: Curve) -> tuple[int, int, int, int]:
     xs, ys = zip(*ring, strict=True)
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def _boundary(groups: Sequence[Sequence[Ring]], inside: Callable[[Windings], bool]) -> list[list[Node]]:
+def _boundary(groups: Sequence[Sequence[Curve]], inside: Callable[[Windings], bool]) -> list[list[Node]]:
     """The exact boundary: rings with the inside on their left. Where it touches itself, the rings go around the inside
     on each side of the place, so that they touch and never cross.
     """
@@ -124,17 +318,17 @@ def _boundary(groups: Sequence[Sequence[Ring]], inside: Callable[[Windings], boo
     return rings
 
 
-def _rounded(ring: Sequence[Node]) -> list[Corner]:
+def _rounded(ring: Sequence[Node]) -> list[Point]:
     """A ring with corners in whole millimetres, without repetitions and without spikes; empty where nothing is left."""
     return without_straight([(round(x), round(y)) for x, y in ring])
 
 
-def without_straight(corners: Sequence[Corner]) -> list[Corner]:
+def without_straight(corners: Sequence[Point]) -> list[Point]:
     """The corners without repetitions and spikes, and without those on a straight line between their neighbours."""
     kept = list(corners)
     while True:
         kept = [b for a, b in zip([*kept[-1:], *kept[:-1]], kept, strict=True) if a != b]
-        left: list[Corner] = []
+        left: list[Point] = []
         for number, b in enumerate(kept):
             a = left[-1] if left else kept[-1]
             c = kept[(number + 1) % len(kept)]
@@ -145,9 +339,9 @@ def without_straight(corners: Sequence[Corner]) -> list[Corner]:
         kept = left
 
 
-def _apart(rings: Sequence[list[Corner]]) -> tuple[list[list[Corner]], bool]:
+def _apart(rings: Sequence[list[Point]]) -> tuple[list[list[Point]], bool]:
     """The rings with corners that are visited more than once drawn to the inside, and whether there were any."""
-    visits: dict[Corner, int] = {}
+    visits: dict[Point, int] = {}
     for ring in rings:
         for corner in ring:
             visits[corner] = visits.get(corner, 0) + 1
@@ -160,7 +354,7 @@ def _apart(rings: Sequence[list[Corner]]) -> tuple[list[list[Corner]], bool]:
     return [each for each in map(without_straight, drawn) if each], True
 
 
-def _drawn(a: Corner, b: Corner, c: Corner) -> Corner:
+def _drawn(a: Point, b: Point, c: Point) -> Point:
     """A corner moved by at most `PULL` to the left of a ring that comes from `a` and goes on to `c`."""
     (ux, uy), (vx, vy) = _unit(b, a), _unit(b, c)
     x, y = ux + vx, uy + vy
@@ -170,7 +364,7 @@ def _drawn(a: Corner, b: Corner, c: Corner) -> Corner:
     return b[0] + _part(x, length), b[1] + _part(y, length)
 
 
-def _unit(a: Corner, b: Corner) -> Corner:
+def _unit(a: Point, b: Point) -> Point:
     """The direction from a to b, of a length of 2**20."""
     x, y = b[0] - a[0], b[1] - a[1]
     length = isqrt((x * x + y * y) << 20) + 1
@@ -183,6 +377,6 @@ def _part(value: int, length: int) -> int:
     return whole if value >= 0 else -whole
 
 
-def _from_least(ring: list[Corner]) -> tuple[Corner, ...]:
+def _from_least(ring: list[Point]) -> tuple[Point, ...]:
     first = ring.index(min(ring))
     return (*ring[first:], *ring[:first])

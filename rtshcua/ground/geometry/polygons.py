@@ -1,30 +1,41 @@
-"""Exact predicates over polygons with integer corners, in any plane unit."""
+"""Points, segments and polygons with integer coordinates: exact predicates and distances, without a root or a float."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from math import isqrt
 
-#: corners as (x, y)
-Corner = tuple[int, int]
+#: a place or a vector: x (east) and y (north), mm where nothing else is said
+Point = tuple[int, int]
+#: the corners of a closed line; its last edge goes from the last corner to the first
+Ring = tuple[Point, ...]
+#: an edge, or any straight piece: from one end to the other
+Segment = tuple[Point, Point]
 
 
-def doubled_area(corners: Sequence[Corner]) -> int:
+def sides(ring: Sequence[Point]) -> Iterator[Segment]:
+    """The edges of a ring, from each corner to the next."""
+    return zip(ring, (*ring[1:], ring[0]), strict=True)
+
+
+def doubled_area(corners: Sequence[Point]) -> int:
     """Twice the signed area: above zero where the corners go counter-clockwise."""
-    return sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True))
+    return sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in sides(corners))
 
 
-def counter_clockwise(corners: Sequence[Corner]) -> list[Corner]:
+def counter_clockwise(corners: Sequence[Point]) -> list[Point]:
     """The same polygon with its inside on the left, beginning at the same corner."""
     return list(corners) if doubled_area(corners) > 0 else [corners[0], *reversed(corners[1:])]
 
 
-def crossing(corners: Sequence[Corner]) -> tuple[int, int] | None:
+def crossing(corners: Sequence[Point]) -> tuple[int, int] | None:
     """The numbers of two edges that meet where they should not, or None for a simple polygon. Edge i goes from corner i
     to the next.
     """
-    met = tangled([corners])
+    met = touching_edges([corners])
     return None if met is None else (met[0][1], met[1][1])
 
 
-def tangled(rings: Sequence[Sequence[Corner]]) -> tuple[tuple[int, int], tuple[int, int]] | None:
+def touching_edges(rings: Sequence[Sequence[Point]]) -> tuple[tuple[int, int], tuple[int, int]] | None:
     """Two edges, each as the numbers of its ring and of its first corner, that meet where they should not; None where
     all rings are simple and have no point in common.
 
@@ -32,7 +43,7 @@ def tangled(rings: Sequence[Sequence[Corner]]) -> tuple[tuple[int, int], tuple[i
     are compared whose extents overlap.
     """
     names = [(number, i) for number, ring in enumerate(rings) for i in range(len(ring))]
-    edges = [(rings[number][i], rings[number][(i + 1) % len(rings[number])]) for number, i in names]
+    edges = [edge for ring in rings for edge in sides(ring)]
     order = sorted(range(len(edges)), key=lambda i: min(edges[i][0][0], edges[i][1][0]))
     active: list[int] = []
     for i in order:
@@ -55,8 +66,8 @@ def tangled(rings: Sequence[Sequence[Corner]]) -> tuple[tuple[int, int], tuple[i
 
 
 def _meet_badly(
-    one: tuple[Corner, Corner],
-    other: tuple[Corner, Corner],
+    one: tuple[Point, Point],
+    other: tuple[Point, Point],
     first: tuple[int, int],
     second: tuple[int, int],
     count: int,
@@ -71,7 +82,7 @@ def _meet_badly(
     return meet(*one, *other)
 
 
-def _folds(first: tuple[Corner, Corner], second: tuple[Corner, Corner]) -> bool:
+def _folds(first: tuple[Point, Point], second: tuple[Point, Point]) -> bool:
     """Whether an edge runs back over the one before it."""
     a, b = first
     _, c = second
@@ -79,7 +90,7 @@ def _folds(first: tuple[Corner, Corner], second: tuple[Corner, Corner]) -> bool:
     return turned and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0
 
 
-def meet(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
+def meet(a: Point, b: Point, c: Point, d: Point) -> bool:
     """Whether the closed segments a-b and c-d have a point in common."""
     s0, s1, s2, s3 = _side(a, b, c), _side(a, b, d), _side(c, d, a), _side(c, d, b)
     if ((s0 > 0) != (s1 > 0)) and ((s2 > 0) != (s3 > 0)) and 0 not in (s0, s1, s2, s3):
@@ -92,29 +103,99 @@ def meet(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
     )
 
 
-def _side(a: Corner, b: Corner, p: Corner) -> int:
+def _side(a: Point, b: Point, p: Point) -> int:
     """Above zero where p lies left of a-b, zero on its line."""
     return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 
 
-def _between(a: Corner, b: Corner, p: Corner) -> bool:
+def _between(a: Point, b: Point, p: Point) -> bool:
     """Whether p, which is on the line of a-b, is within its extent."""
     return min(a[0], b[0]) <= p[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= p[1] <= max(a[1], b[1])
 
 
-def contains(corners: Sequence[Corner], p: Corner) -> bool:
+def contains(corners: Sequence[Point], p: Point) -> bool:
     """Whether p is strictly inside a simple polygon."""
     return contained((corners,), p)
 
 
-def contained(rings: Iterable[Sequence[Corner]], p: Corner) -> bool:
+def contained(rings: Iterable[Sequence[Point]], p: Point) -> bool:
     """Whether p is strictly inside an area: an odd number of edges of its rings lies east of it, and none on it."""
     inside = False
     for corners in rings:
-        for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
+        for a, b in sides(corners):
             side = _side(a, b, p)
             if side == 0 and _between(a, b, p):
                 return False
             if (a[1] > p[1]) != (b[1] > p[1]) and (side > 0) == (b[1] > a[1]):
                 inside = not inside
     return inside
+
+
+def path_length(points: Sequence[Point]) -> int:
+    """The length of a path in mm, rounded down leg by leg."""
+    return sum(length(a, b) for a, b in pairwise(points))
+
+
+def length(a: Point, b: Point) -> int:
+    """The distance of two points in mm, rounded down."""
+    return isqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
+
+
+def scaled(vector: Point, length: int) -> Point:
+    """The vector of that length in the same direction, its parts rounded towards zero."""
+    x, y = vector
+    root = isqrt((x * x + y * y) << 40) + 1
+
+    def part(value: int) -> int:
+        magnitude = (abs(value) * length << 20) // root
+        return magnitude if value >= 0 else -magnitude
+
+    return part(x), part(y)
+
+
+def dot(a: Point, b: Point) -> int:
+    """The inner product."""
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def square(a: Point, b: Point) -> int:
+    """The squared distance of two points."""
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2
+
+
+def is_near(p: Point, edge: Segment, limit: int) -> bool:
+    """Whether p is at most `limit` (not negative) from a segment."""
+    return _compare(p, edge, limit) <= 0
+
+
+def are_apart(one: Segment, other: Segment, limit: int) -> bool:
+    """Whether two segments are at least `limit` (above zero) from each other everywhere."""
+    if meet(*one, *other):
+        return False
+    return (
+        _compare(one[0], other, limit) >= 0
+        and _compare(one[1], other, limit) >= 0
+        and _compare(other[0], one, limit) >= 0
+        and _compare(other[1], one, limit) >= 0
+    )
+
+
+def is_beyond(p: Point, edge: Segment, limit: int) -> bool:
+    """Whether p is at least `limit` from a segment."""
+    return _compare(p, edge, limit) >= 0
+
+
+def _compare(p: Point, edge: Segment, limit: int) -> int:
+    """The sign of the distance of p from a segment, less `limit`."""
+    (ax, ay), (bx, by) = edge
+    ux, uy, vx, vy = bx - ax, by - ay, p[0] - ax, p[1] - ay
+    along, square = ux * vx + uy * vy, ux * ux + uy * uy
+    if along <= 0:
+        distance, bound = vx * vx + vy * vy, limit * limit
+    elif along >= square:
+        wx, wy = p[0] - bx, p[1] - by
+        distance, bound = wx * wx + wy * wy, limit * limit
+    else:
+        cross = ux * vy - uy * vx
+        distance, bound = cross * cross, limit * limit * square
+    return (distance > bound) - (distance < bound)

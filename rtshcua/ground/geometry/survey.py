@@ -6,14 +6,116 @@ height apart, which is what a camera of 53 degrees sees at once; never closer th
 perimeter is that around the area, not those around its holes. An area in several parts has no path.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from functools import lru_cache
 
-from rtshcua.ground.geometry.distance import far
-from rtshcua.ground.geometry.offset import Unshapely, inner
-from rtshcua.ground.geometry.polygons import contained, doubled_area, meet
-from rtshcua.ground.geometry.shapes import Disc, Point, Ring, Shape, parts
-from rtshcua.ground.geometry.ways import Met, Rings, length, numbered, part, sides, way
+from rtshcua.ground.geometry.offset import NoSuchOffset, inner
+from rtshcua.ground.geometry.polygons import (
+    Point,
+    Ring,
+    Segment,
+    contained,
+    doubled_area,
+    is_beyond,
+    length,
+    meet,
+    path_length,
+    sides,
+)
+from rtshcua.ground.geometry.shapes import Disc, Shape, parts
+
+#: the outer ring of an area, and its holes
+Rings = tuple[Ring, ...]
+#: a point on the edge, the number of its ring, and that of the edge in the ring
+EdgePoint = tuple[Point, int, int]
+
+
+def path_within(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[Point]:
+    """The corners of a way between two points on the edge of an area.
+
+    It is straight where it can be. Where the straight way meets a ring, it follows that to where the straight way
+    leaves it for the last time: from there on, the straight way is on the right side of that ring. Both ends being in
+    the area, it meets each ring once.
+    """
+    if _straight(rings, start, end):
+        return []
+    if start[1] == end[1]:
+        return _along(rings, start, end)
+    met = _crossings(rings, start, end)
+    here, passed = start, Fraction(0)
+    points: list[Point] = []
+    while True:
+        passed, there = max((t, each) for t, each in met if each[1] == here[1])
+        points += [*_along(rings, here, there), there[0]]
+        if there == end:
+            return points[:-1]
+        passed, here = min((t, each) for t, each in met if t > passed)
+        points.append(here[0])
+
+
+def _crossings(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[tuple[Fraction, EdgePoint]]:
+    """Where the straight way meets edges, with how far along it that is; both ends are among them."""
+    (px, py), (qx, qy) = start[0], end[0]
+    found = [(Fraction(0), start), (Fraction(1), end)]
+    ux, uy = qx - px, qy - py
+    for ring, number, (a, b) in numbered_edges(rings):
+        if (ring, number) in (start[1:], end[1:]) or not meet(start[0], end[0], a, b):
+            continue
+        vx, vy = b[0] - a[0], b[1] - a[1]
+        cross = ux * vy - uy * vx
+        if cross:
+            along = Fraction((a[0] - px) * vy - (a[1] - py) * vx, cross)
+            if 0 < along < 1:
+                over = (a[0] - px) * uy - (a[1] - py) * ux
+                found.append(
+                    (
+                        along,
+                        ((interpolate(a[0], b[0], over, cross), interpolate(a[1], b[1], over, cross)), ring, number),
+                    )
+                )
+    return found
+
+
+def _along(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[Point]:
+    """The corners between two points of one ring, the shorter way round."""
+    (p, ring, first), (q, _, last) = start, end
+    corners, count = rings[ring], len(rings[ring])
+    onward = [corners[(first + 1 + k) % count] for k in range((last - first) % count)]
+    back = [corners[(first - k) % count] for k in range((first - last) % count)]
+    return min(onward, back, key=lambda points: path_length([p, *points, q]))
+
+
+def _straight(rings: Rings, start: EdgePoint, end: EdgePoint) -> bool:
+    """Whether the way between two points on the edge is inside: it meets no other edge, and its middle is inside. Where
+    it begins or ends at a corner, both edges of that are its own.
+    """
+    p, q = start[0], end[0]
+    if start[1:] == end[1:]:
+        return True
+    middle = ((p[0] + q[0]) // 2, (p[1] + q[1]) // 2)
+    if not contained(rings, middle):
+        return False
+    return not any(
+        meet(p, q, *edge)
+        for ring, number, edge in numbered_edges(rings)
+        if (ring, number) not in (start[1:], end[1:]) and p not in edge and q not in edge
+    )
+
+
+def numbered_edges(rings: Rings) -> Iterator[tuple[int, int, Segment]]:
+    """Every edge, with the number of its ring and its own."""
+    for number, ring in enumerate(rings):
+        for at, edge in enumerate(sides(ring)):
+            yield number, at, edge
+
+
+def interpolate(a: int, b: int, over: int, whole: int) -> int:
+    """`a + (b - a) * over / whole`, to the nearest integer."""
+    if whole < 0:
+        over, whole = -over, -whole
+    return a + (2 * (b - a) * over + whole) // (2 * whole)
+
 
 LEAST_SPACING = 5_000  # mm
 LEAST_INSET = 1_000  # mm
@@ -35,7 +137,7 @@ def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | N
     """The points of a path in `area`, beginning at the end nearer to `start`; None where the area is too small."""
     try:
         shape = _inset(area, max(inset, LEAST_INSET))
-    except Unshapely:
+    except NoSuchOffset:
         return None
     if isinstance(shape, Disc):
         rings: Rings = (_regular(shape.center, shape.radius),)
@@ -60,10 +162,10 @@ def _regular(center: Point, radius: int) -> tuple[Point, ...]:
     """A regular 16-gon in a circle, rounded towards its centre."""
     x, y = center
 
-    def scaled(part: int) -> int:
-        return radius * part // CIRCLE_SCALE if part >= 0 else -(radius * -part // CIRCLE_SCALE)
+    def scale(share: int) -> int:
+        return radius * share // CIRCLE_SCALE if share >= 0 else -(radius * -share // CIRCLE_SCALE)
 
-    return tuple((x + scaled(dx), y + scaled(dy)) for dx, dy in CORNERS)
+    return tuple((x + scale(dx), y + scale(dy)) for dx, dy in CORNERS)
 
 
 def _perimeter(rings: Rings, _: int) -> list[Point]:
@@ -80,7 +182,7 @@ def _orbit(rings: Rings, _: int) -> list[Point] | None:
     low, high = 0, max(length(center, corner) for corner in outer)
     while high - low > 1:
         middle = (low + high) // 2
-        if all(far(center, edge, middle) for edge in sides(outer)):
+        if all(is_beyond(center, edge, middle) for edge in sides(outer)):
             low = middle
         else:
             high = middle
@@ -112,25 +214,25 @@ def _grid(rings: Rings, spacing: int) -> list[Point]:
     low, width = min(heights), max(heights) - min(heights)
     count = min(max(1, -(-width // (spacing * unit))), MOST_LINES)
     path: list[Point] = []
-    last: Met | None = None
+    last: EdgePoint | None = None
     for line in range(count):
         met = _line(rings, across, low + (2 * line + 1) * width // (2 * count))
         met.sort(key=lambda each: (along[0] * each[0][0] + along[1] * each[0][1], each[1:]), reverse=bool(line % 2))
         for each in met:
-            path += [*(() if last is None else way(rings, last, each)), each[0]]
+            path += [*(() if last is None else path_within(rings, last, each)), each[0]]
             last = each
     return _distinct(path)
 
 
-def _line(rings: Rings, across: Point, height: int) -> list[Met]:
+def _line(rings: Rings, across: Point, height: int) -> list[EdgePoint]:
     """Where the line `across . p = height` enters and leaves the area."""
-    met: list[Met] = []
-    for ring, number, (a, b) in numbered(rings):
+    met: list[EdgePoint] = []
+    for ring, number, (a, b) in numbered_edges(rings):
         over_a = across[0] * a[0] + across[1] * a[1] - height
         over_b = across[0] * b[0] + across[1] * b[1] - height
         if (over_a < 0) != (over_b < 0):
             whole = over_a - over_b
-            met.append(((part(a[0], b[0], over_a, whole), part(a[1], b[1], over_a, whole)), ring, number))
+            met.append(((interpolate(a[0], b[0], over_a, whole), interpolate(a[1], b[1], over_a, whole)), ring, number))
     return met
 
 

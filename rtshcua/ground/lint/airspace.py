@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
-from rtshcua.ground.geometry.relations import have_nothing_in_common
+from rtshcua.ground.geometry.shapes import are_disjoint
 from rtshcua.ground.lint.reach import Reach, reach_of, region_of
 from rtshcua.ground.lint.subject import Subject
 from rtshcua.ground.prove.situation import Ground
@@ -54,7 +54,7 @@ def _found(ground: Ground, reach: Reach, name: Name, what: str) -> Diagnostic:
 
 def _apart(one: Zone, other: Zone) -> bool:
     """Whether it is proved that two zones have nothing in common, whenever they exist."""
-    return have_nothing_in_common(region_of(one), region_of(other))
+    return are_disjoint(region_of(one), region_of(other))
 
 
 def _shut_out(ground: Ground, name: Name, within: Name) -> Diagnostic:

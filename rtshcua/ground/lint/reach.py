@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 from rtshcua.decision.times import timed
 from rtshcua.ground.analysis.plane import rings_of
-from rtshcua.ground.geometry.relations import lies_within
-from rtshcua.ground.geometry.shapes import Disc, Region, cornered
+from rtshcua.ground.geometry.shapes import Disc, Region, lies_within, polygonal
 from rtshcua.model.flat.policy import Policy, Vehicle
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
@@ -35,7 +34,7 @@ class Reach(NamedTuple):
         if zone.shape == CIRCLE:
             x, y, squared = zone.data
             return isqrt(squared) - isqrt(x * x + y * y) - 1 > self.across
-        plan = Region(cornered(rings_of(zone)), LOWEST, HIGHEST)
+        plan = Region(polygonal(rings_of(zone)), LOWEST, HIGHEST)
         return lies_within(Region(Disc((0, 0), self.across), LOWEST, HIGHEST), plan)
 
     def misses(self, zone: Zone) -> bool:
@@ -72,7 +71,7 @@ def region_of(zone: Zone) -> Region:
     if zone.shape == CIRCLE:
         x, y, squared = zone.data
         return Region(Disc((x, y), isqrt(squared) + 1), zone.floor, zone.ceiling)
-    return Region(cornered(rings_of(zone)), zone.floor, zone.ceiling)
+    return Region(polygonal(rings_of(zone)), zone.floor, zone.ceiling)
 
 
 def _distance(zone: Zone) -> int:

@@ -16,13 +16,10 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.geojson import GeoRing
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.geometry.arrangement import Ring as Curve
-from rtshcua.ground.geometry.arrangement import TooManyPieces, Windings
-from rtshcua.ground.geometry.overlay import nested, outlined
-from rtshcua.ground.geometry.polygons import counter_clockwise, tangled
-from rtshcua.ground.geometry.rounds import within_disc
-from rtshcua.ground.geometry.shapes import Cornered, Disc, Outline, Point, Ring, Shape, cornered, corners
-from rtshcua.ground.geometry.vectors import scaled
+from rtshcua.ground.geometry.offset import within_disc
+from rtshcua.ground.geometry.overlay import Curve, TooManyPieces, Windings, nested, rounded_boundary
+from rtshcua.ground.geometry.polygons import Point, Ring, counter_clockwise, scaled, touching_edges
+from rtshcua.ground.geometry.shapes import Disc, Polygonal, Shape, SimplePolygon, corners, polygonal
 from rtshcua.model.flat.zone import MAX_COORDINATE, MAX_RINGS, MAX_VERTICES, Projection, project
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import Circle, Combination, Corridor, GeoJson, Polygon, ZoneDecl
@@ -79,7 +76,7 @@ class GroundPlans:
             case _:
                 return self.of(self._zones[shape.name])
 
-    def _polygon(self, shape: Polygon, zone: ZoneDecl) -> Cornered | None:
+    def _polygon(self, shape: Polygon, zone: ZoneDecl) -> Polygonal | None:
         rings: list[Ring] = []
         for number, written in enumerate((shape.corners, *shape.holes)):
             placed = [self.place(corner) for corner in written]
@@ -87,16 +84,16 @@ class GroundPlans:
             if len(found) < len(placed):
                 return None
             rings.append(_turned(found, hole=number > 0))
-        if tangled(rings) is not None or not nested(rings):
+        if touching_edges(rings) is not None or not nested(rings):
             self._report.add(
                 codes.BAD_POLYGON,
                 zone.name.span,
                 f"the edges of `{zone.name.text}` touch each other when its corners are rounded to millimetres",
             )
             return None
-        return cornered(tuple(rings))
+        return polygonal(tuple(rings))
 
-    def _corridor(self, shape: Corridor, zone: ZoneDecl) -> Cornered | None:
+    def _corridor(self, shape: Corridor, zone: ZoneDecl) -> Polygonal | None:
         """A disc around each place, and between them rectangles: what any of them covers."""
         placed = [self.place(point) for point in shape.points]
         points = [point for point in placed if point is not None]
@@ -109,7 +106,7 @@ class GroundPlans:
             curves.append(((ax + x, ay + y), (bx + x, by + y), (bx - x, by - y), (ax - x, ay - y)))
         return self._outlined([curves], lambda windings: windings[0] > 0, shape.span, zone)
 
-    def _geojson(self, shape: GeoJson, zone: ZoneDecl) -> Cornered | None:
+    def _geojson(self, shape: GeoJson, zone: ZoneDecl) -> Polygonal | None:
         """Each polygon without its holes, all together. Rings may touch each other there: RFC 7946 leaves it open."""
         area = self._data.area(shape)
         if not isinstance(area, tuple):
@@ -124,7 +121,7 @@ class GroundPlans:
                 rings.append(_turned(found, hole=number > 0))
             groups.append(rings)
         together = [tuple(ring) for rings in groups for ring in rings]
-        if tangled(together) is None and nested(together):
+        if touching_edges(together) is None and nested(together):
             return self._bounded(tuple(together), shape.span, zone)
         return self._outlined(groups, lambda windings: max(windings) > 0, shape.span, zone)
 
@@ -136,7 +133,7 @@ class GroundPlans:
                 return
             yield point
 
-    def _combination(self, shape: Combination, zone: ZoneDecl) -> Cornered | None:
+    def _combination(self, shape: Combination, zone: ZoneDecl) -> Polygonal | None:
         operands = [self._shape(each, zone) for each in shape.shapes]
         found = [_polygonal(each) for each in operands if each is not None]
         if len(found) < len(operands):
@@ -151,9 +148,9 @@ class GroundPlans:
 
     def _outlined(
         self, groups: Sequence[Sequence[Curve]], inside: Callable[[Windings], bool], span: Span, zone: ZoneDecl
-    ) -> Cornered | None:
+    ) -> Polygonal | None:
         try:
-            made = outlined(groups, inside)
+            made = rounded_boundary(groups, inside)
         except TooManyPieces:
             made = None
         if made is None:
@@ -176,7 +173,7 @@ class GroundPlans:
             return None
         return self._bounded(made.rings, span, zone)
 
-    def _bounded(self, rings: tuple[Ring, ...], span: Span, zone: ZoneDecl) -> Cornered | None:
+    def _bounded(self, rings: tuple[Ring, ...], span: Span, zone: ZoneDecl) -> Polygonal | None:
         """The shape, unless it is more than fits on board."""
         count = sum(map(len, rings))
         if count > MAX_VERTICES or len(rings) > MAX_RINGS:
@@ -187,7 +184,7 @@ class GroundPlans:
                 codes.TOO_MANY, span, f"the outline of `{zone.name.text}` has {many}, and at most {most:,} fit on board"
             )
             return None
-        shape = cornered(rings)
+        shape = polygonal(rings)
         if any(max(abs(x), abs(y)) > MAX_COORDINATE for x, y in corners(shape)):
             self._report.add(
                 codes.TOO_FAR, span, f"`{zone.name.text}` reaches further than 500 km from the vehicle's home"
@@ -196,8 +193,8 @@ class GroundPlans:
         return shape
 
 
-def _polygonal(shape: Shape) -> Cornered:
-    return Outline(within_disc(shape.center, shape.radius)) if isinstance(shape, Disc) else shape
+def _polygonal(shape: Shape) -> Polygonal:
+    return SimplePolygon(within_disc(shape.center, shape.radius)) if isinstance(shape, Disc) else shape
 
 
 def _turned(ring: Sequence[Point], *, hole: bool) -> Ring:

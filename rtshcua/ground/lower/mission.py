@@ -15,7 +15,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.geometry.shapes import Area, parts
+from rtshcua.ground.geometry.shapes import MultiPolygon, parts
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, survey
 from rtshcua.ground.lower import lacking
 from rtshcua.ground.lower.conditions import Place
@@ -359,7 +359,7 @@ def _covered(
     points = survey(region.shape, pattern, altitude, under.policy.vehicle.position_error, start)
     if points is None:
         shape = region.shape
-        several = len(parts(shape)) if isinstance(shape, Area) else 1
+        several = len(parts(shape)) if isinstance(shape, MultiPolygon) else 1
         context.report.add(
             codes.AREA_TOO_SMALL,
             step.span,

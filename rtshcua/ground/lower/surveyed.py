@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.decision.contracts import first_cell
-from rtshcua.ground.geometry.shapes import Point, shape_of
+from rtshcua.ground.geometry.polygons import Point, path_length
+from rtshcua.ground.geometry.shapes import shape_of
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, PATTERNS, survey
-from rtshcua.ground.geometry.ways import path_length
 from rtshcua.model.flat.contract import CHOICE, ZONE, MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy

@@ -16,10 +16,9 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.zones import entry_outside
 from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.geometry.offset import Unshapely, inner, outer
-from rtshcua.ground.geometry.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.geometry.shapes import Disc, Point, Region, Shape, bounds, contains
-from rtshcua.ground.geometry.vectors import square
+from rtshcua.ground.geometry.offset import NoSuchOffset, inner, outer
+from rtshcua.ground.geometry.polygons import Point, square
+from rtshcua.ground.geometry.shapes import Disc, Region, Shape, are_disjoint, bounds, contains, lies_within
 from rtshcua.ground.lower.clock import week
 from rtshcua.ground.lower.ground_plan import GroundPlans
 from rtshcua.ground.lower.heights import Heights
@@ -110,7 +109,7 @@ class ZoneTable:
         other = self.region(name, margin, smaller=smaller, span=span)
         if other is None:
             return tuple(range(len(self.regions)))
-        return self._which(lambda region: have_nothing_in_common(region, other, surely=not smaller))
+        return self._which(lambda region: are_disjoint(region, other, surely=not smaller))
 
     def region(self, name: str, margin: int, *, smaller: bool, span: Span) -> Region | None:
         """A declared zone grown by `margin`, as a region of the plane; None, and reported, where nothing is left."""
@@ -119,7 +118,7 @@ class ZoneTable:
             return None
         try:
             return _grown(self.regions[number], margin, smaller=smaller)
-        except Unshapely as unshapely:
+        except NoSuchOffset as unshapely:
             self._unshapely(unshapely, number, margin, span)
             return None
 
@@ -171,7 +170,7 @@ class ZoneTable:
                 region = _grown(self.regions[number], margin, smaller=smaller).banded(smaller=smaller)
                 name = derived_name(self._declarations[number].name.text, margin, smaller=smaller)
                 zone = NOWHERE if region is None else region.flat(name)
-            except Unshapely as unshapely:
+            except NoSuchOffset as unshapely:
                 zone = NOWHERE if smaller or unshapely.reason == "nothing" else EVERYWHERE
             found = self._derived[key] = self._add(zone)
         return found
@@ -180,7 +179,7 @@ class ZoneTable:
         self.derived.append(zone)
         return len(self.regions) + len(self.derived) - 1
 
-    def _unshapely(self, unshapely: Unshapely, number: int, margin: int, span: Span) -> None:
+    def _unshapely(self, unshapely: NoSuchOffset, number: int, margin: int, span: Span) -> None:
         zone = self._declarations[number]
         done = f"{'grown' if margin > 0 else 'shrunk'} by {display(abs(margin), Dimension.LENGTH)}"
         labels = [(zone.name.span, "the zone is declared here")]
@@ -231,5 +230,5 @@ def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
     """A region grown by `margin` on the safe side, as long as it stays within the local plane."""
     shape = inner(region.shape, margin) if smaller else outer(region.shape, margin)
     if max(map(abs, bounds(shape))) > MAX_COORDINATE:
-        raise Unshapely("far")
+        raise NoSuchOffset("far")
     return replace(region, shape=shape)

@@ -31,8 +31,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.sizes import named_at
-from rtshcua.ground.geometry.shapes import Point
-from rtshcua.ground.geometry.ways import length
+from rtshcua.ground.geometry.polygons import Point, length
 from rtshcua.ground.lower.mission import argument_span
 from rtshcua.ground.prove.places import Place, planned
 from rtshcua.ground.prove.situation import Ground

@@ -20,7 +20,7 @@ from rtshcua.decision.zones import Sweep
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.words import clock
-from rtshcua.ground.geometry.shapes import Point
+from rtshcua.ground.geometry.polygons import Point
 from rtshcua.ground.lower.mission import argument_span
 from rtshcua.ground.prove.leaving import Leg, breach, path_legs, places_along, position
 from rtshcua.ground.prove.period import Period, at_moment, keeps, zone_span

@@ -6,7 +6,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import height, on_globe, quantity
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.geometry.polygons import Corner, contained, contains, crossing, tangled
+from rtshcua.ground.geometry.polygons import Point, contained, contains, crossing, touching_edges
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES, meridian
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import Circle, Corridor, GeoJson, Polygon, ZoneDecl
@@ -151,7 +151,7 @@ def _holes(context: Context, zone: ZoneDecl, shape: Polygon) -> bool:
     """Whether all holes lie in the polygon, and apart from each other."""
     rings = (shape.corners, *shape.holes)
     placed = [_corners(shape, ring) for ring in rings]
-    met = tangled(placed)
+    met = touching_edges(placed)
     if met is not None:
         (one, i), (other, j) = met
         context.report.add(
@@ -192,10 +192,10 @@ def entry_outside(report: Report, zone: ZoneDecl) -> None:
     )
 
 
-def _corners(shape: Polygon, ring: tuple[Coordinates, ...]) -> list[Corner]:
+def _corners(shape: Polygon, ring: tuple[Coordinates, ...]) -> list[Point]:
     return [_corner(each, shape.corners[0]) for each in ring]
 
 
-def _corner(place: Coordinates, near: Coordinates) -> Corner:
+def _corner(place: Coordinates, near: Coordinates) -> Point:
     """A place in the plane of longitudes and latitudes around another, across longitude 180 where that is shorter."""
     return meridian(place.longitude, near.longitude), place.latitude

@@ -6,7 +6,7 @@ from itertools import pairwise
 from math import hypot
 from typing import Final
 
-from rtshcua.ground.geometry.shapes import Outline
+from rtshcua.ground.geometry.shapes import SimplePolygon
 from rtshcua.ground.geometry.survey import survey
 from rtshcua.ground.report.drawing.canvas import number
 
@@ -32,7 +32,7 @@ class Pattern:
 @cache
 def drawn(name: str) -> Pattern:
     """The drawing of a pattern by its name."""
-    way = survey(Outline(_AREA), name, _HEIGHT, _INSET, _ENTRY)
+    way = survey(SimplePolygon(_AREA), name, _HEIGHT, _INSET, _ENTRY)
     assert way is not None
     scale = (_WIDTH - 2 * _MARGIN) / max(x for x, _ in _AREA)
 

@@ -9,13 +9,32 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rtshcua.ground.geometry.distance import apart, far, within
-from rtshcua.ground.geometry.offset import Unshapely, inner, outer
+from rtshcua.ground.geometry.offset import NoSuchOffset, inner, outer
 from rtshcua.ground.geometry.overlay import nested
-from rtshcua.ground.geometry.polygons import contains, counter_clockwise, crossing, doubled_area, meet, tangled
+from rtshcua.ground.geometry.polygons import (
+    Point,
+    are_apart,
+    contains,
+    counter_clockwise,
+    crossing,
+    doubled_area,
+    is_beyond,
+    is_near,
+    meet,
+    touching_edges,
+)
 from rtshcua.ground.geometry.projection import projection_at
-from rtshcua.ground.geometry.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.geometry.shapes import Area, Disc, Outline, Point, Region, Shape, edges, parts
+from rtshcua.ground.geometry.shapes import (
+    Disc,
+    MultiPolygon,
+    Region,
+    Shape,
+    SimplePolygon,
+    are_disjoint,
+    edges,
+    lies_within,
+    parts,
+)
 from rtshcua.ground.geometry.shapes import contains as contains_area
 from rtshcua.ground.geometry.survey import LEAST_INSET, survey
 from rtshcua.model.flat.zone import SHIFT
@@ -24,7 +43,7 @@ POINTS = st.tuples(st.integers(-30, 30), st.integers(-30, 30))
 RAW = st.lists(POINTS, min_size=3, max_size=8, unique=True)
 
 
-def star(radii: list[int], turn: int) -> Outline:
+def star(radii: list[int], turn: int) -> SimplePolygon:
     """A simple polygon around the origin, one corner for each radius."""
     corners = [
         (
@@ -34,7 +53,7 @@ def star(radii: list[int], turn: int) -> Outline:
         for k, r in enumerate(radii)
     ]
     assume(crossing(corners) is None and doubled_area(corners) != 0)
-    return Outline(tuple(counter_clockwise(corners)))
+    return SimplePolygon(tuple(counter_clockwise(corners)))
 
 
 STARS = st.builds(star, st.lists(st.integers(5_000, 60_000), min_size=3, max_size=9), st.integers(0, 9))
@@ -81,15 +100,15 @@ def test_distances_compare_exactly(a: Point, b: Point, c: Point, d: Point, limit
     assume(a != b and c != d)
     distance = shapely.LineString([a, b]).distance(shapely.LineString([c, d]))
     assume(abs(distance - limit) > 1e-9)
-    assert apart((a, b), (c, d), limit) == (distance > limit)
+    assert are_apart((a, b), (c, d), limit) == (distance > limit)
     reach = shapely.LineString([a, b]).distance(shapely.Point(c))
     assume(abs(reach - limit) > 1e-9)
-    assert within(c, (a, b), limit) == (reach < limit)
-    assert far(c, (a, b), limit) == (reach > limit)
+    assert is_near(c, (a, b), limit) == (reach < limit)
+    assert is_beyond(c, (a, b), limit) == (reach > limit)
 
 
 @given(STARS, st.sampled_from([15_000, 3_000, 200, -200, -3_000]))
-def test_the_inner_offset_is_within_the_true_one_and_the_outer_around_it(shape: Outline, margin: int) -> None:
+def test_the_inner_offset_is_within_the_true_one_and_the_outer_around_it(shape: SimplePolygon, margin: int) -> None:
     true = polygon(shape).buffer(margin, quad_segs=256)
     small, large = made(inner, shape, margin), made(outer, shape, margin)
     assert margin < 0 or (small is not None and large is not None)
@@ -104,7 +123,7 @@ def made(offset: Callable[[Shape, int], Shape], shape: Shape, margin: int) -> Sh
     """An offset zone, or None where a narrow one vanishes or falls into parts."""
     try:
         return offset(shape, margin)
-    except Unshapely as unshapely:
+    except NoSuchOffset as unshapely:
         if unshapely.reason == "nothing":
             return None
         raise
@@ -113,12 +132,12 @@ def made(offset: Callable[[Shape, int], Shape], shape: Shape, margin: int) -> Sh
 def test_a_disc_grows_and_shrinks_exactly() -> None:
     assert inner(Disc((5, 6), 100), 20) == outer(Disc((5, 6), 100), 20) == Disc((5, 6), 120)
     assert inner(Disc((5, 6), 100), -20) == Disc((5, 6), 80)
-    with pytest.raises(Unshapely):
+    with pytest.raises(NoSuchOffset):
         inner(Disc((5, 6), 100), -100)
 
 
 def test_a_hole_is_never_flown_in_and_always_kept_out_of() -> None:
-    bay = Outline(
+    bay = SimplePolygon(
         (
             (0, 0),
             (60_000, 0),
@@ -136,14 +155,14 @@ def test_a_hole_is_never_flown_in_and_always_kept_out_of() -> None:
     )
     for offset in (inner, outer):
         shape = offset(bay, 4_000)
-        assert isinstance(shape, Area)
+        assert isinstance(shape, MultiPolygon)
         assert not contains_area(shape, (30_000, 30_000))
         assert contains_area(shape, (30_000, 55_000))
 
 
 SHAPES = st.one_of(
     st.builds(Disc, POINTS, st.integers(1, 30)),
-    RAW.filter(lambda corners: crossing(corners) is None).map(lambda c: Outline(tuple(counter_clockwise(c)))),
+    RAW.filter(lambda corners: crossing(corners) is None).map(lambda c: SimplePolygon(tuple(counter_clockwise(c)))),
 )
 
 
@@ -152,44 +171,44 @@ def test_containment_and_disjointness_agree_with_shapely(one: Shape, other: Shap
     a, b = Region(one, 0, 10), Region(other, 0, 10)
     first, second = polygon(one), polygon(other)
     overlap = first.intersection(second).area
-    if isinstance(one, Outline) and isinstance(other, Outline):
+    if isinstance(one, SimplePolygon) and isinstance(other, SimplePolygon):
         assert lies_within(a, b) == second.covers(first)
-        assert have_nothing_in_common(a, b) == (not first.relate_pattern(second, "T********"))
+        assert are_disjoint(a, b) == (not first.relate_pattern(second, "T********"))
     else:  # a disc is only nearly a polygon
         if lies_within(a, b):
             assert overlap > 0.99 * first.area
-        if have_nothing_in_common(a, b):
+        if are_disjoint(a, b):
             assert overlap < 0.01 * first.area
         if overlap < 0.9 * first.area:
             assert not lies_within(a, b)
         if overlap > 0.1 * first.area:
-            assert not have_nothing_in_common(a, b)
+            assert not are_disjoint(a, b)
 
 
 def test_a_region_is_within_itself_and_height_counts() -> None:
-    square = Outline(((0, 0), (10, 0), (10, 10), (0, 10)))
+    square = SimplePolygon(((0, 0), (10, 0), (10, 10), (0, 10)))
     assert lies_within(Region(square, 0, 10), Region(square, 0, 10))
     assert not lies_within(Region(square, 0, 11), Region(square, 0, 10))
-    assert have_nothing_in_common(Region(square, 0, 10), Region(square, 10, 20))
-    assert not have_nothing_in_common(Region(square, 0, 10), Region(square, 9, 20))
+    assert are_disjoint(Region(square, 0, 10), Region(square, 10, 20))
+    assert not are_disjoint(Region(square, 0, 10), Region(square, 9, 20))
 
 
 @given(STARS, st.sampled_from(["grid", "perimeter", "orbit"]), st.integers(5_000, 40_000), st.integers(0, 4_000))
-def test_a_survey_stays_in_its_area(shape: Outline, pattern: str, spacing: int, inset: int) -> None:
+def test_a_survey_stays_in_its_area(shape: SimplePolygon, pattern: str, spacing: int, inset: int) -> None:
     points = survey(shape, pattern, spacing, inset, None)
     assume(points is not None)
     assert points is not None
     for a, b in pairwise(points):
         assert contains(shape.corners, a)
         if a != b:
-            assert all(apart((a, b), edge, max(inset, LEAST_INSET) - 3) for edge in edges(shape))
+            assert all(are_apart((a, b), edge, max(inset, LEAST_INSET) - 3) for edge in edges(shape))
 
 
 @given(
     st.one_of(
         st.builds(Disc, st.just((0, 0)), st.integers(10_000, 90_000)),
         st.builds(
-            lambda a, b, c: Outline(((0, 0), (a, c), (a - c * b // a, c + b), (-c * b // a, b))),
+            lambda a, b, c: SimplePolygon(((0, 0), (a, c), (a - c * b // a, c + b), (-c * b // a, b))),
             st.integers(30_000, 90_000),
             st.integers(20_000, 80_000),
             st.integers(-20_000, 20_000),
@@ -215,22 +234,22 @@ AREAS = st.builds(
 
 @given(AREAS, st.sampled_from(["grid", "perimeter", "orbit"]), st.integers(5_000, 40_000), st.integers(0, 3_000))
 def test_a_survey_goes_around_holes(
-    area: tuple[Outline, tuple[Point, ...]], pattern: str, spacing: int, inset: int
+    area: tuple[SimplePolygon, tuple[Point, ...]], pattern: str, spacing: int, inset: int
 ) -> None:
     outline, hole = area
-    shape = Area((outline.corners, hole))
-    assume(tangled(shape.rings) is None and nested(shape.rings))
+    shape = MultiPolygon((outline.corners, hole))
+    assume(touching_edges(shape.rings) is None and nested(shape.rings))
     points = survey(shape, pattern, spacing, inset, None)
     assume(points is not None)
     assert points is not None
     for a, b in pairwise(points):
         assert contains_area(shape, a)
         if a != b:
-            assert all(apart((a, b), edge, max(inset, LEAST_INSET) - 3) for edge in edges(shape))
+            assert all(are_apart((a, b), edge, max(inset, LEAST_INSET) - 3) for edge in edges(shape))
 
 
 def test_a_grid_covers_both_sides_of_a_hole_and_an_orbit_goes_around_it() -> None:
-    yard = Area(
+    yard = MultiPolygon(
         (
             ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000)),
             ((40_000, 40_000), (40_000, 60_000), (60_000, 60_000), (60_000, 40_000)),
@@ -247,17 +266,17 @@ def test_a_grid_covers_both_sides_of_a_hole_and_an_orbit_goes_around_it() -> Non
 
 def test_an_area_in_parts_has_no_path() -> None:
     square = ((0, 0), (90_000, 0), (90_000, 90_000), (0, 90_000))
-    assert survey(Area((square, tuple((x + 100_000, y) for x, y in square))), "grid", 10_000, 0, None) is None
+    assert survey(MultiPolygon((square, tuple((x + 100_000, y) for x, y in square))), "grid", 10_000, 0, None) is None
 
 
 def test_an_orbit_keeps_clear_of_holes() -> None:
     ring = ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000))
     hole = ((95_000, 40_000), (95_000, 60_000), (97_000, 60_000), (97_000, 40_000))
-    assert survey(Area((ring, hole)), "orbit", 10_000, 0, None) is None
+    assert survey(MultiPolygon((ring, hole)), "orbit", 10_000, 0, None) is None
 
 
 def test_a_survey_begins_at_the_end_that_is_nearer() -> None:
-    area = Outline(((0, 0), (100_000, 0), (100_000, 20_000), (0, 20_000)))
+    area = SimplePolygon(((0, 0), (100_000, 0), (100_000, 20_000), (0, 20_000)))
     assert survey(area, "grid", 20_000, 0, (99_000, 10_000)) == ((98_998, 10_000), (1_002, 10_000))
     assert survey(area, "grid", 20_000, 0, (1_000, 10_000)) == ((1_002, 10_000), (98_998, 10_000))
 

@@ -10,15 +10,30 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rtshcua.decision.checks.zones import rings as problems
-from rtshcua.ground.geometry.arrangement import Windings, faces
-from rtshcua.ground.geometry.convex import is_convex
-from rtshcua.ground.geometry.distance import far
-from rtshcua.ground.geometry.offset import Unshapely, inner, outer
-from rtshcua.ground.geometry.overlay import Outlined, nested, outlined, without_straight
-from rtshcua.ground.geometry.polygons import contained, contains, crossing, doubled_area, tangled
-from rtshcua.ground.geometry.relations import have_nothing_in_common, lies_within
-from rtshcua.ground.geometry.rounds import around_disc, within_disc
-from rtshcua.ground.geometry.shapes import Area, Cornered, Outline, Point, Region, Ring, Shape, cornered, edges, parts
+from rtshcua.ground.geometry.offset import NoSuchOffset, around_disc, inner, is_convex, outer, within_disc
+from rtshcua.ground.geometry.overlay import RoundedBoundary, Windings, faces, nested, rounded_boundary, without_straight
+from rtshcua.ground.geometry.polygons import (
+    Point,
+    Ring,
+    contained,
+    contains,
+    crossing,
+    doubled_area,
+    is_beyond,
+    touching_edges,
+)
+from rtshcua.ground.geometry.shapes import (
+    MultiPolygon,
+    Polygonal,
+    Region,
+    Shape,
+    SimplePolygon,
+    are_disjoint,
+    edges,
+    lies_within,
+    parts,
+    polygonal,
+)
 
 SMALL = st.tuples(st.integers(-12, 12), st.integers(-12, 12))
 Rule = Callable[[Windings], bool]
@@ -50,19 +65,21 @@ TINY = st.lists(SMALL, min_size=3, max_size=7, unique=True).filter(simple).map(t
 LARGE = stars(50_000, 50_000)
 
 
-def geometry(shape: Cornered) -> shapely.Geometry:
+def geometry(shape: Polygonal) -> shapely.Geometry:
     return shapely.unary_union([shapely.Polygon(ring, holes) for ring, holes in parts(shape)])
 
 
 @st.composite
-def areas(draw: st.DrawFn) -> Cornered:
+def areas(draw: st.DrawFn) -> Polygonal:
     """Two polygons without some others: parts, bays and holes."""
     whole = [draw(LARGE), draw(LARGE)]
     gone = draw(st.lists(stars(15_000, 40_000), max_size=3))
-    made = outlined([whole, *([each] for each in gone)], lambda w: w[0] > 0 and not any(each > 0 for each in w[1:]))
+    made = rounded_boundary(
+        [whole, *([each] for each in gone)], lambda w: w[0] > 0 and not any(each > 0 for each in w[1:])
+    )
     assume(made is not None and made.rings)
     assert made is not None
-    return cornered(made.rings)
+    return polygonal(made.rings)
 
 
 RULES: list[tuple[str, Rule]] = [
@@ -77,17 +94,17 @@ RULES: list[tuple[str, Rule]] = [
 @given(one=st.one_of(TINY, LARGE), other=st.one_of(TINY, LARGE))
 def test_what_is_outlined_is_what_shapely_says(name: str, rule: Rule, one: Ring, other: Ring) -> None:
     true = getattr(shapely.Polygon(one), name)(shapely.Polygon(other))
-    made = outlined([[one], [other]], rule)
+    made = rounded_boundary([[one], [other]], rule)
     assume(made is not None)  # in a plane of a few millimetres, rounding may leave nothing that is simple
     assert made is not None
-    mine = geometry(cornered(made.rings)) if made.rings else shapely.Polygon()
+    mine = geometry(polygonal(made.rings)) if made.rings else shapely.Polygon()
     assert mine.symmetric_difference(true).buffer(-made.moved).area < 1e-6
     well_formed(made)
 
 
-def well_formed(made: Outlined) -> None:
+def well_formed(made: RoundedBoundary) -> None:
     """By the predicate of the ground, and by the one that loading has."""
-    assert tangled(made.rings) is None
+    assert touching_edges(made.rings) is None
     assert nested(made.rings)
     assert not list(problems(made.rings))
 
@@ -95,21 +112,21 @@ def well_formed(made: Outlined) -> None:
 @given(LARGE, LARGE)
 def test_zones_of_usual_size_can_always_be_outlined(one: Ring, other: Ring) -> None:
     for _, rule in RULES:
-        assert outlined([[one], [other]], rule) is not None
+        assert rounded_boundary([[one], [other]], rule) is not None
 
 
 @given(st.lists(TINY, min_size=1, max_size=3), st.lists(SMALL, min_size=1, max_size=5))
 def test_faces_have_the_windings_of_all_places(rings: list[Ring], places: list[Point]) -> None:
     there = set(faces([[ring] for ring in rings]))
     for place in places:
-        on_edge = any(not far(place, edge, 1) for ring in rings for edge in edges(Outline(ring)))
+        on_edge = any(not is_beyond(place, edge, 1) for ring in rings for edge in edges(SimplePolygon(ring)))
         if not on_edge:
             assert tuple(int(contains(ring, place)) for ring in rings) in there | {(0,) * len(rings)}
 
 
 def test_squares_that_touch_at_a_corner_are_drawn_apart() -> None:
     squares = [(((0, 0), (100, 0), (100, 100), (0, 100)),), (((100, 100), (200, 100), (200, 200), (100, 200)),)]
-    made = outlined(squares, lambda w: max(w) > 0)
+    made = rounded_boundary(squares, lambda w: max(w) > 0)
     assert made is not None
     assert made.moved <= 9
     assert len(made.rings) == 2
@@ -118,22 +135,22 @@ def test_squares_that_touch_at_a_corner_are_drawn_apart() -> None:
 
 def test_a_hole_that_touches_the_edge_is_opened() -> None:
     square, hole = ((0, 0), (100, 0), (100, 100), (0, 100)), ((0, 50), (50, 25), (50, 75))
-    made = outlined([[square], [hole]], lambda w: w[0] > 0 >= w[1])
+    made = rounded_boundary([[square], [hole]], lambda w: w[0] > 0 >= w[1])
     assert made is not None
     assert len(made.rings) == 1
     well_formed(made)
 
 
 def test_neighbours_with_a_common_edge_are_one() -> None:
-    made = outlined(
+    made = rounded_boundary(
         [[((0, 0), (10, 0), (10, 10), (0, 10))], [((10, 0), (20, 0), (20, 10), (10, 10))]], lambda w: max(w) > 0
     )
-    assert made == Outlined((((0, 0), (20, 0), (20, 10), (0, 10)),), 1)
+    assert made == RoundedBoundary((((0, 0), (20, 0), (20, 10), (0, 10)),), 1)
 
 
 def test_what_takes_all_away_leaves_nothing() -> None:
     square = ((0, 0), (10, 0), (10, 10), (0, 10))
-    made = outlined([[square], [square]], lambda w: w[0] > 0 >= w[1])
+    made = rounded_boundary([[square], [square]], lambda w: w[0] > 0 >= w[1])
     assert made is not None
     assert not made.rings
 
@@ -148,21 +165,21 @@ def test_spikes_and_straight_corners_go() -> None:
 def test_a_disc_lies_between_its_polygons(radius: int) -> None:
     small, large = within_disc((0, 0), radius), around_disc(radius)
     assert all(x * x + y * y <= radius * radius for x, y in small)
-    assert all(far((0, 0), edge, radius) for edge in edges(Outline(large)))
+    assert all(is_beyond((0, 0), edge, radius) for edge in edges(SimplePolygon(large)))
     assert all(x * x + y * y <= (radius + radius // 500 + 10) ** 2 for x, y in large)
     if radius > 1_000:
         room = radius - radius * 31 // 100_000 - 3
-        assert all(far((0, 0), edge, room) for edge in edges(Outline(small)))
+        assert all(is_beyond((0, 0), edge, room) for edge in edges(SimplePolygon(small)))
 
 
 @settings(max_examples=settings().max_examples // 2)
 @given(areas(), st.sampled_from([20_000, 3_000, 200, -200, -1_500, -4_000]))
-def test_areas_grow_and_shrink_on_the_safe_side(shape: Cornered, margin: int) -> None:
+def test_areas_grow_and_shrink_on_the_safe_side(shape: Polygonal, margin: int) -> None:
     """Holes shrink when an area grows, and vanish; parts flow together, and fall apart."""
     true = geometry(shape).buffer(margin, quad_segs=128)
     small, large = made(inner, shape, margin), made(outer, shape, margin)
     loose = abs(margin) * 0.004 + 20
-    if isinstance(shape, Outline) and is_convex(shape):
+    if isinstance(shape, SimplePolygon) and is_convex(shape):
         loose = abs(margin)  # its round corners are cut in fewer steps, or not at all
     if small is not None:
         assert geometry(small).difference(true.buffer(1 + abs(margin) * 2e-4)).area < 1
@@ -176,15 +193,15 @@ def test_areas_grow_and_shrink_on_the_safe_side(shape: Cornered, margin: int) ->
         assert true.buffer(-1).area < 1
 
 
-def made(offset: Callable[[Shape, int], Shape], shape: Cornered, margin: int) -> Cornered | None:
+def made(offset: Callable[[Shape, int], Shape], shape: Polygonal, margin: int) -> Polygonal | None:
     try:
         found = offset(shape, margin)
-    except Unshapely as unshapely:
+    except NoSuchOffset as unshapely:
         if unshapely.reason == "nothing":
             return None
         raise
-    assert isinstance(found, Outline | Area)
-    well_formed(Outlined(found.rings, 0))
+    assert isinstance(found, SimplePolygon | MultiPolygon)
+    well_formed(RoundedBoundary(found.rings, 0))
     return found
 
 
@@ -192,7 +209,7 @@ def ring_of(*corners: Point) -> Ring:
     return corners
 
 
-YARD = Area(
+YARD = MultiPolygon(
     (
         ring_of((0, 0), (60_000, 0), (60_000, 60_000), (0, 60_000)),
         ring_of((20_000, 20_000), (20_000, 40_000), (40_000, 40_000), (40_000, 20_000)),
@@ -205,57 +222,59 @@ def test_a_hole_closes_when_its_area_grows_over_it() -> None:
         assert len(rings(offset(YARD, 9_000))) == 2
         assert len(rings(offset(YARD, 11_000))) == 1
         assert len(rings(offset(YARD, -9_000))) == 2
-        with pytest.raises(Unshapely, match="nothing"):
+        with pytest.raises(NoSuchOffset, match="nothing"):
             offset(YARD, -15_000)
         assert len(rings(offset(YARD, -11_000))) == 4  # its corners are further than that from the hole
 
 
 def test_an_area_falls_apart_when_it_shrinks() -> None:
     bar = ((0, 0), (40_000, 0), (40_000, 18_000), (60_000, 18_000), (60_000, 0), (100_000, 0), (100_000, 40_000))
-    dumbbell = Outline((*bar, (60_000, 40_000), (60_000, 22_000), (40_000, 22_000), (40_000, 40_000), (0, 40_000)))
+    dumbbell = SimplePolygon(
+        (*bar, (60_000, 40_000), (60_000, 22_000), (40_000, 22_000), (40_000, 40_000), (0, 40_000))
+    )
     assert len(rings(inner(dumbbell, -3_000))) == len(rings(outer(dumbbell, -3_000))) == 2
     assert len(rings(inner(dumbbell, -1_000))) == 1
 
 
 def rings(shape: Shape) -> tuple[Ring, ...]:
-    assert isinstance(shape, Outline | Area)
+    assert isinstance(shape, SimplePolygon | MultiPolygon)
     return shape.rings
 
 
 @settings(max_examples=settings().max_examples // 2)
-@given(areas(), st.one_of(areas(), LARGE.map(Outline)))
-def test_relations_of_areas_agree_with_shapely(one: Cornered, other: Cornered) -> None:
+@given(areas(), st.one_of(areas(), LARGE.map(SimplePolygon)))
+def test_relations_of_areas_agree_with_shapely(one: Polygonal, other: Polygonal) -> None:
     a, b = Region(one, 0, 10), Region(other, 0, 10)
     first, second = geometry(one), geometry(other)
-    within, apart = lies_within(a, b), have_nothing_in_common(a, b)
+    within, apart = lies_within(a, b), are_disjoint(a, b)
     assert within == second.covers(first) or abs(first.difference(second).area) < 1e-3
     assert apart == (first.intersection(second).area == 0) or first.intersection(second).area < 1e-3
 
 
 def test_what_fills_a_hole_is_not_within_and_has_nothing_in_common() -> None:
-    hole = Region(Outline(YARD.rings[1][::-1]), 0, 10)
+    hole = Region(SimplePolygon(YARD.rings[1][::-1]), 0, 10)
     yard = Region(YARD, 0, 10)
     assert not lies_within(hole, yard)
-    assert have_nothing_in_common(hole, yard)
+    assert are_disjoint(hole, yard)
     assert lies_within(yard, yard)
-    assert not have_nothing_in_common(yard, yard)
-    assert not lies_within(Region(Outline(YARD.rings[0]), 0, 10), yard)
+    assert not are_disjoint(yard, yard)
+    assert not lies_within(Region(SimplePolygon(YARD.rings[0]), 0, 10), yard)
 
 
 def test_bands_that_hang_on_one_elevation_move_together() -> None:
-    square = Outline(((0, 0), (10, 0), (10, 10), (0, 10)))
+    square = SimplePolygon(((0, 0), (10, 0), (10, 10), (0, 10)))
     sea, home = Region(square, 0, 100, 5, 5), Region(square, 0, 100)
     assert lies_within(sea, sea)
     assert not lies_within(sea, home)
     assert not lies_within(home, sea)
     assert lies_within(home, sea, surely=False)
     above = Region(square, 103, 200, 5, 5)
-    assert have_nothing_in_common(sea, above)
-    assert not have_nothing_in_common(home, above)
-    assert have_nothing_in_common(home, above, surely=False)
+    assert are_disjoint(sea, above)
+    assert not are_disjoint(home, above)
+    assert are_disjoint(home, above, surely=False)
 
 
 @given(areas(), st.tuples(st.integers(-90_000, 90_000), st.integers(-90_000, 90_000)))
-def test_inside_an_area_is_inside_an_odd_number_of_rings(shape: Cornered, place: Point) -> None:
+def test_inside_an_area_is_inside_an_odd_number_of_rings(shape: Polygonal, place: Point) -> None:
     assert contained(shape.rings, place) == geometry(shape).contains_properly(shapely.Point(place))
     assert all(a != b for ring in shape.rings for a, b in pairwise((*ring, ring[0])))

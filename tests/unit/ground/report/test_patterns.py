@@ -7,7 +7,7 @@ from math import hypot
 import pytest
 
 from rtshcua.ground.checker.checks.contracts import PATTERNS as KNOWN
-from rtshcua.ground.geometry.shapes import Disc, Outline
+from rtshcua.ground.geometry.shapes import Disc, SimplePolygon
 from rtshcua.ground.geometry.survey import survey
 from rtshcua.ground.report.drawing.patterns import drawn
 from rtshcua.ground.report.model import Handbook
@@ -15,7 +15,7 @@ from rtshcua.ground.report.page import page
 from rtshcua.ground.report.words.skills import PATTERNS
 
 M = 1_000
-HOUSE = Outline(((0, 0), (120 * M, 0), (150 * M, 55 * M), (120 * M, 90 * M), (0, 90 * M)))
+HOUSE = SimplePolygon(((0, 0), (120 * M, 0), (150 * M, 55 * M), (120 * M, 90 * M), (0, 90 * M)))
 ROUND = Disc((0, 0), 50 * M)
 
 
@@ -44,7 +44,7 @@ def test_a_grid_is_no_wider_than_it_flies_high(height: int, apart: int) -> None:
 
 
 def test_a_line_of_a_grid_that_meets_a_corner_is_flown_like_any_other() -> None:
-    pointed = Outline(((0, 0), (120 * M, 0), (150 * M, 45 * M), (120 * M, 90 * M), (0, 90 * M)))
+    pointed = SimplePolygon(((0, 0), (120 * M, 0), (150 * M, 45 * M), (120 * M, 90 * M), (0, 90 * M)))
     way = survey(pointed, "grid", 20 * M, 3 * M, (0, 0))
     assert way is not None
     lines = [(a, b) for (a, y), (b, then) in pairwise(way) if y == then]

@@ -16,8 +16,8 @@ from unittest.mock import patch
 from rtshcua.diagnostics import codes
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import check_program
-from rtshcua.ground.prove import contradiction, rules
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove import contradiction, rule_checks
+from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.mavlink import dialect
 
 SIZES = (100, 300, 1_000)
@@ -61,10 +61,10 @@ def source(count: int, crews: int = 50) -> str:
     return "\n".join(parts)
 
 
-def ground(text: str) -> Ground:
+def ground(text: str) -> ProofContext:
     """The policy, lowered and prepared, as the analysis is given it."""
-    found: list[Ground] = []
-    with patch.object(rules, "prove", found.append):
+    found: list[ProofContext] = []
+    with patch.object(rule_checks, "prove", found.append):
         diagnostics = check_program(load(["large.rts"], lambda path: _read(path, text), str(ROOT)), dialect.load())
     assert found, diagnostics
     return found[0]
@@ -74,14 +74,14 @@ def _read(path: str, text: str) -> bytes:
     return text.encode() if path == "large.rts" else Path(path).read_bytes()
 
 
-def seconds(text: str) -> tuple[float, Ground]:
+def seconds(text: str) -> tuple[float, ProofContext]:
     """How much processor time the analysis takes, and what it was made of."""
     made = ground(text)
     made.questions.forget()
     gc.collect()
     start = process_time()
-    contradiction.prove(made)
-    rules.prove(made)
+    contradiction.prove_contracts(made)
+    rule_checks.prove_rules(made)
     return process_time() - start, made
 
 

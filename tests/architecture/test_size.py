@@ -11,13 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 879,
-    "code lines": 84_100,
-    "shared class names": 157,
-    "of them across packages": 128,
-    "shared file names": 114,
+    "modules": 863,
+    "code lines": 84_069,
+    "shared class names": 154,
+    "of them across packages": 126,
+    "shared file names": 110,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 75,
+    "modules below 80 lines with one importer": 67,
     "functions of more than 60 lines": 22,
     "functions of a complexity over 15": 170,
     "functions of a complexity over 25": 15,

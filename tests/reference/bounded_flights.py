@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import Compiled, compile_program
-from rtshcua.ground.prove.bounds import Bounds
+from rtshcua.ground.prove.mission_bounds import Bounds
 from rtshcua.mavlink import dialect
 from rtshcua.simulation.config import Kind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind

@@ -1,6 +1,6 @@
 """What a mission takes at most, in one line."""
 
-from rtshcua.ground.prove.bounds import Bounds, rounded_energy, rounded_time
+from rtshcua.ground.prove.mission_bounds import Bounds, rounded_energy, rounded_time
 
 
 def steps_told(bounds: Bounds) -> list[str]:

@@ -9,7 +9,7 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.front.cli.earlier import Earlier
 from rtshcua.front.cli.programs import Asked
 from rtshcua.front.cli.sources import examine
-from rtshcua.ground.prove.bounds import Bounds
+from rtshcua.ground.prove.mission_bounds import Bounds
 from rtshcua.ground.report.changes import told_changes
 from rtshcua.ground.report.model import ChangeTold
 from rtshcua.ground.versions.raised import compare

@@ -12,7 +12,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.ground.geometry.shapes import are_disjoint
 from rtshcua.ground.lint.reach import Reach, reach_of, region_of
 from rtshcua.ground.lint.subject import Subject
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.model.flat.zone import Zone
 from rtshcua.model.ir.node import Name
 
@@ -40,7 +40,7 @@ def check(subject: Subject) -> Iterator[Diagnostic]:
                 yield _found(ground, reach, name, what)
 
 
-def _found(ground: Ground, reach: Reach, name: Name, what: str) -> Diagnostic:
+def _found(ground: ProofContext, reach: Reach, name: Name, what: str) -> Diagnostic:
     vehicle = ground.lowered.vehicle.name.text
     kilometres = reach.across // 1_000_000
     help = f"look at its coordinates: `{vehicle}` comes at most {kilometres} km from its home"
@@ -57,7 +57,7 @@ def _apart(one: Zone, other: Zone) -> bool:
     return are_disjoint(region_of(one), region_of(other))
 
 
-def _shut_out(ground: Ground, name: Name, within: Name) -> Diagnostic:
+def _shut_out(ground: ProofContext, name: Name, within: Name) -> Diagnostic:
     zones = ground.context.symbols.zones
     return Diagnostic(
         codes.IDLE_AIRSPACE,

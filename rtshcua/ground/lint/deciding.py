@@ -16,8 +16,8 @@ from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.solve import Goal, No
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.lint.reach import Reach, reach_of
+from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
-from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.flat.contract import PLACE, Contract
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
 from rtshcua.model.flat.policy import Policy, RuleKind
@@ -30,7 +30,7 @@ _MINUTE = 60_000_000  # us
 class Deciding:
     """The rules of a lowered policy, each with whether it ever makes a difference to a skill."""
 
-    def __init__(self, ground: Ground) -> None:
+    def __init__(self, ground: ProofContext) -> None:
         self.rules = Ruleset(ground)
         self._ground = ground
         self._spaces: dict[int, Space] = {}
@@ -124,7 +124,7 @@ def _days(utc: Sequence[Between], local: LocalTime) -> Iterator[Between]:
 class Vacuous:
     """Which rules of a program, as they are written, make no difference, in every policy that has them."""
 
-    def __init__(self, grounds: Sequence[Ground]) -> None:
+    def __init__(self, grounds: Sequence[ProofContext]) -> None:
         self._every = [Deciding(ground) for ground in grounds]
 
     def __call__(self, rule: Rule, skill: str) -> bool:

@@ -14,8 +14,8 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.ground.lint.deciding import Deciding
 from rtshcua.ground.lint.reach import is_open
 from rtshcua.ground.lint.subject import Subject
+from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
-from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import RuleKind
 
@@ -33,7 +33,7 @@ def check(subject: Subject) -> Iterator[Diagnostic]:
             yield _found(ground, deciding.rules, moving)
 
 
-def _permitted(ground: Ground, rules: Ruleset) -> list[int]:
+def _permitted(ground: ProofContext, rules: Ruleset) -> list[int]:
     """The skills that move the vehicle and that a permit is about."""
     permits = [number for group in rules.groups if group.kind == RuleKind.PERMIT for number in group.rules]
     skills = dict.fromkeys(skill for number in permits for skill in rules.skills(number))
@@ -52,7 +52,7 @@ def _open(deciding: Deciding, skill: int) -> bool:
     return 0 < len(anyone) <= _TOGETHER and deciding.always_permit(anyone, skill)
 
 
-def _found(ground: Ground, rules: Ruleset, moving: list[int]) -> Diagnostic:
+def _found(ground: ProofContext, rules: Ruleset, moving: list[int]) -> Diagnostic:
     declaration = ground.lowered.declaration
     contracts = ground.prepared.policy.contracts
     names = ", ".join(f"`{contracts[skill].name}`" for skill in moving)

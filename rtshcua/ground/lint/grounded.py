@@ -17,8 +17,8 @@ from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.solve import No
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.lint.subject import Subject
+from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
-from rtshcua.ground.prove.situation import Ground
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind
@@ -49,7 +49,7 @@ def _unknown_on_the_ground(signal: Signal) -> bool:
     return all(each.message in _IN_THE_AIR for each in signal.sources)
 
 
-def _of(ground: Ground, rules: Ruleset, skill: int, signals: tuple[Signal, ...]) -> Iterator[Diagnostic]:
+def _of(ground: ProofContext, rules: Ruleset, skill: int, signals: tuple[Signal, ...]) -> Iterator[Diagnostic]:
     policy = ground.prepared.policy
     contract, slots = policy.contracts[skill], {each.slot for each in signals}
     space = _looked_at(ground, skill, _standing(policy, rules.space(skill), slots))
@@ -87,7 +87,7 @@ def _standing(policy: Policy, space: Space, unknown: set[int]) -> Space:
     return space._replace(slots=tuple(slots))
 
 
-def _looked_at(ground: Ground, skill: int, space: Space) -> Space:
+def _looked_at(ground: ProofContext, skill: int, space: Space) -> Space:
     """The same, with what conditions over time may say there. What one says of a window is what its condition was at
     some moment of it, or UNKNOWN; one that rises or falls was UNKNOWN, or what it may be, at the observation before.
     """
@@ -104,7 +104,7 @@ def _looked_at(ground: Ground, skill: int, space: Space) -> Space:
     return space
 
 
-def _may_be(ground: Ground, of: tuple[int, int], node: Node, truth: Truth, space: Space) -> bool:
+def _may_be(ground: ProofContext, of: tuple[int, int], node: Node, truth: Truth, space: Space) -> bool:
     """Whether what a monitor looks at may have a truth there; `of`: about which skill, and the monitor's number."""
     return not isinstance(ground.questions.ask(("looked at", *of, truth), lambda: [(node, truth)], space), No)
 

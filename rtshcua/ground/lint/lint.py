@@ -7,13 +7,13 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.lint import airspace, authority, gating, grounded, imports, landing, naming, numbers, places, unused
 from rtshcua.ground.lint.subject import Subject
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.proof_context import ProofContext
 
 RULES = (unused, naming, authority, numbers, imports, gating, airspace, places, landing, grounded)
 
 
 def lint(
-    program: Program, asked: Collection[str] | None = None, grounds: tuple[Ground, ...] = ()
+    program: Program, asked: Collection[str] | None = None, grounds: tuple[ProofContext, ...] = ()
 ) -> tuple[Diagnostic, ...]:
     """What is worth a second look in the files `asked` for (None: the first), by place. `grounds` are the lowered
     policies of the program, if it was compiled; without them, the rules about what a policy decides say nothing.

@@ -7,7 +7,7 @@ from pathlib import PurePath
 from rtshcua.ground.checker.symbols import Symbols, collect
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.closure import Imports
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule, TemplateDecl
 from rtshcua.model.ir.program import Unit
 
@@ -24,15 +24,15 @@ class Subject:
     symbols: Symbols
     asked: tuple[Unit, ...]
     imports: Imports
-    grounds: tuple[Ground, ...] = ()
+    grounds: tuple[ProofContext, ...] = ()
 
     @staticmethod
-    def of(program: Program, asked: Collection[str], grounds: tuple[Ground, ...] = ()) -> "Subject":
+    def of(program: Program, asked: Collection[str], grounds: tuple[ProofContext, ...] = ()) -> "Subject":
         """A program without errors."""
         units = tuple(unit for unit in program.units if unit.file in asked and PurePath(unit.file).suffix != ".json")
         return Subject(program, collect(program.units), units, Imports(program.units, program.stable), grounds)
 
-    def lowered(self) -> Iterator[Ground]:
+    def lowered(self) -> Iterator[ProofContext]:
         """The lowered policies of the files that were asked for."""
         asked = {unit.file for unit in self.asked}
         return (ground for ground in self.grounds if ground.lowered.declaration.span.file in asked)

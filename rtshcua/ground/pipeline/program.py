@@ -23,9 +23,9 @@ from rtshcua.ground.lower.mission import lower_mission
 from rtshcua.ground.lower.policy import LoweredPolicy, lower_policy
 from rtshcua.ground.pipeline.closure import Imports, beside
 from rtshcua.ground.pipeline.pins import Pins, claims
-from rtshcua.ground.prove.bounds import Bounds, bounds_of, most
-from rtshcua.ground.prove.prove import prove_mission, prove_policy, refused
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.mission_bounds import Bounds, bounds_of, greatest
+from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.proofs import prove_mission, prove_policy, report_refused
 from rtshcua.ground.testing.case import Case, Tested
 from rtshcua.ground.testing.cases import cases_of
 from rtshcua.ground.testing.scenarios import ScenarioFlight, UnderScenario, scenarios_of
@@ -74,7 +74,7 @@ class Checked:
     diagnostics: tuple[Diagnostic, ...]
     bounds: Mapping[str, Bounds]
     policies: tuple[LoweredPolicy, ...] = ()
-    grounds: tuple[Ground, ...] = ()  # the same, prepared as on board, with what was asked about them
+    grounds: tuple[ProofContext, ...] = ()  # the same, prepared as on board, with what was asked about them
     planned: tuple[Planned, ...] = ()
 
 
@@ -165,7 +165,7 @@ class Compilation:
         self.planned: dict[str, Planned] = {}
         self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
-        self._policies: dict[tuple[str, str], Ground | None] = {}
+        self._policies: dict[tuple[str, str], ProofContext | None] = {}
         self._tested: dict[tuple[str, str], Tested | None] = {}
         self._flown: dict[str, UnderScenario] = {}
         data = DataFiles(program.data, program.data_names)
@@ -227,7 +227,7 @@ class Compilation:
         merged = [with_uses(found, self.context.symbols) for found in self.report.merged()]
         return tuple(dict.fromkeys(sorted(merged, key=place)))
 
-    def grounds(self) -> list[Ground]:
+    def grounds(self) -> list[ProofContext]:
         """The policies that were lowered."""
         return [ground for ground in self._policies.values() if ground is not None]
 
@@ -243,7 +243,7 @@ class Compilation:
         flat = lowered.mission
         self.planned.setdefault(mission.name.text, Planned(under.lowered, flat, mission))
         bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat))
-        self.bounds[mission.name.text] = most(bounds, self.bounds.get(mission.name.text))
+        self.bounds[mission.name.text] = greatest(bounds, self.bounds.get(mission.name.text))
         tested = Tested(under.lowered, under.prepared)
         self._flown.setdefault(mission.name.text, UnderScenario(tested, flat, mission))  # the first has the defaults
         return under.lowered.policy, flat
@@ -263,7 +263,7 @@ class Compilation:
         files = self._imports.closure(policy.span.file)
         return next((each for each in self.context.symbols.vehicles.values() if each.span.file in files), None)
 
-    def _policy(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Ground | None:
+    def _policy(self, policy: PolicyDecl, vehicle: VehicleDecl) -> ProofContext | None:
         key = (policy.name.text, vehicle.name.text)
         if key not in self._policies:
             lowered = self._unproved(policy, vehicle)
@@ -312,7 +312,7 @@ class Compilation:
         if lowered is None or prepared is None:
             return None
         if isinstance(prepared, Refusal):
-            refused(self.context, lowered, prepared)
+            report_refused(self.context, lowered, prepared)
             return None
         return Tested(lowered, prepared)
 

@@ -1,5 +1,5 @@
-"""What is proved of a lowered policy and mission: authority, chains, paths and timing. One file a proof.
+"""What is proved of a lowered policy and of the missions under it: `proofs` calls all proofs in their order.
 
-The rules of `rtshcua.decision` are asked, over sets of values: a step's arguments are known, the vehicle's state is
-not. A proof never takes the place of the decision on board, which is made again.
+The proofs ask the rules of `rtshcua.decision` over sets of values: a step's arguments are known, the state of the
+vehicle is not. A proof does not replace the decision on board, which is made again.
 """

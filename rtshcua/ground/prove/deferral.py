@@ -17,10 +17,10 @@ from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.prove.hopeful import refusing
-from rtshcua.ground.prove.rates import arrives, best, interval, report_intervals
-from rtshcua.ground.prove.situation import Ground
-from rtshcua.ground.prove.timing import approval
+from rtshcua.ground.prove.certain_refusal import refusing_rules
+from rtshcua.ground.prove.observability import arrives, most_frequent, report_interval, report_intervals
+from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_times import approval
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
@@ -34,206 +34,208 @@ PERSON_US = 2_000_000
 NEVER = 1 << 62
 
 
-def prove(ground: Ground) -> None:
+def prove_deferrals(proof: ProofContext) -> None:
     """Report the deferrals of each skill that no report can end, and approvals that come too late by their nature."""
-    policy = ground.prepared.policy
+    policy = proof.policy
     often = report_intervals(policy)
     reported: set[str] = set()
     for number, contract in enumerate(policy.contracts):
         if contract.timing_class == TimingClass.REFLEX:
-            _approved(ground, number, contract)
+            _report_reflex_approval(proof, number, contract)
             continue
-        watched = {signal.name for signal in _signals(ground, (*contract.assume, *contract.maintain))}
-        for clause, signal in _awaited(ground, number, contract):
+        watched = {signal.name for signal in _signals(proof, (*contract.assume, *contract.maintain))}
+        for clause, signal in _awaited(proof, number, contract):
             if not arrives(signal):
                 if signal.name not in watched | reported:  # else it is E1201
                     reported.add(signal.name)
-                    _never(ground, signal, clause)
-            elif interval(signal, often) > contract.deadline_us and contract.name not in reported:
+                    _report_never(proof, signal, clause)
+            elif report_interval(signal, often) > contract.deadline_us and contract.name not in reported:
                 reported.add(contract.name)
-                _late(ground, contract, signal, clause, often)
-    _hasty(ground)
+                _report_late(proof, contract, signal, clause, often)
+    _prove_approval_times(proof)
 
 
-def prove_step(ground: Ground, step: Step, invocation: PreparedInvocation) -> None:
+def prove_step_deferral(proof: ProofContext, step: Step, invocation: PreparedInvocation) -> None:
     """Report a step whose own deadline or clauses leave its contract no time for a report, as the skill's do not."""
     flat = invocation.invocation
     if step.overrides is None or flat.contract.timing_class == TimingClass.REFLEX:
         return
-    policy = ground.prepared.policy
+    policy = proof.policy
     skills, often = policy.contracts[flat.skill], report_intervals(policy, (flat.contract,))
-    if any(interval(signal, often) > skills.deadline_us for _, signal in _awaited(ground, flat.skill, skills)):
+    if any(report_interval(signal, often) > skills.deadline_us for _, signal in _awaited(proof, flat.skill, skills)):
         return  # said of the skill
-    for clause, signal in _awaited(ground, flat.skill, flat.contract):
-        if arrives(signal) and interval(signal, often) > flat.contract.deadline_us:
+    for clause, signal in _awaited(proof, flat.skill, flat.contract):
+        if arrives(signal) and report_interval(signal, often) > flat.contract.deadline_us:
             own = step.overrides.deadline
-            _late(ground, flat.contract, signal, clause, often, step.span if own is None else own.span)
+            _report_late(proof, flat.contract, signal, clause, often, step.span if own is None else own.span)
             return
 
 
-def _awaited(ground: Ground, number: int, contract: Contract) -> Iterator[tuple[Clause, Signal]]:
+def _awaited(proof: ProofContext, number: int, contract: Contract) -> Iterator[tuple[Clause, Signal]]:
     """The signals that a decision on a contract may wait for, and what reads them."""
-    for clause in awaited(ground.prepared.policy, number, contract):
-        for signal in _signals(ground, (clause,)):
+    for clause in awaited(proof.policy, number, contract):
+        for signal in _signals(proof, (clause,)):
             yield clause, signal
 
 
-def _hasty(ground: Ground) -> None:
+def _prove_approval_times(proof: ProofContext) -> None:
     """Approvals that are awaited for less time than a person takes."""
-    for rule in ground.prepared.policy.rules:
+    for rule in proof.policy.rules:
         if rule.kind == RuleKind.CONFIRM and rule.within_us < PERSON_US:
-            written = ground.lowered.written[rule].within
-            ground.context.report.add(
+            written = proof.lowered.written[rule].within
+            proof.report.add(
                 codes.NO_RESOLVER,
-                ground.span(rule) if written is None else written.span,
+                proof.span(rule) if written is None else written.span,
                 f"an approval is awaited for {_time(rule.within_us)}, and a person takes {_time(PERSON_US)} at least",
                 help=f"wait for `{_time(PERSON_US)}` or longer: 30 s leave time to look",
             )
 
 
-def prove_mission(ground: Ground, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
+def prove_observation_time(
+    proof: ProofContext, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]
+) -> None:
     """Report the first step that needs to have observed something for longer than the whole flight up to it.
 
     Observation begins with the run, with which the first step begins to wait: the time since the issue does not count.
     """
-    if not ground.prepared.policy.monitors:
+    if not proof.policy.monitors:
         return
     latest = 0
     for step, invocation in zip(steps, invocations, strict=True):
         contract = invocation.invocation.contract
-        if _unpermitted(ground, step, invocation, latest):
+        if _unpermitted(proof, step, invocation, latest):
             return
-        latest += approval(ground, invocation) + contract.deadline_us
+        latest += approval(proof, invocation) + contract.deadline_us
         for clause in (*contract.require, *contract.assume):
-            at = ground.around(invocation)
-            window = _needed(ground, at, ground.prepared.compiler.node(clause, contract), True)
+            at = proof.around(invocation)
+            window = _needed(proof, at, proof.prepared.compiler.node(clause, contract), True)
             if latest < window < NEVER:
-                ground.context.report.add(
+                proof.report.add(
                     codes.NO_RESOLVER,
                     step.span,
                     f"`{clause.text}` is unknown until {_time(window)} were observed, and this step waits no longer "
                     f"than {_time(latest)} after the run began, with which observation begins",
                     help="take a shorter window, or ask for it in a later step",
-                    labels=[(ground.span(clause), "the contract asks for this")],
+                    labels=[(proof.span(clause), "the contract asks for this")],
                 )
                 return
-        if _forbidden(ground, step, invocation, latest):
+        if _forbidden(proof, step, invocation, latest):
             return
         latest += contract.duration_us
 
 
-def _forbidden(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
+def _forbidden(proof: ProofContext, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
     """Whether a rule that defers while it is unknown must observe longer than the flight up to a step; reports it."""
-    at, compiler = ground.around(invocation), ground.prepared.compiler
-    for rule in refusing(invocation):
+    at, compiler = proof.around(invocation), proof.prepared.compiler
+    for rule in refusing_rules(invocation):
         node = compiler.when(rule)
-        window = 0 if node is None else _needed(ground, at, node, False)
+        window = 0 if node is None else _needed(proof, at, node, False)
         if latest < window < NEVER:
-            ground.context.report.add(
+            proof.report.add(
                 codes.NO_RESOLVER,
                 step.span,
                 f"a rule defers this step until {_time(window)} were observed, and it waits no longer than "
                 f"{_time(latest)} after the run began, with which observation begins",
                 help="take a shorter window, let the step wait for longer, or ask for it in a later step",
-                labels=[(ground.span(rule), "this is unknown until then")],
+                labels=[(proof.span(rule), "this is unknown until then")],
             )
             return True
     return False
 
 
-def _unpermitted(ground: Ground, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
+def _unpermitted(proof: ProofContext, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
     """Whether each permit that may cover a step must observe for longer than the flight up to its release; reports it.
     A step does not wait for a permit: it is denied.
     """
-    at, compiler = ground.around(invocation), ground.prepared.compiler
+    at, compiler = proof.around(invocation), proof.prepared.compiler
     permits = [permit.rule for permit in invocation.candidates.permits if permit.condition(at) & TRUE]
     nodes = [(rule, compiler.when(rule)) for rule in permits]
-    needed = [(rule, 0 if node is None else _needed(ground, at, node, True)) for rule, node in nodes]
+    needed = [(rule, 0 if node is None else _needed(proof, at, node, True)) for rule, node in nodes]
     least = min((window for _, window in needed), default=0)
     if not latest < least < NEVER:
         return False
-    ground.context.report.add(
+    proof.report.add(
         codes.NO_RESOLVER,
         step.span,
         f"nothing permits this step before {_time(least)} were observed, and it is released "
         + (f"no later than {_time(latest)} after the run began" if latest else "when the run begins")
         + ", with which observation begins: it is denied then",
         help="ask for it in a later step, or write a `forbid` of the opposite `within the last`: a step waits for that",
-        labels=[(ground.span(rule), f"this permits it after {_time(window)}") for rule, window in needed],
+        labels=[(proof.span(rule), f"this permits it after {_time(window)}") for rule, window in needed],
     )
     return True
 
 
-def _needed(ground: Ground, at: Environment, node: tree.Node, wanted: bool) -> int:
+def _needed(proof: ProofContext, at: Environment, node: tree.Node, wanted: bool) -> int:
     """How long must have been observed at least for a condition to be true (or false, where that is wanted)."""
     match node:
         case tree.Not(operand):
-            return _needed(ground, at, operand, not wanted)
+            return _needed(proof, at, operand, not wanted)
         case tree.Both(left, right) | tree.Either(left, right):
-            each = _needed(ground, at, left, wanted), _needed(ground, at, right, wanted)
+            each = _needed(proof, at, left, wanted), _needed(proof, at, right, wanted)
             return max(each) if isinstance(node, tree.Both) == wanted else min(each)
         case tree.Monitored(number):
-            monitor = ground.prepared.policy.monitors[number]
+            monitor = proof.policy.monitors[number]
             kind = MonitorKind.FOR_LAST if wanted else MonitorKind.WITHIN_LAST
             return monitor.window_us if monitor.kind == kind else 0
         case _:
-            possible = build(node, ground.prepared.tables)(at) & (TRUE if wanted else FALSE)
+            possible = build(node, proof.prepared.tables)(at) & (TRUE if wanted else FALSE)
             return 0 if possible else NEVER
 
 
-def _signals(ground: Ground, clauses: Sequence[Clause]) -> Iterator[Signal]:
-    policy = ground.prepared.policy
+def _signals(proof: ProofContext, clauses: Sequence[Clause]) -> Iterator[Signal]:
+    policy = proof.policy
     for slot in slots_read(clauses, policy.vehicle, policy.monitors):
         yield signal_of(policy, slot)
 
 
-def _never(ground: Ground, signal: Signal, clause: Clause) -> None:
-    message = ground.context.symbols.signals[signal.name].sources[0].message
-    ground.context.report.add(
+def _report_never(proof: ProofContext, signal: Signal, clause: Clause) -> None:
+    message = proof.context.symbols.signals[signal.name].sources[0].message
+    proof.report.add(
         codes.NO_RESOLVER,
-        ground.span(clause),
+        proof.span(clause),
         f"`{signal.name}` stays unknown: `{message.text}` is a message that vehicles are sent and never report",
         help="read the signal from a message that the vehicle reports",
         labels=[(message.span, "read from this message")],
     )
 
 
-def _late(
-    ground: Ground,
+def _report_late(
+    proof: ProofContext,
     contract: Contract,
     signal: Signal,
     clause: Clause,
     often: Mapping[str, int],
     span: Span | None = None,
 ) -> None:
-    deadline = ground.context.symbols.skills[contract.name].deadline
+    deadline = proof.context.symbols.skills[contract.name].deadline
     assert deadline is not None
-    every = _time(interval(signal, often))
-    ground.context.report.add(
+    every = _time(report_interval(signal, often))
+    proof.report.add(
         codes.NO_RESOLVER,
         span or deadline.span,
         f"`{contract.name}` waits {_time(contract.deadline_us)} at most, and while `{signal.name}` is unknown its next "
-        f"report may take {every}: `{best(signal, often).message}` comes every {every} at best",
+        f"report may take {every}: `{most_frequent(signal, often).message}` comes every {every} at best",
         help=f"let the deadline be {every} or more, or read `{signal.name}` from a message that comes more often",
-        labels=[(ground.span(clause), "this waits for it")],
+        labels=[(proof.span(clause), "this waits for it")],
     )
 
 
-def _approved(ground: Ground, number: int, contract: Contract) -> None:
+def _report_reflex_approval(proof: ProofContext, number: int, contract: Contract) -> None:
     """A reflex that a person would have to approve."""
-    for rule in ground.prepared.policy.rules:
+    for rule in proof.policy.rules:
         if rule.kind == RuleKind.CONFIRM and number in rule.skills:
-            ground.context.report.add(
+            proof.report.add(
                 codes.NO_RESOLVER,
-                ground.span(rule),
+                proof.span(rule),
                 f"`{contract.name}` is a reflex, and no person approves within its {_time(contract.deadline_us)}",
                 help="leave the reflex out of the rule",
-                labels=[(_class(ground, contract), "its class")],
+                labels=[(_class(proof, contract), "its class")],
             )
 
 
-def _class(ground: Ground, contract: Contract) -> Span:
-    written = ground.context.symbols.skills[contract.name].timing_class
+def _class(proof: ProofContext, contract: Contract) -> Span:
+    written = proof.context.symbols.skills[contract.name].timing_class
     assert written is not None
     return written.span
 

@@ -22,8 +22,8 @@ from rtshcua.ground.analysis.extent import PHASE, Conjunction, Extents, alternat
 from rtshcua.ground.analysis.solve import Answer, Goal, Undecided, Yes
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.analysis.witness import plain
-from rtshcua.ground.prove.overlaps import About, Entry, Overlaps
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.rule_index import IndexedRule, RuleIndex, RuleQuery
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import Rule, RuleKind
@@ -42,7 +42,7 @@ MOST_EFFORT = 60_000
 _EVALUATIONS = 16
 
 
-class Group(NamedTuple):
+class WrittenRule(NamedTuple):
     """A rule of the source, and the numbers of what it was lowered to."""
 
     declared: RuleDecl
@@ -51,7 +51,7 @@ class Group(NamedTuple):
     rules: tuple[int, ...]
 
 
-class Key(NamedTuple):
+class RuleSubject(NamedTuple):
     """A skill, a role and a source that stand for all that the same rules speak of."""
 
     skill: int
@@ -62,19 +62,19 @@ class Key(NamedTuple):
 class Ruleset:
     """The rules of a prepared policy; remembers what was asked. `open` are the rules that were not decided on."""
 
-    def __init__(self, ground: Ground) -> None:
-        self.ground = ground
-        self.policy = ground.prepared.policy
-        self.groups = tuple(_groups(ground))
+    def __init__(self, proof: ProofContext) -> None:
+        self.proof = proof
+        self.policy = proof.policy
+        self.groups = tuple(_groups(proof))
         self.at = {group.span: group for group in self.groups}
         self.open: set[Span] = set()
         self._effort = 0
         self._exact: dict[Code, tuple[Conjunction, ...]] = {}
         self._within: dict[tuple[int, int], bool] = {}
-        self._extents = Extents(self.ground.prepared.tables, self.policy.zones)
+        self._extents = Extents(self.proof.prepared.tables, self.policy.zones)
         self._plain: dict[int, Environment] = {}
         self._situations: dict[tuple[int, int], tuple[Environment, ...]] = {}
-        self._overlaps: dict[int, Overlaps] = {}
+        self._overlaps: dict[int, RuleIndex] = {}
         self._left_out: set[int] = set()
         self._alike: dict[tuple[int, Code, int], list[int]] = {}
         self._effects: dict[Hashable, int] = {}
@@ -101,7 +101,7 @@ class Ruleset:
 
     def node(self, number: int) -> tree.Node:
         """The condition of a flat rule."""
-        return self.ground.node(self.rule(number))
+        return self.proof.node(self.rule(number))
 
     def skills(self, number: int) -> Sequence[int]:
         """The skills that a flat rule is about."""
@@ -109,9 +109,9 @@ class Ruleset:
 
     def space(self, skill: int) -> Space:
         """Any situation in which a skill may be asked for."""
-        return self.ground.questions.space(skill)
+        return self.proof.questions.space(skill)
 
-    def keys(self, number: int) -> Iterator[Key]:
+    def keys(self, number: int) -> Iterator[RuleSubject]:
         """The skills, roles and sources of a flat rule; one for all about which the policy's rules are the same."""
         rule = self.rule(number)
         roles = dict.fromkeys(self._roles[role] for role in rule.roles or self._roles)
@@ -119,7 +119,7 @@ class Ruleset:
         for skill in self.skills(number):
             for role in roles:
                 for source in sources:
-                    yield Key(skill, role, source)
+                    yield RuleSubject(skill, role, source)
 
     @property
     def effort(self) -> int:
@@ -138,13 +138,13 @@ class Ruleset:
         def conditions() -> list[Goal]:
             return [(self.node(number), wanted) for number, wanted in goals]
 
-        answer = self.ground.questions.ask(key, conditions, self.space(skill))
-        self._effort += self.ground.questions.effort(key) * _EVALUATIONS
+        answer = self.proof.questions.ask(key, conditions, self.space(skill))
+        self._effort += self.proof.questions.effort(key) * _EVALUATIONS
         return answer
 
     def known(self, goals: Sequence[tuple[int, Truth]], skill: int) -> Answer | None:
         """The answer to a question, if it was asked."""
-        return self.ground.questions.known(self._question(goals, skill))
+        return self.proof.questions.known(self._question(goals, skill))
 
     def _question(self, goals: Sequence[tuple[int, Truth]], skill: int) -> Hashable:
         return ("rules", skill, *((self.code(number), wanted) for number, wanted in goals))
@@ -182,7 +182,7 @@ class Ruleset:
     def holds(self, number: int, at: Environment) -> Truth:
         """The truth of a rule's condition in a situation."""
         self._effort += 1
-        return self.ground.condition(self.rule(number))(at)
+        return self.proof.condition(self.rule(number))(at)
 
     def may_match(self, number: int, skill: int) -> bool | None:
         """Whether the condition of a rule can be true; None where that is best asked of the analysis."""
@@ -239,16 +239,16 @@ class Ruleset:
             found = self._within[pair] = not sometimes and self.space(0).plane.within(*pair)
         return found
 
-    def overlaps(self, kind: int) -> Overlaps:
+    def overlaps(self, kind: int) -> RuleIndex:
         """The rules of a kind, by what their conditions can hold in; without those that were dropped."""
         found = self._overlaps.get(kind)
         if found is None:
             numbers = (
                 each for each, rule in enumerate(self.policy.rules) if rule.kind == kind and each not in self._left_out
             )
-            found = self._overlaps[kind] = Overlaps(
+            found = self._overlaps[kind] = RuleIndex(
                 (
-                    Entry(
+                    IndexedRule(
                         each,
                         self.rule(each),
                         self._extents.parts(self.node(each)),
@@ -262,7 +262,7 @@ class Ruleset:
         return found
 
     def covered(
-        self, number: int, wanted: Truth, kind: RuleKind, but: AbstractSet[int], escape: Truth, key: Key
+        self, number: int, wanted: Truth, kind: RuleKind, but: AbstractSet[int], escape: Truth, key: RuleSubject
     ) -> tuple[int, ...] | Undecided | None:
         """Rules of a kind about a key, but for some, of which one has none of the truths `escape` wherever a rule's
         condition has the truth `wanted`; None where there is a situation without such a rule.
@@ -274,7 +274,7 @@ class Ruleset:
             one = next((each for each in alike if each not in but and self._about(each, key)), None)
             if one is not None:
                 return (one,)
-        about = About(key.skill, (key.role,), (key.source,))
+        about = RuleQuery(key.skill, (key.role,), (key.source,))
         holding = [self._holding(about, key, kind, exact, but) for exact in self._alternatives(number)]
         if all(one is not None for one in holding):
             return tuple(dict.fromkeys(one for one in holding if one is not None))
@@ -295,7 +295,9 @@ class Ruleset:
             used.append(met)
         return None
 
-    def _holding(self, about: About, key: Key, kind: int, exact: Conjunction, but: AbstractSet[int]) -> int | None:
+    def _holding(
+        self, about: RuleQuery, key: RuleSubject, kind: int, exact: Conjunction, but: AbstractSet[int]
+    ) -> int | None:
         """A rule, but for some, that is seen to hold wherever a conjunction does."""
         for number in self.overlaps(kind).holding(about, exact):
             self._effort += 1
@@ -306,7 +308,7 @@ class Ruleset:
         return None
 
     def _met(
-        self, about: About, key: Key, kind: int, at: Environment, escape: Truth, but: AbstractSet[int]
+        self, about: RuleQuery, key: RuleSubject, kind: int, at: Environment, escape: Truth, but: AbstractSet[int]
     ) -> int | None:
         """The first of the rules, but for some, that does not have one of some truths in a situation."""
         for number in self.overlaps(kind).meeting(about, (at,), sure=bool(escape & UNKNOWN)):
@@ -316,7 +318,7 @@ class Ruleset:
                 break
         return None
 
-    def _about(self, number: int, key: Key) -> bool:
+    def _about(self, number: int, key: RuleSubject) -> bool:
         """Whether a rule is about a key; none is about the skill that it flies itself."""
         rule = self.rule(number)
         return (
@@ -330,11 +332,11 @@ class Ruleset:
         """Whether a rule's condition reads the time of day, by itself or through a zone."""
         return timed(self.code(number), self.policy.zones)
 
-    def undecided(self, group: Group, what: str, why: str) -> None:
+    def undecided(self, group: WrittenRule, what: str, why: str) -> None:
         """Say, once a rule, that a check could not decide."""
         if group.span not in self.open:
             self.open.add(group.span)
-            self.ground.context.report.add(
+            self.proof.report.add(
                 codes.UNDECIDED,
                 group.span,
                 f"it could not be decided whether this rule {what}",
@@ -367,17 +369,17 @@ def timed(code: Code, zones: Sequence[Zone]) -> bool:
     )
 
 
-def _groups(ground: Ground) -> Iterator[Group]:
+def _groups(proof: ProofContext) -> Iterator[WrittenRule]:
     """The rules by the place where they are written, in the order of their last ones."""
     declared: dict[Span, RuleDecl] = {}
-    for each in ground.lowered.declaration.rules:
+    for each in proof.lowered.declaration.rules:
         declared.setdefault(each.span, each)
     numbers: dict[Span, list[int]] = {}
-    for number, rule in enumerate(ground.prepared.policy.rules):
-        numbers.setdefault(ground.span(rule), []).append(number)
+    for number, rule in enumerate(proof.policy.rules):
+        numbers.setdefault(proof.span(rule), []).append(number)
     for span, rules in numbers.items():
         if span in declared:
-            yield Group(declared[span], span, ground.prepared.policy.rules[rules[0]].kind, tuple(rules))
+            yield WrittenRule(declared[span], span, proof.policy.rules[rules[0]].kind, tuple(rules))
 
 
 def _representatives(members: Iterable[int], mentions: Iterable[tuple[int, ...]]) -> dict[int, int]:

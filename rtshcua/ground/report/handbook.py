@@ -7,7 +7,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.checker.symbols import collect
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.lower.policy import LoweredPolicy
-from rtshcua.ground.prove.bounds import Bounds
+from rtshcua.ground.prove.mission_bounds import Bounds
 from rtshcua.ground.report.cases import Tried, starts_and_cases
 from rtshcua.ground.report.chapter import chapter, digest_of
 from rtshcua.ground.report.missions import mission_told

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from rtshcua.ground.prove.bounds import Bounds, rounded_energy, rounded_time
+from rtshcua.ground.prove.mission_bounds import Bounds, rounded_energy, rounded_time
 from rtshcua.ground.report.model import Fact, MissionTold, StepTold
 from rtshcua.ground.report.words.missions import told_asker, told_otherwise, told_step, told_tighter
 from rtshcua.model.flat.mission import Invocation, Mission

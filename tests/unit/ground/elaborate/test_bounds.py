@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from rtshcua.front.cli.bounds import bounds_told
 from rtshcua.ground.pipeline.program import Checked, Compiled
-from rtshcua.ground.prove.bounds import Bounds, _taken, most, rounded_energy, rounded_time
+from rtshcua.ground.prove.mission_bounds import Bounds, _taken, greatest, rounded_energy, rounded_time
 
 Compile = Callable[..., Compiled]
 Check = Callable[[str], Checked]
@@ -116,8 +116,8 @@ def test_the_largest_steps_are_shown_a_repeated_one_once(check_text: Check, site
 
 
 def test_of_a_mission_with_parameters_they_are_the_largest() -> None:
-    assert most(Bounds(3, 5, 9), None) == Bounds(3, 5, 9)
-    assert most(Bounds(3, 5, 9), Bounds(4, 4, 10)) == Bounds(4, 5, 10)
+    assert greatest(Bounds(3, 5, 9), None) == Bounds(3, 5, 9)
+    assert greatest(Bounds(3, 5, 9), Bounds(4, 4, 10)) == Bounds(4, 5, 10)
 
 
 def test_they_are_told_in_one_line() -> None:

@@ -12,7 +12,7 @@ from reference.sources import findings, found, mission, policy, program, skill
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.diagnostics.codes import Severity
-from rtshcua.ground.prove.fan import Fan, Landmarks, disc, hull
+from rtshcua.ground.prove.airspace_keeping import HullSweep, Landmarks, disc, hull
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 from virtual.rows import rows
 
@@ -32,7 +32,7 @@ def zone(shape: int, data: tuple[int, ...]) -> Zone:
 
 
 def answer(flat: Zone, points: list[tuple[int, int]], error: int) -> int:
-    fan = Fan(points, (-error, -error, error, error), Zones(flat))
+    fan = HullSweep(points, (-error, -error, error, error), Zones(flat))
     return fan.within(PreparedZone(0, flat))
 
 

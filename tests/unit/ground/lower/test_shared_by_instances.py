@@ -8,7 +8,7 @@ from reference.sources import findings, program
 from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.ground.geometry import survey
 from rtshcua.ground.geometry.shapes import Disc
-from rtshcua.ground.prove import situation
+from rtshcua.ground.prove import proof_context
 from rtshcua.model.flat.mission import Invocation
 
 POLICY = """
@@ -44,7 +44,7 @@ def test_a_step_is_prepared_once_for_all_that_have_the_same_arguments(monkeypatc
         prepared[invocation.step, invocation.arguments] += 1
         return prepare_invocation(invocation, *others)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(situation, "prepare_invocation", counted)
+    monkeypatch.setattr(proof_context, "prepare_invocation", counted)
     assert findings(program(POLICY, MISSION)) == ()
     assert set(prepared.values()) == {1}
     assert len(prepared) <= 3 + 3 * 3 + 3 + 3 + 1, "of 64 missions with 5 steps each"

@@ -4,8 +4,8 @@ import pytest
 
 from reference.sources import findings, found, mission, policy, program, skill
 from rtshcua.adapters.vehicle import manoeuvre
-from rtshcua.ground.prove import observation
-from rtshcua.ground.prove.rates import COMMANDS
+from rtshcua.ground.prove import observability
+from rtshcua.ground.prove.observability import COMMAND_MESSAGES
 from rtshcua.mavlink import dialect
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from virtual.rows import rows
@@ -18,9 +18,9 @@ def codes(*parts: str) -> list[str]:
 
 
 def test_the_figures_are_those_of_what_flies() -> None:
-    assert observation.DECIDE_US == CONSERVATIVE_US
-    assert observation.ACTUATE_US == manoeuvre.RETRY_US
-    assert dialect.load().messages.keys() >= COMMANDS
+    assert observability.DECIDE_US == CONSERVATIVE_US
+    assert observability.ACTUATE_US == manoeuvre.RETRY_US
+    assert dialect.load().messages.keys() >= COMMAND_MESSAGES
 
 
 # ---------------------------------------------------------------- E0618

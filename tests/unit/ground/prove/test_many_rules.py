@@ -9,9 +9,9 @@ from reference.many_rules import KINDS, policy
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import examine_program
-from rtshcua.ground.prove import rules, ruleset
+from rtshcua.ground.prove import rule_checks, ruleset
+from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
-from rtshcua.ground.prove.situation import Ground
 from rtshcua.mavlink import dialect
 
 LIBRARY = str(Path(__file__).resolve().parents[4])
@@ -26,11 +26,11 @@ def effort(monkeypatch: pytest.MonkeyPatch) -> Check:
     made: list[Ruleset] = []
 
     class Kept(Ruleset):
-        def __init__(self, ground: Ground) -> None:
+        def __init__(self, ground: ProofContext) -> None:
             super().__init__(ground)
             made.append(self)
 
-    monkeypatch.setattr(rules, "Ruleset", Kept)
+    monkeypatch.setattr(rule_checks, "Ruleset", Kept)
 
     def check(text: str) -> tuple[int, tuple[Diagnostic, ...]]:
         program = load(["x.rts"], lambda path: text.encode() if path == "x.rts" else Path(path).read_bytes(), LIBRARY)
@@ -53,7 +53,7 @@ def test_so_many_that_the_effort_is_limited_are_told(effort: Check, monkeypatch:
     took, whole = effort(text)
     assert "E1103" not in [each.code.id for each in whole]
     monkeypatch.setattr(ruleset, "MOST_EFFORT", took // 2)
-    monkeypatch.setattr(rules, "MOST_EFFORT", took // 2)
+    monkeypatch.setattr(rule_checks, "MOST_EFFORT", took // 2)
     _, found = effort(text)
     assert [each.message for each in found if each.code.id == "E1103"] == [
         f"the rules of `many` were not all compared with each other: after {took // 2} steps that is given up"

@@ -1,31 +1,127 @@
-"""E0809 to E0812: what a mission takes at most, in steps, time and energy, and whether that is within what it says.
+"""E0809 to E0812: what a mission takes at most in steps, time and energy. E0620: each step finds the charge it needs.
 
 Time runs from the issue to the end: the start window, each step's approval, deadline and duration, and the longest
 chain that may follow one of them. Energy is what the contracts of the steps may take up to one that is given up, and of
 the chain that is then flown, whichever step that is; a return takes no less than the way home from the farthest planned
 place. A mission whose bound exceeds a full charge is refused: no battery that is put in would be enough.
+
+For E0620 the flight begins with a full charge, and every step before took all that it may. A step that may be skipped
+counts as flown, and is not asked itself: its `skip` is for that. Needed is what step 7 of the decision asks for (the
+step's own bound, the way home from the farthest planned place, the reserve), and that no clause about the battery, and
+no rule, then refuses the step.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import isqrt
 from typing import NamedTuple
 
 from rtshcua.decision.contracts import longest
+from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.flying import charge, home_us
-from rtshcua.decision.prepare import prepare_invocation
-from rtshcua.decision.values import TRUE
+from rtshcua.decision.prepare import PreparedInvocation, prepare_invocation
+from rtshcua.decision.values import TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.prove.durations import StepBound
-from rtshcua.ground.prove.situation import Ground
-from rtshcua.ground.prove.timing import START_WINDOW_US
+from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_bounds import StepBound
+from rtshcua.ground.prove.step_starts import StartPlace, planned
+from rtshcua.ground.prove.step_times import START_WINDOW_US
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
 from rtshcua.model.flat.limits import FULL
-from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.quantity import Dimension, display
+
+#: so many steps before the one that lacks charge are told of
+_SHOWN_STEPS = 6
+
+
+def prove_charge(
+    proof: ProofContext,
+    steps: Sequence[Step],
+    invocations: Sequence[PreparedInvocation],
+    starts: Sequence[Sequence[StartPlace]],
+) -> None:
+    """Report the first step that may find too little; `starts` are the places where each may begin."""
+    left = FULL
+    spent: list[tuple[str, int]] = []
+    for step, invocation, places in zip(steps, invocations, starts, strict=True):
+        flat = invocation.invocation
+        if flat.on_inadmissible != OnInadmissible.SKIP:
+            why = next(_wants(proof, invocation, places, left), None)
+            if why is not None:
+                _report_short(proof, step, left, why, spent)
+                return
+        left = max(left - flat.contract.energy, 0)
+        spent.append((flat.contract.name, left))
+
+
+_Why = tuple[str, tuple[tuple[Span, str], ...]]
+
+
+def _wants(
+    proof: ProofContext, invocation: PreparedInvocation, places: Sequence[StartPlace], left: int
+) -> Iterator[_Why]:
+    """Why a step is refused with this charge and would not be with a full one: in words, and where that is written."""
+    battery = proof.prepared.tables.known.battery
+    for place in places:
+        at, volume = planned(proof, invocation, place)
+        needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
+        if needed > left:
+            yield _needs(proof, invocation, needed), ((proof.lowered.vehicle.reserve.span, "what must be left"),)
+        slots = list(at.slots)
+        slots[battery] = point(left)
+        worst = at.over(slots, None, 0)
+        slots = list(at.slots)
+        slots[battery] = point(FULL)
+        full = at.over(slots, None, 0)
+        yield from _refusals(proof, invocation, worst, full)
+
+
+def _needs(proof: ProofContext, invocation: PreparedInvocation, needed: int) -> str:
+    own = invocation.invocation.contract.energy
+    words = f"it needs {_percent_text(needed)}: {_percent_text(own)} for itself"
+    if needed > own:
+        reserve = proof.policy.vehicle.reserve
+        words += f", {_percent_text(needed - own - reserve)} for the way home and {_percent_text(reserve)} in reserve"
+    return words
+
+
+def _refusals(
+    proof: ProofContext, invocation: PreparedInvocation, worst: Environment, full: Environment
+) -> Iterator[_Why]:
+    """What refuses a step whatever else the state is."""
+    for clause, condition in (*invocation.require, *invocation.assume):
+        if not condition(worst) & TRUE and condition(full) & TRUE:
+            yield f"`{clause.text}` does not hold then", ((proof.span(clause), "the contract asks for this"),)
+    for degrade in invocation.candidates.degrades:
+        if degrade.condition(worst) == TRUE != degrade.condition(full):
+            yield "a rule of the policy then sends it home", ((proof.span(degrade.rule), "this rule"),)
+    for forbid in invocation.candidates.forbids:
+        if forbid.condition(worst) == TRUE != forbid.condition(full):
+            yield "a rule of the policy then forbids it", ((proof.span(forbid.rule), "this rule"),)
+    permits = [permit for permit in invocation.candidates.permits if permit.condition(full) & TRUE]
+    if permits and not any(permit.condition(worst) & TRUE for permit in permits):
+        yield "no rule then permits it", tuple((proof.span(permit.rule), "this rule does not") for permit in permits)
+
+
+def _report_short(proof: ProofContext, step: Step, left: int, why: _Why, spent: Sequence[tuple[str, int]]) -> None:
+    told = [f"{_percent_text(charge)} after `{name}`" for name, charge in spent[-_SHOWN_STEPS:]]
+    from_ = ["..."] if len(spent) > _SHOWN_STEPS else ["full at the start"]
+    proof.report.add(
+        codes.SHORT_OF_ENERGY,
+        step.span,
+        f"{_percent_text(left)} of the charge may be left when this step begins, and {why[0]}",
+        help="what is left when each step takes all that it may: " + ", ".join([*from_, *told]),
+        labels=why[1],
+    )
+
+
+def _percent_text(charge: int) -> str:
+    return display(charge, Dimension.RATIO)
+
 
 SECOND_US = 1_000_000
 
@@ -35,7 +131,7 @@ _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 _ALOFT = (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)
 
 #: so many of the largest contributions are shown
-SHOWN = 3
+_SHOWN = 3
 
 
 class Bounds(NamedTuple):
@@ -49,7 +145,7 @@ class Bounds(NamedTuple):
     steps: tuple[StepBound, ...] = ()
 
 
-def most(one: Bounds, other: Bounds | None) -> Bounds:
+def greatest(one: Bounds, other: Bounds | None) -> Bounds:
     """What is within both."""
     if other is None:
         return one
@@ -62,41 +158,43 @@ def most(one: Bounds, other: Bounds | None) -> Bounds:
     )
 
 
-def bounds_of(ground: Ground, declared: MissionDecl, mission: Mission, flown: tuple[StepBound, ...] = ()) -> Bounds:
+def bounds_of(
+    proof: ProofContext, declared: MissionDecl, mission: Mission, flown: tuple[StepBound, ...] = ()
+) -> Bounds:
     """The bounds of a mission, of which `flown` is what each step is proved to take; reports where they exceed what it
     says.
     """
-    policy = ground.prepared.policy
+    policy = proof.policy
     steps = [step for phase in declared.phases for step in phase.steps]
-    times = [_time(ground, mission, invocation) for invocation in mission.invocations]
+    times = [_step_time(proof, mission, invocation) for invocation in mission.invocations]
     energies = [invocation.contract.energy for invocation in mission.invocations]
     chains = {policy.contingency, *(each.contract.fallback for each in mission.invocations)}
     found = Bounds(
         len(mission.invocations),
         START_WINDOW_US + sum(times) + max(_chain_time(chain, policy) for chain in chains),
-        _energy(ground, mission),
+        _mission_energy(proof, mission),
         flown,
     )
-    _count(ground, declared, found.invocations)
-    _within(ground, declared, found, steps, times, energies)
+    _count(proof, declared, found.invocations)
+    _within(proof, declared, found, steps, times, energies)
     return found
 
 
-def _time(ground: Ground, mission: Mission, invocation: Invocation) -> int:
+def _step_time(proof: ProofContext, mission: Mission, invocation: Invocation) -> int:
     """How long a step takes from its turn to its end, in us."""
-    contract, vehicle = invocation.contract, ground.prepared.policy.vehicle
-    return _approval(ground, mission, invocation) + contract.deadline_us + longest(contract, vehicle)
+    contract, vehicle = invocation.contract, proof.policy.vehicle
+    return _approval(proof, mission, invocation) + contract.deadline_us + longest(contract, vehicle)
 
 
-def _approval(ground: Ground, mission: Mission, invocation: Invocation) -> int:
+def _approval(proof: ProofContext, mission: Mission, invocation: Invocation) -> int:
     """How long a step may wait for an approval."""
-    rules = ground.prepared.rules.candidates(invocation.skill, invocation.role, invocation.source)
+    rules = proof.prepared.rules.candidates(invocation.skill, invocation.role, invocation.source)
     if not rules.confirms:
         return 0
-    prepared = prepare_invocation(invocation, ground.prepared, mission.phases)
+    prepared = prepare_invocation(invocation, proof.prepared, mission.phases)
     if isinstance(prepared, Refusal):
         return 0  # reported by the proofs
-    at = ground.around(prepared)
+    at = proof.around(prepared)
     return max((each.rule.within_us for each in rules.confirms if each.condition(at) & TRUE), default=0)
 
 
@@ -109,10 +207,10 @@ def _taken(contract: Contract, way_home: int) -> int:
     return max(contract.energy, way_home) if contract.motion.kind == MotionKind.HOME else contract.energy
 
 
-def _energy(ground: Ground, mission: Mission) -> int:
+def _mission_energy(proof: ProofContext, mission: Mission) -> int:
     """What the steps take up to the one that a chain follows, and that chain: after it no step is flown."""
-    policy = ground.prepared.policy
-    way_home = _way_home(ground, mission)
+    policy = proof.policy
+    way_home = _way_home(proof, mission)
 
     def chain_energy(chain: Iterable[Link]) -> int:
         return sum(_taken(policy.contracts[link.skill], way_home) for link in chain)
@@ -128,9 +226,9 @@ def _energy(ground: Ground, mission: Mission) -> int:
     return largest
 
 
-def _way_home(ground: Ground, mission: Mission) -> int:
+def _way_home(proof: ProofContext, mission: Mission) -> int:
     """The energy of the way home from the farthest and highest planned place, rounded up; low it is only near home."""
-    vehicle, plans = ground.prepared.policy.vehicle, [invocation.plan for invocation in mission.invocations]
+    vehicle, plans = proof.policy.vehicle, [invocation.plan for invocation in mission.invocations]
     speeds = vehicle.speeds
     assert speeds is not None  # the compiler writes them
     squares = (x * x + y * y for plan in plans for x, y in zip(plan.path[::2], plan.path[1::2], strict=True))
@@ -142,27 +240,29 @@ def _way_home(ground: Ground, mission: Mission) -> int:
     return charge(speeds, max(near, far))
 
 
-def _count(ground: Ground, declared: MissionDecl, steps: int) -> None:
+def _count(proof: ProofContext, declared: MissionDecl, steps: int) -> None:
     if declared.most_steps is None or steps <= declared.most_steps:
         return
-    ground.context.report.add(
+    proof.report.add(
         codes.MISSION_STEPS,
         declared.name.span,
         f"the mission `{declared.name.text}` has {steps} steps, and says that it has at most {declared.most_steps}",
         help=f"leave steps out, or write `steps at most {steps}`",
-        labels=[(phase.name.span, f"these are {len(phase.steps)}") for phase in declared.phases if phase.steps][:SHOWN],
+        labels=[(phase.name.span, f"these are {len(phase.steps)}") for phase in declared.phases if phase.steps][
+            :_SHOWN
+        ],
     )
 
 
 def _within(
-    ground: Ground,
+    proof: ProofContext,
     declared: MissionDecl,
     found: Bounds,
     steps: Sequence[Step],
     times: Sequence[int],
     energies: Sequence[int],
 ) -> None:
-    report = ground.context.report
+    report = proof.report
     start = display(START_WINDOW_US, Dimension.DURATION)
     if declared.most_time is not None and found.time_us > declared.most_time.value:
         report.add(
@@ -176,7 +276,7 @@ def _within(
             labels=_largest(steps, times, rounded_time),
         )
     limit = declared.most_energy
-    over = found.energy > FULL and not _told(ground, steps)
+    over = found.energy > FULL and not _short_already(proof, steps)
     if not over and (limit is None or found.energy <= limit.value):
         return
     needs = f"the mission may need {rounded_energy(found.energy)} of a full charge"
@@ -202,10 +302,10 @@ def _within(
         )
 
 
-def _told(ground: Ground, steps: Sequence[Step]) -> bool:
+def _short_already(proof: ProofContext, steps: Sequence[Step]) -> bool:
     """Whether one of the steps was found to lack charge: that says more."""
     spans = {step.span for step in steps}
-    return any(each.code is codes.SHORT_OF_ENERGY and each.span in spans for each in ground.context.report.found)
+    return any(each.code is codes.SHORT_OF_ENERGY and each.span in spans for each in proof.report.found)
 
 
 def _largest(steps: Sequence[Step], amounts: Sequence[int], words: Callable[[int], str]) -> list[tuple[Span, str]]:
@@ -213,7 +313,7 @@ def _largest(steps: Sequence[Step], amounts: Sequence[int], words: Callable[[int
     sums: dict[Span, list[int]] = {}
     for step, amount in zip(steps, amounts, strict=True):
         sums.setdefault(step.span, []).append(amount)
-    largest = sorted(sums.items(), key=lambda item: (-sum(item[1]), item[0]))[:SHOWN]
+    largest = sorted(sums.items(), key=lambda item: (-sum(item[1]), item[0]))[:_SHOWN]
     return [
         (span, f"up to {words(sum(parts))}" + (f", {len(parts)} times {words(parts[0])}" if len(parts) > 1 else ""))
         for span, parts in largest

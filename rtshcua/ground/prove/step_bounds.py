@@ -33,21 +33,21 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.sizes import named_at
 from rtshcua.ground.geometry.polygons import Point, length
 from rtshcua.ground.lower.mission import argument_span
-from rtshcua.ground.prove.places import Place, planned
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_starts import StartPlace, planned
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind
 from rtshcua.model.flat.limits import FULL, MAX_SPEED
 from rtshcua.model.flat.policy import Speeds
 from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
-_SECOND: Final = 1_000_000
+SECOND_US: Final = 1_000_000
 _MILLISECOND: Final = 1_000
 _METRE: Final = 1_000  # mm
 #: where to write what, and what that is
 _Fix = tuple[Span, str, str]
 #: where autopilots report the wind
-_WIND: Final = ("WIND_COV", "WIND")
+_WIND_MESSAGES: Final = ("WIND_COV", "WIND")
 
 
 class StepBound(NamedTuple):
@@ -58,45 +58,45 @@ class StepBound(NamedTuple):
     energy: int
 
 
-def prove(
-    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: int
+def prove_step_bounds(
+    proof: ProofContext, step: Step, invocation: PreparedInvocation, starts: Sequence[StartPlace], slowest: int
 ) -> StepBound | None:
     """What a step takes at most that may begin at `starts`; None after a finding. `slowest` is the slowest speed that
     it and those before it ask for, mm/s, 0 if none does.
     """
-    before = len(ground.context.report.found)
-    speeds, contract = _speeds(ground), invocation.invocation.contract
-    wind = _wind(ground, invocation)
+    before = len(proof.report.found)
+    speeds, contract = _speeds(proof), invocation.invocation.contract
+    wind = _wind(proof, invocation)
 
     def takes(height: int) -> int:
         """What it takes if it leads to a height."""
-        return max(_step_us(ground, invocation, start, height, slowest, wind) for start in starts)
+        return max(_step_us(proof, invocation, start, height, slowest, wind) for start in starts)
 
     time_us, fits = takes(invocation.invocation.plan.altitude), _energy_us(speeds, contract.energy)
     if 0 < contract.duration_us < time_us:
-        skill = ground.context.symbols.skills[step.skill.text]
+        skill = proof.context.symbols.skills[step.skill.text]
         own = None if step.overrides is None else step.overrides.duration
         limit = own or skill.duration
         assert limit is not None
-        nearer = _nearer(ground, step, invocation, starts[0].height, takes, min(fits, contract.duration_us))
-        _too_long(ground, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest)
+        nearer = _nearer(proof, step, invocation, starts[0].height, takes, min(fits, contract.duration_us))
+        _too_long(proof, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest)
     energy = charge(speeds, time_us)
     # a return is never refused for want of charge, and the mission's bound counts the way home, if that is more
     home = invocation.invocation.plan.kind == MotionKind.HOME
-    if len(ground.context.report.found) == before and energy > contract.energy and not home:
+    if len(proof.report.found) == before and energy > contract.energy and not home:
         fits = min(fits, contract.duration_us or fits)
-        nearer = _nearer(ground, step, invocation, starts[0].height, takes, fits)
-        _too_much(ground, step, "the step", contract, energy, nearer)
+        nearer = _nearer(proof, step, invocation, starts[0].height, takes, fits)
+        _too_much(proof, step, "the step", contract, energy, nearer)
     returns: list[tuple[Contract, int]] = []
-    if len(ground.context.report.found) == before:
-        returns = _links(ground, step, invocation, starts, slowest)
-    if len(ground.context.report.found) > before:
+    if len(proof.report.found) == before:
+        returns = _prove_links(proof, step, invocation, starts, slowest)
+    if len(proof.report.found) > before:
         return None
     for link, needed in returns:
-        if not _is_told(ground, link):
-            _too_much(ground, step, "the return, a link of this step's chains,", link, needed, code=codes.RETURN_ENERGY)
+        if not _is_told(proof, link):
+            _too_much(proof, step, "the return, a link of this step's chains,", link, needed, code=codes.RETURN_ENERGY)
     if home and energy > contract.energy:
-        _too_much(ground, step, "the return", contract, energy, code=codes.RETURN_ENERGY)
+        _too_much(proof, step, "the return", contract, energy, code=codes.RETURN_ENERGY)
     return StepBound(contract.name, time_us, energy)
 
 
@@ -106,7 +106,7 @@ def _energy_us(speeds: Speeds, energy: int) -> int:
 
 
 def _nearer(
-    ground: Ground, step: Step, invocation: PreparedInvocation, here: int, takes: Callable[[int], int], fits: int
+    proof: ProofContext, step: Step, invocation: PreparedInvocation, here: int, takes: Callable[[int], int], fits: int
 ) -> _Fix | None:
     """The height nearest to what the step asks for, towards where it begins, to which it takes no longer than `fits`;
     None where its height is no argument, or none does.
@@ -114,7 +114,7 @@ def _nearer(
     contract, asked = invocation.invocation.contract, invocation.invocation.plan.altitude
     cell = contract.motion.altitude
     parameter = next((each for each in contract.parameters if 0 <= each.cell == cell), None)
-    span = None if parameter is None else argument_span(ground.context, step, parameter.name)
+    span = None if parameter is None else argument_span(proof.context, step, parameter.name)
     if parameter is None or span is None or span == step.span or not parameter.low <= here <= parameter.high:
         return None
     sign = 1 if here > asked else -1
@@ -128,21 +128,21 @@ def _nearer(
     return span, height, f"write `{height}`"
 
 
-def _speeds(ground: Ground) -> Speeds:
-    speeds = ground.prepared.policy.vehicle.speeds
+def _speeds(proof: ProofContext) -> Speeds:
+    speeds = proof.policy.vehicle.speeds
     assert speeds is not None  # the compiler writes them
     return speeds
 
 
-def _wind(ground: Ground, invocation: PreparedInvocation) -> int:
+def _wind(proof: ProofContext, invocation: PreparedInvocation) -> int:
     """The most wind in which a step goes on: what the vehicle is flown in, and what `assume` and `degrade` leave."""
-    policy, most = ground.prepared.policy, _speeds(ground).wind
+    policy, most = proof.policy, _speeds(proof).wind
     slots = [
         signal.slot
         for signal in policy.signals
-        if signal.dimension == Dimension.SPEED.value and all(each.message in _WIND for each in signal.sources)
+        if signal.dimension == Dimension.SPEED.value and all(each.message in _WIND_MESSAGES for each in signal.sources)
     ]
-    at = ground.around(invocation)
+    at = proof.around(invocation)
 
     def goes_on(slot: int, wind: int) -> bool:
         values = list(at.slots)
@@ -162,10 +162,10 @@ def _wind(ground: Ground, invocation: PreparedInvocation) -> int:
 
 
 def _step_us(
-    ground: Ground, invocation: PreparedInvocation, start: Place, altitude: int, slowest: int, wind: int
+    proof: ProofContext, invocation: PreparedInvocation, start: StartPlace, altitude: int, slowest: int, wind: int
 ) -> int:
     """How long a step takes at most from where it begins to where it is done, which is at a height."""
-    flat, vehicle, speeds = invocation.invocation, ground.prepared.policy.vehicle, _speeds(ground)
+    flat, vehicle, speeds = invocation.invocation, proof.policy.vehicle, _speeds(proof)
     plan = flat.plan
     height = sinking_us(speeds, start.height - altitude) + rising_us(speeds, altitude - start.height)
     match plan.kind:
@@ -184,14 +184,14 @@ def _step_us(
     return BEGINS + sum(leg_us(speeds, length(a, b) + 1, speed) for a, b in pairwise(points)) + height + SETTLES
 
 
-def _is_told(ground: Ground, contract: Contract) -> bool:
+def _is_told(proof: ProofContext, contract: Contract) -> bool:
     """Whether it was said already of another step that this return may take more than its skill says."""
     written = f"`{contract.name}` takes at most"
-    return any(each.code is codes.RETURN_ENERGY and written in each.message for each in ground.context.report.found)
+    return any(each.code is codes.RETURN_ENERGY and written in each.message for each in proof.report.found)
 
 
-def _links(
-    ground: Ground, step: Step, invocation: PreparedInvocation, starts: Sequence[Place], slowest: int
+def _prove_links(
+    proof: ProofContext, step: Step, invocation: PreparedInvocation, starts: Sequence[StartPlace], slowest: int
 ) -> list[tuple[Contract, int]]:
     """Report the first link that may take longer than it may, wherever in the step it begins. Given are the returns
     that may take more charge than their skill says, and how much; none is refused for that.
@@ -199,37 +199,37 @@ def _links(
     returns: list[tuple[Contract, int]] = []
     if invocation.invocation.plan.kind in (MotionKind.HOME, MotionKind.LAND):
         return returns  # what follows it lands
-    volumes = [planned(ground, invocation, start)[1] for start in starts]
+    volumes = [planned(proof, invocation, start)[1] for start in starts]
     distance = max(volume.farthest[1] for volume in volumes)
     low = min(volume.height[0] for volume in volumes)
     high = max(volume.height[1] for volume in volumes)
     degrades = [rule.target for rule in invocation.candidates.degrades]
-    for chain in (degrades, invocation.chain, ground.prepared.contingency):
+    for chain in (degrades, invocation.chain, proof.prepared.contingency):
         reach, so_far = (distance, low, high), slowest
         for link in chain:
-            reach, time_us = _link_us(ground, link, *reach, so_far)
-            contract = ground.prepared.policy.contracts[link.link.skill]
+            reach, time_us = _link_us(proof, link, *reach, so_far)
+            contract = proof.policy.contracts[link.link.skill]
             asks = contract.motion.speed >= 0 and contract.motion.kind == MotionKind.FLY
             so_far = slower(so_far, link.link.arguments[contract.motion.speed] if asks else 0)
             allowed = link.link.limit_us or contract.duration_us
             name = f"`{contract.name}`, a link of this step's chains,"
             if link is not chain[-1] and 0 < allowed < time_us:
-                declared = ground.context.symbols.skills[contract.name].duration
-                limit = ground.span(link.link) if link.link.limit_us or declared is None else declared.span
-                _too_long(ground, step, name, contract, time_us, allowed, limit, slowest=slowest)
+                declared = proof.context.symbols.skills[contract.name].duration
+                limit = proof.span(link.link) if link.link.limit_us or declared is None else declared.span
+                _too_long(proof, step, name, contract, time_us, allowed, limit, slowest=slowest)
                 return []
-            needed = charge(_speeds(ground), time_us)
+            needed = charge(_speeds(proof), time_us)
             if link.motion == MotionKind.HOME and needed > contract.energy:
                 returns.append((contract, needed))
     return returns
 
 
 def _link_us(
-    ground: Ground, link: PreparedLink, distance: int, low: int, high: int, slowest: int
+    proof: ProofContext, link: PreparedLink, distance: int, low: int, high: int, slowest: int
 ) -> tuple[tuple[int, int, int], int]:
     """From how far and between which heights later links begin, and how long a link takes at most; 0: it is cut."""
-    vehicle, speeds = ground.prepared.policy.vehicle, _speeds(ground)
-    contract, arguments = ground.prepared.policy.contracts[link.link.skill], link.link.arguments
+    vehicle, speeds = proof.policy.vehicle, _speeds(proof)
+    contract, arguments = proof.policy.contracts[link.link.skill], link.link.arguments
     reach = (distance, low, high)
     match link.motion:
         case MotionKind.HOME:
@@ -253,7 +253,7 @@ def _link_us(
 
 
 def _too_long(
-    ground: Ground,
+    proof: ProofContext,
     step: Step,
     what: str,
     contract: Contract,
@@ -263,31 +263,31 @@ def _too_long(
     nearer: _Fix | None = None,
     slowest: int = 0,
 ) -> None:
-    speeds = _speeds(ground)
+    speeds = _speeds(proof)
     goes_on = ""
     if contract.motion.kind == MotionKind.HOME and 0 < slowest < speeds.homeward:
         goes_on = f", at {display(slowest, Dimension.SPEED)}, the slowest that a step asks for"
-    size = named_at(ground.context.report, ground.context.symbols.skills[contract.name], limit)
-    enough = display(-(-time_us // _SECOND) * _SECOND, Dimension.DURATION)
+    size = named_at(proof.report, proof.context.symbols.skills[contract.name], limit)
+    enough = display(-(-time_us // SECOND_US) * SECOND_US, Dimension.DURATION)
     longer = "let it last longer" if size is None else f"write `sizes {contract.name}({size} = {enough})`"
     lasts = f"`{contract.name}` lasts at most {display(allowed, Dimension.DURATION)}"
     over = time_us - allowed
-    ground.context.report.add(
+    proof.report.add(
         codes.PLAN_TOO_LONG,
         step.span if nearer is None else nearer[0],
         f"{what} takes up to {enough}, and {lasts}"
-        if over >= _SECOND
+        if over >= SECOND_US
         else f"{lasts}, and {what} takes up to "
         f"{display(-(-over // _MILLISECOND) * _MILLISECOND, Dimension.DURATION)} longer",
-        help=f"fly a shorter path, or faster, or {longer}; {_counted(ground)}{goes_on}",
-        labels=[(limit, "declared here"), *_declared(ground)],
+        help=f"fly a shorter path, or faster, or {longer}; {_counted_with(proof)}{goes_on}",
+        labels=[(limit, "declared here"), *_speeds_span(proof)],
         fix=nearer,
         amount=time_us,
     )
 
 
 def _too_much(
-    ground: Ground,
+    proof: ProofContext,
     step: Step,
     what: str,
     contract: Contract,
@@ -295,40 +295,40 @@ def _too_much(
     nearer: _Fix | None = None,
     code: Code = codes.STEP_ENERGY,
 ) -> None:
-    skill = ground.context.symbols.skills[contract.name]
+    skill = proof.context.symbols.skills[contract.name]
     own = None if step.overrides is None or contract.name != step.skill.text else step.overrides.energy
     declared = own or skill.energy
     assert declared is not None
     needed = -(-energy // 10) * 10  # to a tenth of a percent
-    size = None if own is not None else named_at(ground.context.report, skill, declared.span)
+    size = None if own is not None else named_at(proof.report, skill, declared.span)
     enough = display(needed, Dimension.RATIO)
     more = f"`energy at most {enough}`" if size is None else f"`sizes {contract.name}({size} = {enough})`"
-    ground.context.report.add(
+    proof.report.add(
         code,
         step.span if nearer is None else nearer[0],
         f"{what} takes up to {enough} of a full charge, and `{contract.name}` takes at most "
         f"{display(contract.energy, Dimension.RATIO)}",
-        help=f"write {more}, or fly a shorter path, or faster; {_counted(ground)}",
-        labels=[(declared.span, "declared here"), *_declared(ground)],
+        help=f"write {more}, or fly a shorter path, or faster; {_counted_with(proof)}",
+        labels=[(declared.span, "declared here"), *_speeds_span(proof)],
         fix=nearer,
         amount=energy,
     )
 
 
-def _declared(ground: Ground) -> Iterator[tuple[Span, str]]:
+def _speeds_span(proof: ProofContext) -> Iterator[tuple[Span, str]]:
     """Where the vehicle says how fast it is."""
-    speeds = ground.lowered.vehicle.speeds
+    speeds = proof.lowered.vehicle.speeds
     if speeds:
         first, last = speeds[0].span, speeds[-1].span
         yield Span(first.file, first.start, last.end), "the speeds that are counted with"
 
 
-def _counted(ground: Ground) -> str:
+def _counted_with(proof: ProofContext) -> str:
     """By which speeds it was counted, in words."""
-    speeds, vehicle = _speeds(ground), ground.prepared.policy.vehicle
+    speeds, vehicle = _speeds(proof), proof.policy.vehicle
     names = {"cruise": speeds.cruise, "climb": speeds.climb, "descent": speeds.descent, "landing": speeds.landing}
     told = ", ".join(f"{name} {display(value, Dimension.SPEED)}" for name, value in names.items())
     against = f"against {display(speeds.wind, Dimension.SPEED)} of wind" if speeds.wind else "without wind"
-    if ground.lowered.vehicle.speeds:
+    if proof.lowered.vehicle.speeds:
         return f"counted with the speeds of `{vehicle.name}`, {against}"
     return f"`{vehicle.name}` declares no `speeds`: counted with {told}, {against}"

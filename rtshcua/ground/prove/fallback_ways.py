@@ -21,11 +21,10 @@ from rtshcua.decision.volume import SHORT, across, near_home
 from rtshcua.decision.zones import Place as Places
 from rtshcua.decision.zones import PreparedZone, Sweep
 from rtshcua.diagnostics import codes
-from rtshcua.ground.prove.fan import Fan, Landmarks, Point, disc
-from rtshcua.ground.prove.leaving import Leg, breach, path_legs
-from rtshcua.ground.prove.period import Period, keeps, zone_span
-from rtshcua.ground.prove.places import Place, from_home, planned
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.airspace_keeping import HullSweep, Landmarks, Leg, Point, breach_text, disc, keeps, path_legs
+from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_starts import StartPlace, from_home, planned
+from rtshcua.ground.prove.step_times import StepTime, zone_span
 from rtshcua.model.flat.contract import PLACE, MotionKind
 from rtshcua.model.flat.policy import Vehicle
 from rtshcua.model.flat.zone import HIGHEST
@@ -38,7 +37,7 @@ _METRE = 1_000  # mm
 _SHORTEST = 1_000
 
 
-class Flown(NamedTuple):
+class FlownPath(NamedTuple):
     """The places from which a link may begin, in the order of the path, and their heights in mm; the last one may be
     where a link ends, `after` is that one's skill.
     """
@@ -58,7 +57,7 @@ class Stretch(NamedTuple):
     high: int
 
 
-class Leaves(NamedTuple):
+class Departure(NamedTuple):
     """Where a way begins that leaves the airspace, and the part of it that does."""
 
     place: Point
@@ -66,12 +65,12 @@ class Leaves(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Then:
+class _LinkTime:
     """When a link may fly: until `further` us after the latest begin of a step. The airspace, and what of it may be
     present then.
     """
 
-    period: Period
+    period: StepTime
     further: int
     airspace: PreparedAirspace
     present: PreparedAirspace = field(init=False)
@@ -80,42 +79,42 @@ class Then:
         object.__setattr__(self, "present", self.period.present(self.airspace, self.further))
 
 
-class Ways:
+class FallbackWays:
     """The ways that lead from the steps of one mission."""
 
-    def __init__(self, ground: Ground) -> None:
-        self._ground = ground
-        self._vehicle = ground.prepared.policy.vehicle
+    def __init__(self, proof: ProofContext) -> None:
+        self._proof = proof
+        self._vehicle = proof.policy.vehicle
         reach = self._vehicle.position_error + 1  # the middle of a leg is rounded by less than 1 mm
         self._box = (-reach, -reach, reach, reach)
-        self._landmarks = Landmarks(ground.prepared.policy)
+        self._landmarks = Landmarks(proof.policy)
         self._homes = disc(self._vehicle.home_within)
         self._told: set[Point] = set()
         self._nowhere: set[PreparedLink] = set()
 
-    def prove(self, step: Step, invocation: PreparedInvocation, period: Period, starts: Sequence[Place]) -> None:
+    def prove(self, step: Step, invocation: PreparedInvocation, period: StepTime, starts: Sequence[StartPlace]) -> None:
         """Report the first way from a step that leaves the airspace; the step itself was found to keep it, if home is
         where it is declared.
         """
-        airspace = self._ground.prepared.airspace
+        airspace = self._proof.prepared.airspace
         if airspace is None or invocation.invocation.plan.kind == MotionKind.LAND:
             return  # it leads nowhere
         if invocation.invocation.plan.kind == MotionKind.HOME:
-            there = Then(period, invocation.lasts_us, airspace)
+            there = _LinkTime(period, invocation.lasts_us, airspace)
             for start in starts:
-                if not self._link(step, None, Flown(((start.x, start.y),), start.height, start.height), there):
+                if not self._link(step, None, FlownPath(((start.x, start.y),), start.height, start.height), there):
                     return
             return
         links = list(self._links(invocation))
         for start in starts:
-            _, volume = planned(self._ground, invocation, start)
+            _, volume = planned(self._proof, invocation, start)
             path = invocation.invocation.plan.path
             points = ((start.x, start.y), *zip(path[::2], path[1::2], strict=True))
-            flown = Flown(points, *volume.height[:2])
+            flown = FlownPath(points, *volume.height[:2])
             for link, lasts in links:
                 if link in self._nowhere:
                     continue
-                there = Then(period, invocation.lasts_us + lasts, airspace)
+                there = _LinkTime(period, invocation.lasts_us + lasts, airspace)
                 if not self._link(step, link, flown, there):
                     return
                 if link.motion == MotionKind.FLY:
@@ -127,8 +126,8 @@ class Ways:
         """
         degrades = [[rule.target] for rule in invocation.candidates.degrades]
         before = 0  # the contingency flies when the step's own chain has failed
-        for chain in (*degrades, invocation.chain, self._ground.prepared.contingency):
-            lasts = before if chain is self._ground.prepared.contingency else 0
+        for chain in (*degrades, invocation.chain, self._proof.prepared.contingency):
+            lasts = before if chain is self._proof.prepared.contingency else 0
             for link in chain:
                 lasts += self._lasts(link)
                 if link.motion in (MotionKind.HOME, MotionKind.FLY, MotionKind.CLIMB):
@@ -136,10 +135,10 @@ class Ways:
             before = max(before, lasts)
 
     def _lasts(self, link: PreparedLink) -> int:
-        policy = self._ground.prepared.policy
+        policy = self._proof.policy
         return longest(policy.contracts[link.link.skill], policy.vehicle, link.link.limit_us)
 
-    def _link(self, step: Step, link: PreparedLink | None, flown: Flown, then: Then) -> bool:
+    def _link(self, step: Step, link: PreparedLink | None, flown: FlownPath, then: _LinkTime) -> bool:
         """Whether a link, or a step that is the way home (None), keeps the airspace; reports the place from where it
         does not.
         """
@@ -152,7 +151,7 @@ class Ways:
             flown = flown._replace(low=min(flown.low, altitude), high=max(flown.high, altitude))
             if to and not self._keeps(Stretch("", tuple(to), altitude, altitude), then.present):
                 self._nowhere.add(link)  # said once: it is the same from everywhere
-                self._report(step, link, flown, Leaves(to[0], Stretch("", (to[0],), altitude, altitude)), to, then)
+                self._report(step, link, flown, Departure(to[0], Stretch("", (to[0],), altitude, altitude)), to, then)
                 return False
         leaves = self._leaving(flown, to, home, then.present, self._vehicle, self._told)
         if leaves is not None:
@@ -173,19 +172,19 @@ class Ways:
 
     def _leaving(
         self,
-        flown: Flown,
+        flown: FlownPath,
         to: Sequence[Point],
         home: bool,
         airspace: PreparedAirspace,
         vehicle: Vehicle,
         told: AbstractSet[Point] = frozenset(),
-    ) -> Leaves | None:
+    ) -> Departure | None:
         """A place of the path from where the straight way leaves the airspace, but not of a leg from one that was
         `told`; `to` is all that it may lead to, and empty where the link leads up and nowhere else.
         """
         zones = tuple(tuple(zone.number for zone in each) for each in (airspace.inside, airspace.outside))
         key = (flown.points, flown.low, flown.high, tuple(to), home and vehicle.return_altitude, zones)
-        if key in self._ground.kept:
+        if key in self._proof.kept:
             return None
         legs = path_legs(flown.points)
         near = home and any(_comes_near(leg, near_home(vehicle)) for leg in legs)
@@ -195,12 +194,12 @@ class Ways:
             for leg in legs:
                 found = None if leg[0] in told else self._leg(leg, flown, to, vehicle if home else None, airspace)
                 if found is not None:
-                    return Leaves(leg[1], found)
-        self._ground.kept.add(key)
+                    return Departure(leg[1], found)
+        self._proof.kept.add(key)
         return None
 
     def _leg(
-        self, leg: Leg, flown: Flown, to: Sequence[Point], returns: Vehicle | None, airspace: PreparedAirspace
+        self, leg: Leg, flown: FlownPath, to: Sequence[Point], returns: Vehicle | None, airspace: PreparedAirspace
     ) -> Stretch | None:
         """The part of the way from somewhere on a leg that leaves the airspace; `returns` is who flies home on it."""
         limit = 0 if returns is None else near_home(returns)
@@ -223,39 +222,39 @@ class Ways:
         return keeps(self._space(stretch), airspace) == TRUE
 
     def _space(self, stretch: Stretch) -> Places:
-        sweep: Sweep = Fan(stretch.points, self._box, self._landmarks)
+        sweep: Sweep = HullSweep(stretch.points, self._box, self._landmarks)
         return Places(((sweep, stretch.low, stretch.high),), 0)
 
-    def _beyond(self, link: PreparedLink, flown: Flown) -> Flown:
+    def _beyond(self, link: PreparedLink, flown: FlownPath) -> FlownPath:
         """Where later links may begin: the place that this one flies to too."""
         altitude = self._altitude(link)
-        name = self._ground.prepared.policy.contracts[link.link.skill].name
+        name = self._proof.policy.contracts[link.link.skill].name
         low, high = min(flown.low, altitude), max(flown.high, altitude)
-        return Flown((*flown.points, self._target(link)), low, high, name)
+        return FlownPath((*flown.points, self._target(link)), low, high, name)
 
     def _altitude(self, link: PreparedLink) -> int:
-        return link.link.arguments[self._ground.prepared.policy.contracts[link.link.skill].motion.altitude]
+        return link.link.arguments[self._proof.policy.contracts[link.link.skill].motion.altitude]
 
     def _target(self, link: PreparedLink) -> Point:
-        cell = first_cell(self._ground.prepared.policy.contracts[link.link.skill], PLACE)
+        cell = first_cell(self._proof.policy.contracts[link.link.skill], PLACE)
         x, y = link.link.arguments[cell : cell + 2]
         return x, y
 
-    def _missing(self, step: Step, link: PreparedLink | None, zone: PreparedZone, then: Then) -> None:
+    def _missing(self, step: Step, link: PreparedLink | None, zone: PreparedZone, then: _LinkTime) -> None:
         if link is None:
             return  # of a step that is found where its own path is looked at
-        ground, policy = self._ground, self._ground.prepared.policy
+        proof, policy = self._proof, self._proof.policy
         name = policy.contracts[link.link.skill].name
-        ground.context.report.add(
+        proof.report.add(
             codes.RETURN_OUTSIDE if link.motion == MotionKind.HOME else codes.LOITER_OUTSIDE,
             step.span,
             f"the way of the link `{name}` from this step would be in `{policy.zones[zone.number].name}`, which does "
             f"not exist at all times {then.period.from_to(then.further)}: it may be flown then",
             help="issue the mission at another time, or let its steps take less",
             labels=[
-                (ground.span(then.airspace.airspace), "the airspace"),
-                (ground.span(link.link), "this link would fly there"),
-                (zone_span(ground, zone), "declared here"),
+                (proof.span(then.airspace.airspace), "the airspace"),
+                (proof.span(link.link), "this link would fly there"),
+                (zone_span(proof, zone), "declared here"),
             ],
         )
 
@@ -263,13 +262,13 @@ class Ways:
         self,
         step: Step,
         link: PreparedLink | None,
-        flown: Flown,
-        leaves: Leaves,
+        flown: FlownPath,
+        leaves: Departure,
         to: Sequence[Point],
-        then: Then,
+        then: _LinkTime,
     ) -> None:
         airspace, (place, stretch) = then.present, leaves
-        ground, policy = self._ground, self._ground.prepared.policy
+        proof, policy = self._proof, self._proof.policy
         home = link is None or link.motion == MotionKind.HOME
         name = "" if link is None else policy.contracts[link.link.skill].name
         if stretch.what == _ACROSS:
@@ -283,39 +282,41 @@ class Ways:
         subject += f"{from_home(*place)},"
         if link is not None and place in to:
             subject = f"`{name}`, a link of this step's chains,"
-        labels = [(ground.span(airspace.airspace), "the airspace")]
+        labels = [(proof.span(airspace.airspace), "the airspace")]
         if link is not None:
-            labels.append((ground.span(link.link), "this link would fly there"))
+            labels.append((proof.span(link.link), "this link would fly there"))
         labels += then.period.labels(airspace, self._space(stretch), then.further)
         within = self._vehicle.home_within
         if home and within and self._keeps(stretch._replace(points=_of_home(stretch, to)), airspace):
-            labels.append((ground.lowered.vehicle.within.span, "home may lie so far from where it is declared"))
+            labels.append((proof.lowered.vehicle.within.span, "home may lie so far from where it is declared"))
         help = "move the step, or lead the mission around by further steps"
         raised = self._raised(flown, to, stretch, airspace) if home else None
         if raised is not None:
             help = f"{_above(raised)}; or {help}"
-            declared = ground.lowered.vehicle.return_altitude
+            declared = proof.lowered.vehicle.return_altitude
             if declared is not None:
                 labels.append((declared.span, "the vehicle returns at this height"))
         if link is not None:
             help = f"on board the link would not be flown then, but the one after it; {help}"
         code = codes.PATH_OUTSIDE if link is None else codes.RETURN_OUTSIDE if home else codes.LOITER_OUTSIDE
-        ground.context.report.add(
+        proof.report.add(
             code,
             step.span,
-            f"{subject} would {breach(policy, airspace, legs, stretch.low, stretch.high)}",
+            f"{subject} would {breach_text(policy, airspace, legs, stretch.low, stretch.high)}",
             help=help,
             labels=labels,
         )
 
-    def raised(self, start: Place, airspace: PreparedAirspace) -> str:
+    def raised(self, start: StartPlace, airspace: PreparedAirspace) -> str:
         """Which return altitude would lead a way home from a place above what stands in it, in words; or nothing."""
-        flown = Flown(((start.x, start.y),), start.height, start.height)
+        flown = FlownPath(((start.x, start.y),), start.height, start.height)
         leaves = self._leaving(flown, self._homes, True, airspace, self._vehicle)
         height = None if leaves is None else self._raised(flown, self._homes, leaves.stretch, airspace)
         return "" if height is None else _above(height)
 
-    def _raised(self, flown: Flown, to: Sequence[Point], stretch: Stretch, airspace: PreparedAirspace) -> int | None:
+    def _raised(
+        self, flown: FlownPath, to: Sequence[Point], stretch: Stretch, airspace: PreparedAirspace
+    ) -> int | None:
         """The least return altitude, in whole metres, with which all ways home from a step keep the airspace; None if
         there is none above what stands in the way.
         """
@@ -345,7 +346,7 @@ def _above(height: int) -> str:
 
 
 def _stretches(
-    points: Sequence[Point], flown: Flown, to: Sequence[Point], returns: Vehicle | None, *, near: bool
+    points: Sequence[Point], flown: FlownPath, to: Sequence[Point], returns: Vehicle | None, *, near: bool
 ) -> list[Stretch]:
     """The parts of the way from some places to where it leads; `near`: some of these are near home."""
     if returns is None:

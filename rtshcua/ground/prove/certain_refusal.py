@@ -1,8 +1,8 @@
-"""Whether a step can be permitted at all: what only the state of the vehicle decides is taken to go the step's way.
+"""Whether a step is refused in every state of the vehicle: what only the state decides is taken to go the step's way.
 
-Arguments, the time and the phase are known, or known to be in a set; a permit that no state makes true does not permit,
+Arguments, the time and the phase are known, or known to be in a set. A permit that no state makes true does not permit,
 a forbid that every state makes true forbids, and a degrade that every state makes true flies in the step's place. What
-is not known of the time (`Known`) is taken to go the step's way too.
+is not known of the time (`TimeKnowledge`) is taken to go the step's way too.
 """
 
 from collections.abc import Iterator
@@ -18,13 +18,12 @@ from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import Space
 from rtshcua.ground.analysis.witness import Witness
 from rtshcua.ground.lower.zones import EVERYWHERE
-from rtshcua.ground.prove.best import ALWAYS, NEVER, hopeful
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.proof_context import ALWAYS, NEVER, ProofContext, optimistic
 from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.zone import Zone
 
 
-class Known(Enum):
+class TimeKnowledge(Enum):
     """What is known of the time: all of it, so zones exist on their dates; the time of day, and no date; nothing."""
 
     ALL = "all"
@@ -32,8 +31,12 @@ class Known(Enum):
     NOTHING = "nothing"
 
 
-def refused(
-    ground: Ground, invocation: PreparedInvocation, space: Space, known: Known, given: tuple[Goal, ...] = ()
+def certain_refusals(
+    proof: ProofContext,
+    invocation: PreparedInvocation,
+    space: Space,
+    known: TimeKnowledge,
+    given: tuple[Goal, ...] = (),
 ) -> Iterator[tuple[Witness, Rule | None]]:
     """Situations of a space in which a step is surely refused: by a forbid or degrade, or (None) for want of a permit.
 
@@ -41,80 +44,82 @@ def refused(
     places in the space are those of the invocation.
     """
     candidates = invocation.candidates
-    for span in _between_dates(ground, space.utc) if known is Known.ALL else (None,):
+    for span in _between_dates(proof, space.utc) if known is TimeKnowledge.ALL else (None,):
         moments = space if span is None else space._replace(utc=(span,))
-        time = Time(known, span, () if span else invocation.invocation.arguments)
-        permits = [_hoped(ground, permit.rule, True, time) for permit in candidates.permits]
+        time = _Moment(known, span, () if span else invocation.invocation.arguments)
+        permits = [_optimistic_condition(proof, permit.rule, True, time) for permit in candidates.permits]
         if None not in permits:
             wanting: list[Goal] = [(node, FALSE | UNKNOWN) for node in permits if node is not None]
             answer = satisfiable([*given, *wanting], moments)
             if isinstance(answer, Yes):
                 yield answer.witness, None
-        for rule in refusing(invocation):
-            node = _hoped(ground, rule, False, time)
+        for rule in refusing_rules(invocation):
+            node = _optimistic_condition(proof, rule, False, time)
             answer = satisfiable([*given, (ALWAYS if node is None else node, TRUE)], moments)
             if isinstance(answer, Yes):
                 yield answer.witness, rule
 
 
-def refusing(invocation: PreparedInvocation) -> tuple[Rule, ...]:
+def refusing_rules(invocation: PreparedInvocation) -> tuple[Rule, ...]:
     """The rules that refuse a step where they hold: the forbids, and the degrades that fly something else."""
     candidates = invocation.candidates
     return (*(each.rule for each in candidates.forbids), *(each.rule for each in candidates.degrades))
 
 
-class Time(NamedTuple):
+class _Moment(NamedTuple):
     """A time in which no zone begins or ceases to exist on a date, where all is known of it; else the arguments of a
     step, for which what is not known goes its way.
     """
 
-    known: Known
+    known: TimeKnowledge
     span: Span | None
     arguments: tuple[int, ...]
 
     def leaves_open(self, zone: Zone) -> bool:
         """Whether a zone may exist, or not, for all that is known."""
-        return self.span is None and bool(zone.dates or ((zone.daily or zone.weekly) and self.known is Known.NOTHING))
+        return self.span is None and bool(
+            zone.dates or ((zone.daily or zone.weekly) and self.known is TimeKnowledge.NOTHING)
+        )
 
 
-def _between_dates(ground: Ground, utc: tuple[Span, ...]) -> Iterator[Span]:
+def _between_dates(proof: ProofContext, utc: tuple[Span, ...]) -> Iterator[Span]:
     """The moments in pieces, in each of which no zone begins or ceases to exist on a date."""
-    edges = {edge for zone in ground.prepared.policy.zones if zone.dates for edge in (zone.dates[0], zone.dates[1] + 1)}
+    edges = {edge for zone in proof.policy.zones if zone.dates for edge in (zone.dates[0], zone.dates[1] + 1)}
     for low, high in utc:
         for start, end in pairwise([low, *sorted(edge for edge in edges if low < edge <= high), high + 1]):
             yield start, end - 1
 
 
-def _hoped(ground: Ground, rule: Rule, hope: bool, time: Time) -> tree.Node | None:
+def _optimistic_condition(proof: ProofContext, rule: Rule, hope: bool, time: _Moment) -> tree.Node | None:
     key = (() if rule.when is None else rule.when.code, hope, time)
-    if key not in ground.hopes:
-        node = ground.prepared.compiler.when(rule)
-        ground.hopes[key] = None if node is None else hopeful(_at_time(ground, node, hope, time), hope)
-    return ground.hopes[key]
+    if key not in proof.hopes:
+        node = proof.prepared.compiler.when(rule)
+        proof.hopes[key] = None if node is None else optimistic(_at_time(proof, node, hope, time), hope)
+    return proof.hopes[key]
 
 
-def _at_time(ground: Ground, node: tree.Node, hope: bool, time: Time) -> tree.Node:
+def _at_time(proof: ProofContext, node: tree.Node, hope: bool, time: _Moment) -> tree.Node:
     """A condition in which what dates decide is decided, and what is not known of the time is what brings it nearest to
     `hope`: a place that is given is inside a zone, or not, while that exists.
 
     What says that a zone exists, of a zone that is an argument, is to be in a place that is everywhere on those dates.
     """
-    policy = ground.prepared.policy
+    policy = proof.policy
     match node:
         case tree.Both(left, right):
-            return tree.Both(_at_time(ground, left, hope, time), _at_time(ground, right, hope, time))
+            return tree.Both(_at_time(proof, left, hope, time), _at_time(proof, right, hope, time))
         case tree.Either(left, right):
-            return tree.Either(_at_time(ground, left, hope, time), _at_time(ground, right, hope, time))
+            return tree.Either(_at_time(proof, left, hope, time), _at_time(proof, right, hope, time))
         case tree.Not(operand):
-            return tree.Not(_at_time(ground, operand, not hope, time))
-        case tree.InWindow() | tree.InWeek() if time.known is Known.NOTHING:
+            return tree.Not(_at_time(proof, operand, not hope, time))
+        case tree.InWindow() | tree.InWeek() if time.known is TimeKnowledge.NOTHING:
             return ALWAYS if hope else NEVER
         case tree.Inside(number) if time.span is not None and _only_dates(policy.zones[number]):
             zone = policy.zones[number]
             return ALWAYS if zone.dates[0] <= time.span[0] <= zone.dates[1] else NEVER
         case tree.PointInside(cell, number) if time.leaves_open(policy.zones[number]):
             place = time.arguments[cell : cell + 2]
-            inside = ground.prepared.tables.zones[number].along(place, NO_BOX) == TRUE
+            inside = proof.prepared.tables.zones[number].along(place, NO_BOX) == TRUE
             return ALWAYS if inside and hope else NEVER
         case _:
             return node

@@ -15,13 +15,13 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.extent import FAR
 from rtshcua.ground.analysis.solve import No, Yes
 from rtshcua.ground.analysis.words import words
-from rtshcua.ground.prove.overlaps import About
-from rtshcua.ground.prove.ruleset import Group, Ruleset
+from rtshcua.ground.prove.rule_index import RuleQuery
+from rtshcua.ground.prove.ruleset import Ruleset, WrittenRule
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import RuleKind
 
 
-def prove(rules: Ruleset, alive: list[Group]) -> None:
+def report_overridden(rules: Ruleset, alive: list[WrittenRule]) -> None:
     """Report each degrade rule that comes after one to another target that is wider, or has the same condition."""
     degrades = [group for group in alive if group.kind == RuleKind.DEGRADE]
     place = {rules.group_of(group.rules[0]): at for at, group in enumerate(degrades)}
@@ -40,7 +40,7 @@ def prove(rules: Ruleset, alive: list[Group]) -> None:
         last = max(last, *later.rules)
 
 
-def _candidates(rules: Ruleset, later: Group, flown: AbstractSet[int]) -> Iterator[int]:
+def _candidates(rules: Ruleset, later: WrittenRule, flown: AbstractSet[int]) -> Iterator[int]:
     """The rules, in order, that may match wherever one does, and fly something else; each is to be asked about."""
     pairs = [
         (number, skill) for number in later.rules for skill in rules.skills(number) if skill != _target(rules, number)
@@ -60,7 +60,7 @@ def _candidates(rules: Ruleset, later: Group, flown: AbstractSet[int]) -> Iterat
             (
                 found
                 for effects in ((-FAR, effect - 1), (effect + 1, FAR))
-                for about in [About(skill, rule.roles, rule.sources, effects)]
+                for about in [RuleQuery(skill, rule.roles, rule.sources, effects)]
                 for found in [next(rules.overlaps(RuleKind.DEGRADE).meeting(about, points, sure=True, after=after), -1)]
                 if found >= 0
             ),
@@ -77,7 +77,7 @@ def _candidates(rules: Ruleset, later: Group, flown: AbstractSet[int]) -> Iterat
             points.append(answer.witness.at)
 
 
-def _after_wider(rules: Ruleset, earlier: Group, later: Group) -> bool:
+def _after_wider(rules: Ruleset, earlier: WrittenRule, later: WrittenRule) -> bool:
     """Whether one rule matches wherever another does; reports it."""
     witness: tuple[Yes, int] | None = None
     narrower = False
@@ -103,7 +103,7 @@ def _after_wider(rules: Ruleset, earlier: Group, later: Group) -> bool:
     policy = rules.policy
     name = policy.contracts[target.skill].name
     situation = words(witness[0].witness, policy, policy.contracts[witness[1]])
-    rules.ground.context.report.add(
+    rules.proof.report.add(
         codes.SHADOWED_RULE if always else codes.CONFLICTING_RULES,
         later.span,
         "this `degrade` never decides: wherever it matches, an earlier one does too"
@@ -122,16 +122,16 @@ def _target(rules: Ruleset, number: int) -> int:
     return target.skill
 
 
-def _before(rules: Ruleset, earlier: Group, number: int, skill: int) -> int | None:
+def _before(rules: Ruleset, earlier: WrittenRule, number: int, skill: int) -> int | None:
     """The flat rule of an earlier one that matches wherever another does, for a skill, and flies something else."""
     later, matching = rules.rule(number), rules.ask([(number, TRUE)], skill)
     for candidate in earlier.rules:
         rule = rules.rule(candidate)
-        if rule.target is None or later.target is None or same(rule.target, later.target):
+        if rule.target is None or later.target is None or same_link(rule.target, later.target):
             continue
         if skill not in rules.skills(candidate):
             continue
-        if not covers(rule.roles, later.roles) or not covers(rule.sources, later.sources):
+        if not covers_all(rule.roles, later.roles) or not covers_all(rule.sources, later.sources):
             continue
         if isinstance(matching, Yes) and rules.holds(candidate, matching.witness.at) != TRUE:
             continue
@@ -140,11 +140,11 @@ def _before(rules: Ruleset, earlier: Group, number: int, skill: int) -> int | No
     return None
 
 
-def same(one: Link, other: Link) -> bool:
+def same_link(one: Link, other: Link) -> bool:
     """Whether two links fly the same."""
     return (one.skill, one.arguments) == (other.skill, other.arguments)
 
 
-def covers(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
+def covers_all(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
     """Whether a list of roles or sources, where none means any, has all of another."""
     return not wider or (bool(narrower) and set(narrower) <= set(wider))

@@ -16,9 +16,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.lower.mission import argument_span
-from rtshcua.ground.prove.best import hopeful
 from rtshcua.ground.prove.conjuncts import conjuncts
-from rtshcua.ground.prove.situation import Ground
+from rtshcua.ground.prove.proof_context import ProofContext, optimistic
 from rtshcua.model.flat.contract import SourceKind, TimingClass
 from rtshcua.model.flat.policy import Rule, RuleKind
 from rtshcua.model.ir.expression import Condition
@@ -27,7 +26,7 @@ from rtshcua.model.outcome import Reason
 from rtshcua.model.quantity import Dimension, display
 
 
-class Unmet(NamedTuple):
+class _FailedClause(NamedTuple):
     """A clause of a permit that is not true: where it is written, the parameters it reads, what would do."""
 
     span: Span
@@ -35,74 +34,74 @@ class Unmet(NamedTuple):
     accepted: tuple[Offer, ...]
 
 
-def prove(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
+def prove_authority(proof: ProofContext, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
     """Whether in some state of the vehicle a step is permitted and flown; reports it where in none it is."""
-    at = ground.around(invocation)
+    at = proof.around(invocation)
     found = authority(invocation, at)
     if PASS in found or not found:
-        return not _degraded(ground, step, invocation, at)
+        return not _degraded(proof, step, invocation, at)
     # a forbid that some state makes false does not decide in the best case; what permits, or does not, comes last
     forbids = (each.rule for each in invocation.candidates.forbids if not each.condition(at) & FALSE)
     forbid = None if found[0].reason is Reason.CLASS_NOT_PERMITTED else next(forbids, None)
     if forbid is not None:
-        ground.context.report.add(
+        proof.report.add(
             codes.FORBIDDEN,
             step.span,
-            f"the policy `{ground.prepared.policy.name}` forbids this step",
-            help=_otherwise(ground, invocation, at, forbid),
-            labels=[(ground.span(forbid), "by this rule")],
+            f"the policy `{proof.policy.name}` forbids this step",
+            help=_help_against(proof, invocation, at, forbid),
+            labels=[(proof.span(forbid), "by this rule")],
         )
         return False
     match found[-1].reason:
         case Reason.CLASS_NOT_PERMITTED:
-            _class(ground, mission, step, invocation)
+            _class(proof, mission, step, invocation)
         case Reason.NOT_PERMITTED:
-            _not_permitted(ground, mission, step, invocation)
+            _not_permitted(proof, mission, step, invocation)
         case _:
-            _out_of_scope(ground, step, invocation, at)
+            _out_of_scope(proof, step, invocation, at)
     return False
 
 
-def _degraded(ground: Ground, step: Step, invocation: PreparedInvocation, at: Environment) -> bool:
+def _degraded(proof: ProofContext, step: Step, invocation: PreparedInvocation, at: Environment) -> bool:
     """Whether a degrade holds, or is unknown, in every state; reports it."""
     always = (each.rule for each in invocation.candidates.degrades if not each.condition(at) & FALSE)
     rule = next(always, None)
     if rule is None or rule.target is None:
         return False
-    policy = ground.prepared.policy
-    ground.context.report.add(
+    policy = proof.policy
+    proof.report.add(
         codes.DEGRADED,
         step.span,
         f"the policy `{policy.name}` flies `{policy.contracts[rule.target.skill].name}` in place of this step, "
         "whatever the state",
-        help=_otherwise(ground, invocation, at, rule),
-        labels=[(ground.span(rule), "by this rule")],
+        help=_help_against(proof, invocation, at, rule),
+        labels=[(proof.span(rule), "by this rule")],
     )
     return True
 
 
-def _otherwise(ground: Ground, invocation: PreparedInvocation, at: Environment, rule: Rule) -> str:
+def _help_against(proof: ProofContext, invocation: PreparedInvocation, at: Environment, rule: Rule) -> str:
     """The nearest arguments for which a rule does not hold; where there are none, what else to change."""
-    node = ground.prepared.compiler.when(rule)
-    changes = Changes(at, ground.prepared.tables)
-    wanted = None if node is None else changes.find(hopeful(node, False), False)
-    contract, policy = invocation.invocation.contract, ground.prepared.policy
+    node = proof.prepared.compiler.when(rule)
+    changes = Changes(at, proof.prepared.tables)
+    wanted = None if node is None else changes.find(optimistic(node, False), False)
+    contract, policy = invocation.invocation.contract, proof.policy
     offers = [offer(change, contract, policy, at) for change in wanted or ()]
     if not offers or not all(each.change.argument and each.options for each in offers):
         return "narrow the condition of the rule, or leave the step out"
-    return _accepted({each.subject: "` or `".join(_words(each)) for each in offers})
+    return _accepted({each.subject: "` or `".join(_values_text(each)) for each in offers})
 
 
 def _accepted(values: Mapping[str, str]) -> str:
     return "nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in values.items())
 
 
-def _class(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
-    skill = ground.context.symbols.skills[step.skill.text]
+def _class(proof: ProofContext, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
+    skill = proof.context.symbols.skills[step.skill.text]
     assert mission.source is not None
     assert skill.timing_class is not None
     timing = TimingClass(invocation.invocation.contract.timing_class).name.lower()
-    ground.context.report.add(
+    proof.report.add(
         codes.SOURCE_CLASS,
         step.skill.span,
         f"`{mission.source.text}` may not ask for a skill of the class `{timing}`",
@@ -114,8 +113,8 @@ def _class(ground: Ground, mission: MissionDecl, step: Step, invocation: Prepare
     )
 
 
-def _not_permitted(ground: Ground, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
-    policy, flat = ground.prepared.policy, invocation.invocation
+def _not_permitted(proof: ProofContext, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
+    policy, flat = proof.policy, invocation.invocation
     assert mission.role is not None
     may: list[str] = []
     for rule in policy.rules:
@@ -124,36 +123,36 @@ def _not_permitted(ground: Ground, mission: MissionDecl, step: Step, invocation:
             through = " or ".join(f"`{SourceKind(source).name.lower()}`" for source in rule.sources) or "any source"
             may.append(f"{roles} through {through}")
     source = SourceKind(flat.source).name.lower()
-    ground.context.report.add(
+    proof.report.add(
         codes.NOT_PERMITTED,
         step.skill.span,
         f"no rule permits `{step.skill.text}` to the role `{mission.role.text}` through `{source}`",
         help="it is permitted to " + "; to ".join(dict.fromkeys(may)) if may else "it is permitted to nobody",
-        labels=[(ground.lowered.declaration.name.span, "the policy is declared here")],
+        labels=[(proof.lowered.declaration.name.span, "the policy is declared here")],
     )
 
 
-def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, at: Environment) -> None:
+def _out_of_scope(proof: ProofContext, step: Step, invocation: PreparedInvocation, at: Environment) -> None:
     """Explain by the permit that is nearest to permitting."""
-    permits = [_unmet(ground, permit, invocation, at) for permit in invocation.candidates.permits]
+    permits = [_failed_clauses(proof, permit, invocation, at) for permit in invocation.candidates.permits]
     nearest = min(permits, key=len)
-    report, flat = ground.context.report, invocation.invocation
+    report, flat = proof.report, invocation.invocation
     names = list(dict.fromkeys(name for unmet in nearest for name in unmet.parameters))
-    span = argument_span(ground.context, step, names[0]) if names else step.span
-    default = _default(ground, step, names[0]) if names and span == step.span else None
+    span = argument_span(proof.context, step, names[0]) if names else step.span
+    default = _default(proof, step, names[0]) if names and span == step.span else None
     written = (
         f" = {report.text(span if default is None else default)}" if names and (default or span != step.span) else ""
     )
     subject = f"`{names[0]}{written}`" if names else f"`{flat.contract.name}`"
-    accepted = {each.subject: "` or `".join(_words(each)) for unmet in nearest for each in unmet.accepted}
+    accepted = {each.subject: "` or `".join(_values_text(each)) for unmet in nearest for each in unmet.accepted}
     fix = None
     if names and len(nearest) == 1 and names[0] in accepted and span != step.span:
-        replacement = _words(nearest[0].accepted[0])[0]
+        replacement = _values_text(nearest[0].accepted[0])[0]
         fix = (span, replacement, f"write `{replacement}`")
     report.add(
         codes.OUT_OF_SCOPE,
         span,
-        f"{subject} is outside of what `{ground.prepared.policy.name}` permits for `{flat.contract.name}`",
+        f"{subject} is outside of what `{proof.policy.name}` permits for `{flat.contract.name}`",
         help=_accepted(accepted) if accepted else None,
         labels=[
             *((unmet.span, "this does not hold") for unmet in nearest),
@@ -163,38 +162,40 @@ def _out_of_scope(ground: Ground, step: Step, invocation: PreparedInvocation, at
     )
 
 
-def _default(ground: Ground, step: Step, parameter: str) -> Span | None:
+def _default(proof: ProofContext, step: Step, parameter: str) -> Span | None:
     """Where the default of a parameter is written."""
-    skill = ground.context.symbols.skills[step.skill.text]
+    skill = proof.context.symbols.skills[step.skill.text]
     return next((p.default.span for p in skill.parameters if p.name.text == parameter and p.default is not None), None)
 
 
-def _words(offer: Offer) -> list[str]:
+def _values_text(offer: Offer) -> list[str]:
     """The values that would do, as a source writes them."""
     return [name or display(value, Dimension(offer.dimension)) for value, name in offer.options]
 
 
-def _unmet(ground: Ground, permit: PreparedRule, invocation: PreparedInvocation, at: Environment) -> list[Unmet]:
+def _failed_clauses(
+    proof: ProofContext, permit: PreparedRule, invocation: PreparedInvocation, at: Environment
+) -> list[_FailedClause]:
     """The clauses of a permit that cannot be true, in source order."""
     rule = permit.rule
-    declared = _declaration(ground, rule)
-    node = ground.prepared.compiler.when(rule)
+    declared = _declaration(proof, rule)
+    node = proof.prepared.compiler.when(rule)
     if declared is None or node is None:
         return []
-    contract, policy = invocation.invocation.contract, ground.prepared.policy
-    changes = Changes(at, ground.prepared.tables)
+    contract, policy = invocation.invocation.contract, proof.policy
+    changes = Changes(at, proof.prepared.tables)
     parameters = {parameter.name for parameter in contract.parameters}
-    found: list[Unmet] = []
+    found: list[_FailedClause] = []
     for clause, part in conjuncts(declared, node):
-        if build(part, ground.prepared.tables)(at) & TRUE:
+        if build(part, proof.prepared.tables)(at) & TRUE:
             continue
         wanted = changes.find(part, True) or ()
         offers = [offer(change, contract, policy, at) for change in wanted if change.argument]
         reads = dict.fromkeys(each.name for each in references(clause) if each.name in parameters)
-        found.append(Unmet(clause.span, tuple(reads), tuple(each for each in offers if each.options)))
+        found.append(_FailedClause(clause.span, tuple(reads), tuple(each for each in offers if each.options)))
     return found
 
 
-def _declaration(ground: Ground, rule: Rule) -> Condition | None:
+def _declaration(proof: ProofContext, rule: Rule) -> Condition | None:
     """The condition of the rule that was lowered to this one."""
-    return ground.lowered.written[rule].when
+    return proof.lowered.written[rule].when

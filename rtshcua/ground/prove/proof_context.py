@@ -1,8 +1,10 @@
-"""What is known before the flight: all of a step's arguments, and nothing of the vehicle's state."""
+"""What all proofs ask: a policy as on board, with all arguments of a step and nothing of the vehicle's state known."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from typing import Final
 
+from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Condition, Environment, build
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
 from rtshcua.decision.situation import environment
@@ -12,25 +14,55 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span as Where
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.report import Report
 from rtshcua.ground.lower.policy import LoweredPolicy
-from rtshcua.ground.prove.best import ALWAYS as ALWAYS
-from rtshcua.ground.prove.best import hopeful
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.limits import WEEK
 from rtshcua.model.flat.mission import Invocation
-from rtshcua.model.flat.policy import Airspace, Rule
+from rtshcua.model.flat.policy import Airspace, Policy, Rule
+
+#: the condition of a rule without one
+ALWAYS: Final = tree.AtMost((), 0)
+NEVER: Final = tree.AtMost((), -1)
+
+
+def optimistic(node: tree.Node, hope: bool, fixed: frozenset[int] | None = None) -> tree.Node:
+    """A condition whose atoms about the state are what brings it nearest to `hope`.
+
+    Arguments, the time and the phase are known. `fixed` are slots of the state that are known too, and with them the
+    place: None where nothing of the state is.
+    """
+    match node:
+        case tree.Both(left, right):
+            return tree.Both(optimistic(left, hope, fixed), optimistic(right, hope, fixed))
+        case tree.Either(left, right):
+            return tree.Either(optimistic(left, hope, fixed), optimistic(right, hope, fixed))
+        case tree.Not(operand):
+            return tree.Not(optimistic(operand, not hope, fixed))
+        case tree.AtMost(terms, _) | tree.Equal(terms, _):
+            known = all(term.argument or term.at in (fixed or ()) for term in terms)
+        case tree.Member(argument, index, _):
+            known = argument or index in (fixed or ())
+        case tree.Known(index):
+            known = index in (fixed or ())
+        case tree.Inside() | tree.InsideArgument():
+            known = fixed is not None
+        case _:
+            known = isinstance(node, tree.PointInside | tree.InWindow | tree.InWeek | tree.InPhase)
+    return node if known else ALWAYS if hope else NEVER
+
 
 #: us since the epoch: later than any flight
 EVER = 1 << 53
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
+class ProofContext:
     """A lowered policy, prepared as on board, and any state that its vehicle may be in; `questions` are asked of it.
 
     `kept` are the ways that were found to keep its airspace (`ways`): the missions of one policy share many.
-    `steps` are those that were prepared, `hopes` the conditions of rules as `hopeful` has them: the choices of a
+    `steps` are those that were prepared, `hopes` the conditions of rules as `optimistic` has them: the choices of a
     mission's parameters share many.
     `nodes` and `conditions` are those of its rules, by their code.
     `bests` are the clauses of contracts in the best of all states.
@@ -49,6 +81,16 @@ class Ground:
     impossible: set[int] = field(default_factory=set)
     nodes: dict[tuple[int, ...], Node] = field(default_factory=dict)
     conditions: dict[tuple[int, ...], Condition] = field(default_factory=dict)
+
+    @property
+    def report(self) -> Report:
+        """Where findings go."""
+        return self.context.report
+
+    @property
+    def policy(self) -> Policy:
+        """The lowered policy."""
+        return self.prepared.policy
 
     def node(self, rule: Rule) -> Node:
         """The condition of a rule as a tree; rules share those that are alike."""
@@ -72,7 +114,7 @@ class Ground:
         found = self.bests.get(clause.code)
         if found is None:
             fixed = frozenset(where(self.prepared.policy.vehicle))
-            node = hopeful(self.prepared.compiler.node(clause, contract), True, fixed)
+            node = optimistic(self.prepared.compiler.node(clause, contract), True, fixed)
             found = self.bests[clause.code] = build(node, self.prepared.tables)
         return found
 

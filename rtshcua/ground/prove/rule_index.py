@@ -25,7 +25,7 @@ _ANY: Final = (FAR, FAR)
 _NONE: Final = (-2 * FAR, -2 * FAR)
 
 
-class Entry(NamedTuple):
+class IndexedRule(NamedTuple):
     """A rule by its number: what its condition can hold in, exactly what it is, and of which effect it is."""
 
     number: int
@@ -35,7 +35,7 @@ class Entry(NamedTuple):
     effect: int = 0
 
 
-class About(NamedTuple):
+class RuleQuery(NamedTuple):
     """Whom a rule that is looked for must be about: a skill, and all of some roles and sources; none is anyone.
 
     `effect` is that which it must have, the lowest and the highest; `within_us` the longest that it may wait.
@@ -48,12 +48,12 @@ class About(NamedTuple):
     within_us: int = FAR
 
 
-class Overlaps:
+class RuleIndex:
     """Some rules, by what their conditions can hold in. `implies` says of two conditions besides bounds whether one is
     true wherever the other is, and not false where that is unknown.
     """
 
-    def __init__(self, entries: Iterable[Entry], implies: Callable[[tree.Node, tree.Node], bool]) -> None:
+    def __init__(self, entries: Iterable[IndexedRule], implies: Callable[[tree.Node, tree.Node], bool]) -> None:
         every = list(entries)
         named = Counter(cell for entry in every for part in entry.parts for cell in part)
         self._cells: tuple[Cell, ...] = tuple(cell for cell, _ in named.most_common(_CELLS))
@@ -73,14 +73,14 @@ class Overlaps:
         for others in dict.fromkeys(part.others for part in self._exact.get(number, ())):
             self._holding[others].remove(number)
 
-    def meeting(self, about: About, points: Sequence[Environment], *, sure: bool, after: int = -1) -> Iterator[int]:
+    def meeting(self, about: RuleQuery, points: Sequence[Environment], *, sure: bool, after: int = -1) -> Iterator[int]:
         """The rules, in order, whose conditions may be true in all of some situations; with `sure` unset, may be true
         or unknown. Each is to be asked itself: none is left out, and others may be among them.
         """
         sides = [side for cell in self._cells for side in _over(cell, points, sure=sure)]
         return _in_order(self._meeting, about, sides, after)
 
-    def holding(self, about: About, exact: Conjunction) -> Iterator[int]:
+    def holding(self, about: RuleQuery, exact: Conjunction) -> Iterator[int]:
         """Rules whose condition is true wherever a conjunction is, and not false where that is unknown, as can be seen
         from both; those in order that have the same other conditions.
         """
@@ -108,7 +108,7 @@ class Overlaps:
             for cell, (low, high) in wider.bounds.items()
         )
 
-    def _row(self, entry: Entry, bounds: Bounds) -> tuple[int, ...]:
+    def _row(self, entry: IndexedRule, bounds: Bounds) -> tuple[int, ...]:
         rule = entry.rule
         return (
             *(side for cell in self._cells for side in _sides(bounds.get(cell))),
@@ -121,7 +121,7 @@ class Overlaps:
         )
 
 
-def _in_order(tree: Enclosing, about: About, sides: list[int], after: int) -> Iterator[int]:
+def _in_order(tree: Enclosing, about: RuleQuery, sides: list[int], after: int) -> Iterator[int]:
     low, high = about.effect
     row = (*sides, -about.skill, about.skill, *_hull(about.roles), *_hull(about.sources))
     return tree.around((*row, -high, low, -about.within_us), after)

@@ -1,35 +1,80 @@
-"""When a step may come, and what of zones and of conditions changes then.
+"""When each step may begin. E0801, E0805: even on the slowest way its validity is not over by then.
 
-A step comes no sooner after the mission's issue than those before it take at least, and no later than they take at
-most. A zone to stay out of counts as present if it may exist at some moment between, or while the step lasts; a zone to
-stay inside of must exist at all of them. Without a time of issue there must be some one that will do: what a step asks
-of the time of day is collected here (`Period.asked`), and all of a mission is asked together (`some_time`). Dates are
-left for the time of issue.
+A step begins no sooner after the mission's issue than those before it take at least, and no later than they take at
+most: up to `START_WINDOW_US` to the start, and for each step its approval, its deadline, and as long as its contract
+allows. A zone to stay out of counts as present if it may exist at some moment between, or while the step lasts; a zone
+to stay inside of must exist at all of them. Without a time of issue some one must do: what a step asks of the time of
+day is collected here (`StepTime.asked`) and asked of all steps together in `issue_times`, dates excepted.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.times import Window, daily, weekly, windows_of
-from rtshcua.decision.values import AND, FALSE, NOT, TRUE, Span, Truth
+from rtshcua.decision.values import FALSE, TRUE, Span
 from rtshcua.decision.zones import Place, PreparedZone
+from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span as Where
 from rtshcua.ground.analysis.daytime import Asked, arcs_where
 from rtshcua.ground.analysis.space import reads_days
 from rtshcua.ground.analysis.words import clock
-from rtshcua.ground.prove.line import Line
-from rtshcua.ground.prove.situation import EVER, Ground
-from rtshcua.ground.prove.timing import START_WINDOW_US, approval
+from rtshcua.ground.prove.proof_context import EVER, ProofContext
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import DAY
+from rtshcua.model.ir.missions import Step
+from rtshcua.model.quantity import Dimension, display
+
+#: how long after its issue a mission may begin
+START_WINDOW_US = 300 * 1_000_000
+
+
+def prove_validity(proof: ProofContext, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
+    """Report every step whose decision may mean nothing any more when its turn comes."""
+    latest = START_WINDOW_US
+    for step, invocation in zip(steps, invocations, strict=True):
+        contract = invocation.invocation.contract
+        skill = proof.context.symbols.skills[step.skill.text]
+        if not contract.duration_us:
+            proof.report.add(
+                codes.ENDLESS_STEP,
+                step.span,
+                f"`{contract.name}` does not end, so nothing after this step would ever begin",
+                help="add `lasts at most` to the skill",
+                labels=[(skill.name.span, "declared here, without `lasts at most`")],
+            )
+            return
+        latest += approval(proof, invocation) + contract.deadline_us
+        if latest > contract.validity_us:
+            own = None if step.overrides is None else step.overrides.validity
+            validity = own or skill.validity
+            assert validity is not None
+            proof.report.add(
+                codes.VALIDITY_TOO_SHORT,
+                step.span,
+                f"this step may begin {display(latest, Dimension.DURATION)} after the mission was issued, and "
+                f"`{contract.name}` is valid for {display(contract.validity_us, Dimension.DURATION)}",
+                help=f"{display(START_WINDOW_US, Dimension.DURATION)} to the start, then all deadlines, approvals and "
+                "durations before it count; move the step forward, or shorten those before it",
+                labels=[(validity.span, "declared here")],
+            )
+            return
+        latest += contract.duration_us
+
+
+def approval(proof: ProofContext, invocation: PreparedInvocation) -> int:
+    """How long a step may wait for approvals."""
+    at = proof.around(invocation)
+    waits = [rule.rule.within_us for rule in invocation.candidates.confirms if rule.condition(at) & TRUE]
+    return max(waits, default=0)
+
 
 _EXACT = (0, 0)
 
 
-class Found(NamedTuple):
+class Failure(NamedTuple):
     """Whether a condition fails, and at which moment of UTC, where one is known."""
 
     fails: bool
@@ -37,12 +82,12 @@ class Found(NamedTuple):
 
 
 @dataclass(slots=True)
-class Period:
+class StepTime:
     """A step may begin from `low` to `high` us after the issue, which is 0 where it is not known, and lasts at most
     `lasts_us`. `asked` is what it asks of a time of issue, once it is looked at.
     """
 
-    ground: Ground
+    proof: ProofContext
     issued_at_us: int
     low: int
     high: int
@@ -74,7 +119,7 @@ class Period:
         """Which of the zones to stay out of that a place is not clear of exist at some times only."""
         zones = (each for each in airspace.outside if each.times is not None and place.inside(each) != FALSE)
         return [
-            (zone_span(self.ground, zone), f"this may exist then: the step may fly {self.from_to(further)}")
+            (zone_span(self.proof, zone), f"this may exist then: the step may fly {self.from_to(further)}")
             for zone in zones
             if self.issued_at_us
         ]
@@ -88,17 +133,17 @@ class Period:
         self._ask_zone(zone, further, exists=True)
 
     def _ask_zone(self, zone: PreparedZone, further: int, *, exists: bool) -> None:
-        flat = self.ground.prepared.policy.zones[zone.number]
+        flat = self.proof.policy.zones[zone.number]
         if not (flat.daily or flat.weekly) or flat.dates or self.issued_at_us:
             return
-        windows = windows_of(flat, self.ground.prepared.tables.local)
-        cycle = Cycle.of(self.ground, windows)
+        windows = windows_of(flat, self.proof.prepared.tables.local)
+        cycle = IssueCycle.of(self.proof, windows)
         wanted, (window,) = TRUE if exists else FALSE, windows
         arcs = arcs_where(
             cycle.edges(windows), lambda at: window.truth((cycle.at(at),), _EXACT) == wanted, cycle.period
         )
         sometimes = "at some times of the day" if flat.daily else "at some times of the week"
-        label = (zone_span(self.ground, zone), f"`{flat.name}` exists {sometimes} only")
+        label = (zone_span(self.proof, zone), f"`{flat.name}` exists {sometimes} only")
         self._ask(Asked(arcs, self.low, self.high + further, cycle.period, (label,)))
 
     def missing(self, airspace: PreparedAirspace, further: int) -> PreparedZone | None:
@@ -111,7 +156,7 @@ class Period:
 
     def from_to(self, further: int) -> str:
         """That time in words; it is known."""
-        local, day = self.ground.prepared.tables.local, reads_days(self.ground.prepared.policy)
+        local, day = self.proof.prepared.tables.local, reads_days(self.proof.policy)
         ((low, high),) = self.utc(further)
         return f"from {clock(low, local, day=day)} to {clock(high, local, day=day)}, local time"
 
@@ -121,87 +166,63 @@ class Period:
         arguments: Sequence[int],
         through: int,
         holds: Callable[[Span], bool],
-    ) -> Found:
+    ) -> Failure:
         """Whether a condition fails at some moment at which the step may begin, or whatever the time of issue: what
         `holds` says of a moment. `through` is how far after it the zones count. What it asks of a time of issue that
         is not known is collected.
         """
-        windows, dates = changes(self.ground, clause, arguments)
+        windows, dates = changes_read(self.proof, clause, arguments)
         if self.issued_at_us:
             ((low, high),) = self.utc(0)
             for moment in sorted({low, high, *_moments(windows, dates, low, high, through)}):
                 if not holds((moment, moment)):
-                    return Found(True, moment)
-            return Found(False)
+                    return Failure(True, moment)
+            return Failure(False)
         if not windows and not dates:
-            return Found(not holds((0, EVER)))
+            return Failure(not holds((0, EVER)))
         if dates:  # on some date it must hold, at some time of the day
             period = max((window.period for window in windows), default=DAY)
-            starts = {self.ground.prepared.tables.local.steady(), *(date - period for date in dates)}
+            starts = {self.proof.prepared.tables.local.steady(), *(date - period for date in dates)}
             moments = {
                 moment
                 for start in starts
                 for moment in (start, *_moments(windows, dates, start, start + 2 * period + DAY, through))
             }
-            return Found(not any(holds((moment, moment)) for moment in sorted({0, EVER, *dates, *moments})))
-        cycle = Cycle.of(self.ground, windows)
+            return Failure(not any(holds((moment, moment)) for moment in sorted({0, EVER, *dates, *moments})))
+        cycle = IssueCycle.of(self.proof, windows)
         edges = {each - back for each in cycle.edges(windows) for back in (0, through)}
         arcs = arcs_where(edges, lambda at: holds(cycle.at(at)), cycle.period)
         if arcs and arcs[0].length < cycle.period:
-            label = (self.ground.span(clause), "the contract asks for this")
+            label = (self.proof.span(clause), "the contract asks for this")
             self._ask(Asked(arcs, self.low, self.high, cycle.period, (label,)))
-        return Found(not arcs)
+        return Failure(not arcs)
 
     def timed(self, clause: Clause, arguments: Sequence[int]) -> bool:
         """Whether what a condition says depends on the time."""
-        return any(changes(self.ground, clause, arguments))
+        return any(changes_read(self.proof, clause, arguments))
 
     def _ask(self, asked: Asked) -> None:
         if asked not in self.asked:
             self.asked.append(asked)
 
 
-def zone_span(ground: Ground, zone: PreparedZone) -> Where:
+def zone_span(proof: ProofContext, zone: PreparedZone) -> Where:
     """Where a zone of the airspace is declared."""
-    return ground.context.symbols.zones[ground.prepared.policy.zones[zone.number].name].name.span
+    return proof.context.symbols.zones[proof.policy.zones[zone.number].name].name.span
 
 
-def periods(ground: Ground, invocations: Sequence[PreparedInvocation]) -> list[Period]:
+def step_times(proof: ProofContext, invocations: Sequence[PreparedInvocation]) -> list[StepTime]:
     """When each step of a mission may begin."""
     earliest, latest = 0, START_WINDOW_US
-    found: list[Period] = []
+    found: list[StepTime] = []
     for invocation in invocations:
         flat = invocation.invocation
-        latest += approval(ground, invocation) + flat.contract.deadline_us
-        found.append(Period(ground, flat.issued_at_us, earliest, latest, invocation.lasts_us))
+        latest += approval(proof, invocation) + flat.contract.deadline_us
+        found.append(StepTime(proof, flat.issued_at_us, earliest, latest, invocation.lasts_us))
         latest += flat.contract.duration_us
         time = flat.contract.motion.time
         earliest += flat.arguments[time] if time >= 0 else 0
     return found
-
-
-def along(
-    comes: Sequence[Period], invocations: Sequence[PreparedInvocation], lines: Sequence[Line | None]
-) -> Iterator[Period]:
-    """The periods for all arguments on lines: a step comes no sooner than those before it take at least with any of
-    them, and asks for all of them what its period says.
-    """
-    earliest = 0
-    for period, invocation, line in zip(comes, invocations, lines, strict=True):
-        yield replace(period, low=earliest, asked=[each._replace(low=earliest) for each in period.asked])
-        flat = invocation.invocation
-        time = flat.contract.motion.time
-        earliest += 0 if time < 0 else flat.arguments[time] if line is None else line.least(time)
-
-
-def keeps(place: Place, airspace: PreparedAirspace) -> Truth:
-    """Whether a place is in the airspace, as if all its zones existed."""
-    truth = TRUE
-    for zone in airspace.inside:
-        truth = AND[truth][place.inside(zone)]
-    for zone in airspace.outside:
-        truth = AND[truth][NOT[place.inside(zone)]]
-    return truth
 
 
 def at_moment(at: Environment, utc: Span) -> Environment:
@@ -209,7 +230,7 @@ def at_moment(at: Environment, utc: Span) -> Environment:
     return Environment(at.slots, at.arguments, (utc,), (0, 0), at.place, at.monitors, at.phase, at.through)
 
 
-class Cycle(NamedTuple):
+class IssueCycle(NamedTuple):
     """What stands for all times: a day or a week, `period` us from `base` on, in which local time has one offset. The
     nights in which clocks are set are left for the time of issue.
     """
@@ -218,9 +239,9 @@ class Cycle(NamedTuple):
     period: int
 
     @classmethod
-    def of(cls, ground: Ground, windows: Sequence[Window]) -> "Cycle":
+    def of(cls, proof: ProofContext, windows: Sequence[Window]) -> "IssueCycle":
         """The one that shows all that some windows do: a week where one of them is of some days of the week."""
-        return cls(ground.prepared.tables.local.steady(), max((each.period for each in windows), default=DAY))
+        return cls(proof.prepared.tables.local.steady(), max((each.period for each in windows), default=DAY))
 
     def at(self, moment: int) -> Span:
         """A moment of it, in us since it began."""
@@ -231,9 +252,9 @@ class Cycle(NamedTuple):
         return [at - self.base for each in windows for at in each.changes(self.base - 1, self.base + self.period - 1)]
 
 
-def zones_read(ground: Ground, clause: Clause, arguments: Sequence[int]) -> Iterator[int]:
+def zones_read(proof: ProofContext, clause: Clause, arguments: Sequence[int]) -> Iterator[int]:
     """The zones that a condition asks about, given the arguments."""
-    tables = ground.prepared.tables.tables
+    tables = proof.prepared.tables.tables
     for op, a, b in zip(clause.code[::3], clause.code[1::3], clause.code[2::3], strict=True):
         match op:
             case Op.POSITION_IN:
@@ -244,10 +265,10 @@ def zones_read(ground: Ground, clause: Clause, arguments: Sequence[int]) -> Iter
                 yield tables[b][arguments[a]]
 
 
-def changes(ground: Ground, clause: Clause, arguments: Sequence[int]) -> tuple[list[Window], list[int]]:
+def changes_read(proof: ProofContext, clause: Clause, arguments: Sequence[int]) -> tuple[list[Window], list[int]]:
     """The windows of the local day or week, and the dates, by which something changes that a condition reads."""
-    policy, local = ground.prepared.policy, ground.prepared.tables.local
-    read = [policy.zones[number] for number in zones_read(ground, clause, arguments)]
+    policy, local = proof.policy, proof.prepared.tables.local
+    read = [policy.zones[number] for number in zones_read(proof, clause, arguments)]
     windows: list[Window] = []
     for op, a, b in zip(clause.code[::3], clause.code[1::3], clause.code[2::3], strict=True):
         if op == Op.TIME_IN:

@@ -1,0 +1,196 @@
+"""Whether a part of a way keeps the airspace, and where it leaves it, in words.
+
+All that lies on straight ways between two sets of places is their convex hull, widened by a box. A hull does not cut
+into a zone when its edge keeps clear of the zone's edges and no ring of these lies within it. A sweep along the hull's
+edge (`decision.zones`) answers the first and on which side of the zone the hull is; for the second one corner of each
+ring is enough.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from math import isqrt
+from typing import TypeAlias
+
+from rtshcua.decision.outline import Box, rings
+from rtshcua.decision.prepare import PreparedAirspace
+from rtshcua.decision.values import AND, FALSE, NOT, TRUE, Truth
+from rtshcua.decision.zones import Place, PreparedZone, Sweep
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import CIRCLE, Zone, unproject
+from rtshcua.model.quantity import Dimension, display
+
+Point: TypeAlias = tuple[int, int]
+
+#: a circumscribed polygon of 16 corners around a circle of radius 1,000: the corners of its first quarter
+_QUARTER = ((1_020, 0), (943, 391), (722, 722), (391, 943))
+
+
+def disc(radius: int) -> list[Point]:
+    """The corners of a polygon that holds a circle around home; home alone where the radius is 0."""
+    if not radius:
+        return [(0, 0)]
+    quarter = [(-(-x * radius // 1_000), -(-y * radius // 1_000)) for x, y in _QUARTER]
+    turned = [[(x, y), (-y, x), (-x, -y), (y, -x)] for x, y in quarter]
+    return [point for points in turned for point in points]
+
+
+def hull(points: Iterable[Point]) -> list[Point]:
+    """The corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+    return [*_half(ordered)[:-1], *_half(ordered[::-1])[:-1]]
+
+
+def _half(ordered: Sequence[Point]) -> list[Point]:
+    chain: list[Point] = []
+    for point in ordered:
+        while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
+            chain.pop()
+        chain.append(point)
+    return chain
+
+
+def _turn(a: Point, b: Point, c: Point) -> int:
+    """Above 0 where `c` lies left of the way from `a` to `b`."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+class Landmarks:
+    """One place of each ring of the zones of a policy; a circle's is its centre."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._zones = policy.zones
+        self._found: dict[int, tuple[Point, ...]] = {}
+
+    def zone(self, number: int) -> Zone:
+        """A zone of the policy."""
+        return self._zones[number]
+
+    def of(self, number: int) -> tuple[Point, ...]:
+        """The places of one zone."""
+        if number not in self._found:
+            zone = self._zones[number]
+            if zone.shape == CIRCLE:
+                self._found[number] = ((zone.data[0], zone.data[1]),)
+            else:
+                self._found[number] = tuple(ring[0] for ring in rings(zone))
+        return self._found[number]
+
+
+class HullSweep(Sweep):
+    """A convex hull as a sweep: what it answers of a zone holds for all that is within it."""
+
+    __slots__ = ("_corners", "_landmarks")
+
+    def __init__(self, points: Iterable[Point], box: Box, landmarks: Landmarks) -> None:
+        corners = hull(points)
+        closed = [*corners, corners[0]] if len(corners) > 1 else corners
+        super().__init__(tuple(coordinate for corner in closed for coordinate in corner), box)
+        self._corners, self._landmarks = corners, landmarks
+
+    def within(self, zone: PreparedZone) -> Truth:
+        """Whether the places of the hull are inside the zone, whatever their height."""
+        answer = super().within(zone)
+        if answer == TRUE and self._landmarks.zone(zone.number).shape == CIRCLE:
+            return TRUE  # a disc that holds the edge of a hull holds the hull
+        if answer in (TRUE, FALSE) and any(map(self._holds, self._landmarks.of(zone.number))):
+            return TRUE | FALSE
+        return answer
+
+    def _holds(self, place: Point) -> bool:
+        """Whether a place is within the hull, or on its edge."""
+        corners = self._corners
+        if len(corners) < 3:
+            return False
+        return all(_turn(a, b, place) >= 0 for a, b in pairwise((*corners, corners[0])))
+
+
+Leg: TypeAlias = tuple[Point, Point]
+
+#: a leg is looked at every metre, but at no more places than this
+_EVERY, _MOST = 1_000, 500
+_NO_BOX: Box = (0, 0, 0, 0)
+
+
+def breach_text(policy: Policy, airspace: PreparedAirspace, legs: Sequence[Leg], low: int, high: int) -> str:
+    """What a vehicle would do on these legs, at heights in mm, that the airspace does not allow, as if all its zones
+    existed; to stand after "would".
+    """
+    error = policy.vehicle.position_error
+    box = (-error, -error, error, error)
+    for zone in airspace.inside:
+        found = _vertical(policy, zone, low, high)
+        if found is not None:
+            return found
+        place = next((each for each in places_along(legs) if zone.along(each, box) != TRUE), None)
+        if place is not None:
+            exact = zone.along(place, _NO_BOX) == TRUE
+            return (f"come within {_length(error)} of the edge of" if exact else "leave") + _near_text(
+                policy, zone, place
+            )
+    for zone in airspace.outside:
+        if zone.between(low, high) == FALSE:
+            continue
+        near = [each for each in places_along(legs) if zone.along(each, box) != FALSE]
+        if near:
+            entered = next((each for each in near if zone.along(each, _NO_BOX) != FALSE), None)
+            return (f"come within {_length(error)} of" if entered is None else "enter") + _near_text(
+                policy, zone, entered or near[0]
+            )
+    return f"come within {_length(error)} of the edge of the airspace" if error else "touch the edge of the airspace"
+
+
+def path_legs(points: Sequence[Point]) -> list[Leg]:
+    """The legs of a path; where it is one place, that alone."""
+    return list(pairwise(points)) or [(points[0], points[0])]
+
+
+def place_text(policy: Policy, place: Point) -> str:
+    """A place as it is written in sources, to 5 decimals."""
+    latitude, longitude = unproject(policy.projection, *place)
+    return f"{_degrees(latitude, 'NS')}, {_degrees(longitude, 'EW')}"
+
+
+def _vertical(policy: Policy, zone: PreparedZone, low: int, high: int) -> str | None:
+    name = policy.zones[zone.number].name
+    if high >= zone.ceiling:
+        return f"fly at {_height(high)} where `{name}` has its ceiling at {_height(zone.ceiling)}"
+    if low <= zone.floor:
+        return f"be down to {_height(low)} where `{name}` has its floor at {_height(zone.floor)}"
+    return None
+
+
+def places_along(legs: Sequence[Leg]) -> Iterator[Point]:
+    """Places on some legs, their ends among them, near enough to each other to say where something is."""
+    for (x0, y0), (x1, y1) in legs:
+        count = min(isqrt((x1 - x0) ** 2 + (y1 - y0) ** 2) // _EVERY + 1, _MOST)
+        for at in range(count + 1):
+            yield x0 + (x1 - x0) * at // count, y0 + (y1 - y0) * at // count
+
+
+def _near_text(policy: Policy, zone: PreparedZone, place: Point) -> str:
+    return f" `{policy.zones[zone.number].name}`, near {place_text(policy, place)}"
+
+
+def _degrees(value: int, signs: str) -> str:
+    whole = (abs(value) + 50) // 100
+    return f"{whole // 100_000}.{whole % 100_000:05} {signs[value < 0]}"
+
+
+def _length(value: int) -> str:
+    return display(value, Dimension.LENGTH)
+
+
+def _height(value: int) -> str:
+    return display(value, Dimension.ALTITUDE)
+
+
+def keeps(place: Place, airspace: PreparedAirspace) -> Truth:
+    """Whether a place is in the airspace, as if all its zones existed."""
+    truth = TRUE
+    for zone in airspace.inside:
+        truth = AND[truth][place.inside(zone)]
+    for zone in airspace.outside:
+        truth = AND[truth][NOT[place.inside(zone)]]
+    return truth

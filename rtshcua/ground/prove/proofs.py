@@ -1,0 +1,169 @@
+"""All proofs in their order: those of a policy, and those of a mission, which follow the vehicle from step to step."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+from rtshcua.decision.flying import slower
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, at_slowest, paths_fit, prepare
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.analysis.space import signals
+from rtshcua.ground.checker.context import Context
+from rtshcua.ground.lower.policy import LoweredPolicy
+from rtshcua.ground.prove.contradiction import prove_contracts, prove_step_contract
+from rtshcua.ground.prove.deferral import prove_deferrals, prove_observation_time, prove_step_deferral
+from rtshcua.ground.prove.fallback_chains import prove_landing_height, prove_last_links, prove_links
+from rtshcua.ground.prove.fallback_ways import FallbackWays
+from rtshcua.ground.prove.issue_times import prove_known_issue, prove_some_issue
+from rtshcua.ground.prove.mission_bounds import prove_charge
+from rtshcua.ground.prove.observability import prove_observability, prove_step_observability
+from rtshcua.ground.prove.parameter_ranges import prove_between, unmoved_lines
+from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.rule_checks import prove_delegations, prove_rules
+from rtshcua.ground.prove.step_authority import prove_authority
+from rtshcua.ground.prove.step_bounds import StepBound, prove_step_bounds
+from rtshcua.ground.prove.step_paths import prove_home, prove_path
+from rtshcua.ground.prove.step_starts import (
+    AT_HOME,
+    MOST_PLACES,
+    StartPlace,
+    may_be_skipped,
+    places_after,
+    prove_aloft,
+    prove_start,
+    warn_not_landed,
+)
+from rtshcua.ground.prove.step_times import StepTime, prove_validity, step_times
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.ir.missions import MissionDecl, Step
+
+#: the proofs of a policy, in their order
+_POLICY_PROOFS = (
+    prove_links, prove_last_links, prove_deferrals, prove_observability, prove_contracts, prove_delegations,
+    prove_rules,
+)  # fmt: skip
+
+
+def prove_policy(context: Context, lowered: LoweredPolicy) -> ProofContext | None:
+    """The policy prepared as on board, after its proofs; None where it would be refused there."""
+    found = _prepared(lowered.policy)
+    if isinstance(found, Refusal):
+        report_refused(context, lowered, found)
+        return None
+    prepared, questions = found
+    proof = ProofContext(context, lowered, prepared, tuple(signals(lowered.policy)), questions.again())
+    for prove in _POLICY_PROOFS:
+        prove(proof)
+    return proof
+
+
+@lru_cache(maxsize=32)
+def _prepared(policy: Policy) -> tuple[PreparedPolicy, Questions] | Refusal:
+    """A policy prepared, and what is asked about it: missions in several files are often under the same one, and each
+    is a program of its own, in which the same questions come up.
+    """
+    prepared = prepare(policy)
+    return prepared if isinstance(prepared, Refusal) else (prepared, Questions(prepared))
+
+
+def prove_mission(proof: ProofContext, declared: MissionDecl, mission: Mission) -> tuple[StepBound, ...]:
+    """The proofs of a mission under a policy; what each step takes at most, as far as the mission can be flown."""
+    too_long = paths_fit(mission, proof.prepared)
+    if too_long is not None:
+        text = f"`{declared.name.text}` does not fit on board: {too_long.text}"
+        proof.report.add(codes.TOO_MANY, declared.name.span, text, help=too_long.help)
+        return ()
+    prepared: list[PreparedInvocation] = []
+    slowest = 0
+    for invocation in mission.invocations:
+        found = proof.prepare(invocation, mission.phases)
+        if isinstance(found, Refusal):
+            report_refused(proof.context, proof.lowered, found)
+            return ()
+        prepared.append(at_slowest(found, slowest))
+        slowest = slower(slowest, invocation.plan.speed)
+    steps = [step for phase in declared.phases for step in phase.steps]
+    permitted = [prove_authority(proof, declared, step, one) for step, one in zip(steps, prepared, strict=True)]
+    before = len(proof.report.found)
+    comes = step_times(proof, prepared)
+    flown = prove_flight(proof, declared, steps, prepared, comes, permitted)
+    if len(proof.report.found) == before:
+        for step, one, good in zip(steps, prepared, permitted, strict=True):
+            if good:
+                prove_step_contract(proof, step, one)
+    if all(permitted):
+        timely = prove_known_issue if mission.issued_at_us else prove_some_issue
+        if not timely(proof, steps, prepared, comes, unmoved_lines(prepared)):
+            prove_between(proof, declared, steps, prepared, comes, timely)
+    for step, one in zip(steps, prepared, strict=True):
+        prove_step_deferral(proof, step, one)
+        prove_step_observability(proof, step, one)
+    prove_validity(proof, steps, prepared)
+    prove_observation_time(proof, steps, prepared)
+    return flown
+
+
+def report_refused(context: Context, lowered: LoweredPolicy, malformed: Refusal) -> None:
+    """Report what would not be loaded on board."""
+    context.report.add(
+        codes.REFUSED_ON_BOARD,
+        lowered.declaration.name.span,
+        f"what `{lowered.declaration.name.text}` was compiled to would be refused on board: {malformed.text}",
+        help="this is a fault of the compiler, unless a limit is named",
+    )
+
+
+def prove_flight(
+    proof: ProofContext,
+    mission: MissionDecl,
+    steps: Sequence[Step],
+    invocations: Sequence[PreparedInvocation],
+    comes: Sequence[StepTime],
+    permitted: Sequence[bool],
+) -> tuple[StepBound, ...]:
+    """Report what is wrong with the way of a mission, up to the first step that cannot be flown; what each step takes
+    at most, where all are proved.
+
+    What comes after such a step would begin at a place that is never reached.
+    """
+    ways = FallbackWays(proof)
+    starts: list[tuple[StartPlace, ...]] = []
+    places: tuple[StartPlace, ...] = (AT_HOME,)
+    decided, slowest = True, 0
+    bounds: list[StepBound] = []
+    for number, (step, one, period) in enumerate(zip(steps, invocations, comes, strict=True)):
+        able = places if permitted[number] and one.invocation.skill not in proof.impossible else ()
+        if (able and not may_be_skipped(one)) or not any(place.aloft for place in places):
+            able = prove_aloft(proof, step, one, able, steps[:number])
+        able = prove_path(proof, step, one, period, able, steps[:number]) if able else ()
+        able = prove_aloft(proof, step, one, able, steps[:number])
+        slowest = slower(slowest, one.invocation.plan.speed)
+        bound = prove_step_bounds(proof, step, one, able, slowest) if able else None
+        able = prove_start(proof, step, one, able, steps[:number]) if able else ()
+        if not able or not (number or prove_home(proof, step, comes)):
+            return ()
+        if bound is not None:
+            bounds.append(bound)
+        ways.prove(step, one, period, able)
+        starts.append(able)
+        places = places_after(one, places, able)
+        if len(places) > MOST_PLACES:
+            places = places[:MOST_PLACES]
+            if decided:
+                decided = False
+                _too_many_places(proof, step)
+    warn_not_landed(proof, mission, steps[-1], places)
+    prove_charge(proof, steps, invocations, starts)
+    prove_landing_height(proof, steps, invocations)
+    return tuple(bounds) if len(bounds) == len(steps) else ()
+
+
+def _too_many_places(proof: ProofContext, step: Step) -> None:
+    proof.report.add(
+        codes.UNDECIDED,
+        step.span,
+        f"after this step the vehicle may be at more than {MOST_PLACES} places, for so many steps may be skipped",
+        help="the ways from some of them are left for on board; let a step between them `abort` or `hold`",
+    )

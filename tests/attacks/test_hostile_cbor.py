@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from hostile.documents import enveloped, head
+from rtshcua.app.documents import claimed, recorded_replacement
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.cose_receipt import check_receipt
 from rtshcua.evidence.proofs.file import MAX_PROOF, read_extra
 from rtshcua.front.cli import app
-from rtshcua.front.cli.showing.bundle import claimed, recorded_replacement
 from rtshcua.ground.checker import geojson
 from rtshcua.ground.checker.geojson import read_area
 from rtshcua.ground.checker.refused import Refused

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Final
 
 from campaign.wrong import BY_NAME, Aimed
+from rtshcua.app.programs import compile_sources
 from rtshcua.campaign.drawing import FLAVOURS, Space, Tally, draw
 from rtshcua.campaign.flights import Field, Flight, moments
 from rtshcua.campaign.results import Failed, Result
-from rtshcua.front.cli.sources import compile_sources
 from rtshcua.model.faults import KINDS
 from rtshcua.model.scenario import Scenario, Start
 from rtshcua.virtual.flown import ScenarioFlown

@@ -10,7 +10,7 @@ import pytest
 from typer.main import get_command
 
 from rtshcua.adapters.qualification.sortie import SORTIES
-from rtshcua.front.cli.sources import compile_sources
+from rtshcua.app.programs import compile_sources
 from rtshcua.front.cli.table import find
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual.forked import Forked

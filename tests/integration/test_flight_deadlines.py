@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.front.cli.sources import compile_sources
+from rtshcua.app.programs import compile_sources
 from rtshcua.onboard.ports import Ending
 from virtual import case
 from virtual.flight import Flight

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from rtshcua.app.programs import compile_sources
 from rtshcua.evidence.report import Verdict
-from rtshcua.front.cli.sources import compile_sources
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.onboard.ports import Ending, Event, Presented
 from rtshcua.wire.approval import ApprovalDocument, sign_approval

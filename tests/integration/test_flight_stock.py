@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.app.programs import compile_sources
 from rtshcua.codec.frames import kind_of
-from rtshcua.front.cli.sources import compile_sources
 from rtshcua.mavlink.framing import message_id
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.config import STOCK, Boot, Kind

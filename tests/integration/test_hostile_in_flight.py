@@ -10,8 +10,8 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import GAP_US
+from rtshcua.app.programs import compile_sources
 from rtshcua.evidence.report import Verdict
-from rtshcua.front.cli.sources import compile_sources
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.app.programs import read_sources
 from rtshcua.campaign.flights import Field
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.front.cli import app
-from rtshcua.front.cli.sources import read_sources
 from rtshcua.front.cli.table import COMMANDS
 from rtshcua.front.cli.testing.running import ISSUED_AT_US
 from rtshcua.ground.pipeline.suite import scenarios

@@ -271,7 +271,7 @@ def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], 
 def _warm() -> None:
     """Remember what ships as each command would: read, checked, its zones compared."""
     from rtshcua import library
-    from rtshcua.front.cli.sources import compile_sources
+    from rtshcua.app.programs import compile_sources
 
     compile_sources([library.root() / "missions" / "standard.rts"], mission=None, issued_at_us=0)
 

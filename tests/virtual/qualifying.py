@@ -12,7 +12,7 @@ from rtshcua.adapters.qualification.missions import NAME, Trial, source_of
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie
 from rtshcua.adapters.qualification.sortie import SORTIES, QualifyingDriver, Sortie
 from rtshcua.adapters.vehicle.bounds import Reach
-from rtshcua.front.cli.sources import compile_sources, read_text
+from rtshcua.app.programs import compile_sources, read_text
 from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Mission

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rtshcua import library
-from rtshcua.front.cli.sources import compile_sources
+from rtshcua.app.programs import compile_sources
 from rtshcua.simulation.config import SimulationConfig
 from virtual import case
 

@@ -13,9 +13,10 @@ from rtshcua import __version__
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.laying import lay
 from rtshcua.adapters.store.reading import read_regular
+from rtshcua.app.documents import read_bundle
+from rtshcua.app.exit_codes import words_of
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.faults import distrust, fail, words_of
-from rtshcua.front.cli.recognising import read_bundle
+from rtshcua.front.cli.faults import distrust, fail
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.library import root
 from rtshcua.wire import cose

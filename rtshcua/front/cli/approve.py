@@ -8,6 +8,8 @@ import typer
 
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.exit_codes import untrusted
+from rtshcua.app.wording import shorten
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -22,9 +24,8 @@ from rtshcua.front.cli.document_options import (
     SignedRoot,
 )
 from rtshcua.front.cli.documents import MOST_S, WHERE, WHOSE, deliver, expect_sense, flight_id, subject
-from rtshcua.front.cli.faults import fail, refuse, say, untrusted
+from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.shown import shorten
 from rtshcua.front.cli.unlock import person_key, terminal, unlock_person
 from rtshcua.ground.analysis.confirming import may_match
 from rtshcua.ground.lower.surveyed import Planned, planned_otherwise

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rtshcua.adapters.store.boundary import BoundaryStore, DamagedState
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.exit_codes import code_of, untrusted
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.faults import code_of, untrusted
 from rtshcua.front.cli.refused import Refused
 from rtshcua.front.cli.unlock import unlock
 from rtshcua.onboard.ports import BoundaryKey

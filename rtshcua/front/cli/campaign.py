@@ -14,6 +14,9 @@ from typing import Annotated, Final
 import typer
 
 from rtshcua import __version__, library
+from rtshcua.app.exit_codes import exit_code, words_of
+from rtshcua.app.programs import compile_sources, no_source
+from rtshcua.app.wording import moment
 from rtshcua.campaign import campaign as flying
 from rtshcua.campaign.campaign import Order
 from rtshcua.campaign.drawing import FLAVOURS, Space, answers_of
@@ -27,11 +30,9 @@ from rtshcua.campaign.written import scenario_text
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.front.cli.faults import say, words_of
-from rtshcua.front.cli.findings import Findings, exit_code
+from rtshcua.front.cli.faults import say
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
-from rtshcua.front.cli.moments import moment
-from rtshcua.front.cli.sources import compile_sources, no_source
 from rtshcua.front.cli.stdout import out
 from rtshcua.model.faults import KINDS
 from rtshcua.model.flat.mission import Mission

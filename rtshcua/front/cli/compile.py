@@ -9,12 +9,13 @@ import typer
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store.writing import replace_inside
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.programs import compile_sources, meant, no_source
+from rtshcua.app.wording import moment
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.bounds import bounds_dict, bounds_told
-from rtshcua.front.cli.findings import Findings, exit_code
-from rtshcua.front.cli.moments import moment
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.replacing import Replacing, replace_with, warned
-from rtshcua.front.cli.sources import compile_sources, meant, no_source
 from rtshcua.front.cli.stdout import out
 from rtshcua.front.cli.unlock import another_key, check_trusted, strangers, unlock, unlock_for
 from rtshcua.ground.pipeline.pins import Pins, undeclared

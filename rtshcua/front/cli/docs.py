@@ -11,18 +11,17 @@ import typer
 
 from rtshcua import __version__
 from rtshcua.adapters.store.writing import replace_inside
+from rtshcua.app.check import EarlierPolicies, earlier_policies
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.files import overwriting_a_source, source_files
+from rtshcua.app.programs import RootProgram, examine, programs, read_sources
+from rtshcua.app.wording import moment
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
-from rtshcua.front.cli.asked import unfolded
-from rtshcua.front.cli.earlier import Earlier, earlier_policies
 from rtshcua.front.cli.faults import say
-from rtshcua.front.cli.findings import Findings, exit_code
-from rtshcua.front.cli.moments import moment
-from rtshcua.front.cli.overwriting import refusal
-from rtshcua.front.cli.programs import Asked, programs
-from rtshcua.front.cli.sources import examine, read_sources
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out, out_rendered
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.program import Checked, compile_program
@@ -69,7 +68,7 @@ def docs(
     made_at = time.time_ns() // 1_000 if at is None else moment(at)
     if made_at is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    files = unfolded(paths)
+    files = source_files(paths)
     if isinstance(files, Refusal):
         return findings.end(files)
     target = _target(output, paths[0], as_json)
@@ -78,7 +77,7 @@ def docs(
         return findings.end(refused)
     if target is not None and not target.parent.is_dir():
         return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
-    earlier = Earlier("", ()) if since is None else earlier_policies(since)
+    earlier = EarlierPolicies("", ()) if since is None else earlier_policies(since)
     if isinstance(earlier, Refusal):
         return findings.end(earlier)
     asked = programs(files)
@@ -86,7 +85,7 @@ def docs(
     sources: dict[str, Source] = {}
     for each in asked:
         sources |= each.reading.program.sources
-    imported = None if target is None else refusal(target, sources, "a page")
+    imported = None if target is None else overwriting_a_source(target, sources, "a page")
     if imported is not None:
         return findings.end(imported)
     trials = _trials(asked, files)
@@ -149,7 +148,7 @@ def _refusal(target: Path | None, files: Sequence[Path]) -> Refusal | None:
         return Refusal("usage", "a specification has no page of its own", help)
     if target is not None and target.exists() and not target.is_file():
         return Refusal("output", f"`{target}` is no regular file, and is not replaced by a page")
-    return None if target is None else refusal(target, files, "a page")
+    return None if target is None else overwriting_a_source(target, files, "a page")
 
 
 class _Trials(NamedTuple):
@@ -163,7 +162,7 @@ class _Trials(NamedTuple):
     sources: dict[str, Source]
 
 
-def _trials(asked: Sequence[Asked], files: Sequence[Path]) -> _Trials:
+def _trials(asked: Sequence[RootProgram], files: Sequence[Path]) -> _Trials:
     """Each file's own tests in its own program, as `rtshcua test` runs them; those of what it imports are not asked."""
     paths = {shown(str(path)): path for path in files}
     trials = _Trials({}, {}, [], {})
@@ -185,7 +184,7 @@ def _trials(asked: Sequence[Asked], files: Sequence[Path]) -> _Trials:
     return trials
 
 
-def _part(asked: Asked, checked: Checked, trials: _Trials) -> Part:
+def _part(asked: RootProgram, checked: Checked, trials: _Trials) -> Part:
     """A program with those of its missions that need no further values."""
     program = asked.reading.program
     tried, scenarios = trials.tried[asked.name], trials.scenarios[asked.name]

@@ -4,13 +4,13 @@ import json
 from pathlib import Path
 
 from rtshcua.adapters.store.verification import Asked, verify_carefully
+from rtshcua.app.documents import no_log
+from rtshcua.app.pin import Pin
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.records import AnyRecord
 from rtshcua.front.cli.beside import anchors_beside, bundle_beside
 from rtshcua.front.cli.faults import fail
 from rtshcua.front.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
-from rtshcua.front.cli.pin import Pin
-from rtshcua.front.cli.recognising import no_log
 from rtshcua.front.cli.showing.page import for_terminal
 from rtshcua.front.cli.showing.record import Told, show_record
 from rtshcua.front.cli.stdout import out_json, out_rendered

@@ -5,7 +5,6 @@ A command that was given `--json` also says it in one JSON object on the standar
 RTSHCUA_DEBUG=1 shows the traceback of an internal fault.
 """
 
-import errno
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -14,6 +13,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rtshcua.app.exit_codes import code_of, exit_code_of, remedy, words_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire.untrusted import Untrusted
@@ -22,27 +22,6 @@ if TYPE_CHECKING:
     from rtshcua.adapters.vehicle.address import AddressError
 
 _json = ContextVar("json", default=False)  # whether this command was asked for JSON
-
-_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EPIPE}
-_LINK = {
-    errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.ECONNABORTED, errno.ECONNREFUSED, errno.ECONNRESET, errno.EHOSTDOWN,
-    errno.EHOSTUNREACH, errno.ENETDOWN, errno.ENETUNREACH, errno.ENOTCONN, errno.ETIMEDOUT,
-}  # fmt: skip
-_INPUT = {
-    errno.E2BIG, errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
-    errno.ENOTEMPTY, errno.ENXIO, errno.EPERM,
-}  # fmt: skip
-
-#: what to do about what is not to be trusted, by slug
-_REMEDIES = {
-    "no-keys": "`rtshcua keys init` makes a development root",
-    "malformed": "it was cut off or damaged, or is another kind of file: make it again, or copy it again",
-    "exposed": "`chmod 600` it; replace what others may have read: `rtshcua keys replace`, or another passphrase",
-}
-#: of what is refused for another reason than that it is not to be trusted, by slug
-_CODES = dict.fromkeys(("usage", "output", "no-approver", "several-approvers"), ExitCode.USAGE)
-_CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "outside", "since", "wrong-kind"), ExitCode.INPUT)
-_CODES |= {"not-flown": ExitCode.TESTS}
 
 
 #: errors that are told with the slug of their exit code, where they have none of their own
@@ -102,26 +81,12 @@ def misaddressed(option: str, error: "AddressError") -> ExitCode:
 
 def distrust(error: Untrusted, help: str = "", *, where: str = "") -> ExitCode:
     """Fails for something that is not to be trusted; `where` says what it was, before the text."""
-    return refuse(Refusal(error.slug, f"{where}{error}", help or _help(error)))
-
-
-def untrusted(error: Untrusted) -> Refusal:
-    """What is not to be trusted, with what to do about it where that is known."""
-    return Refusal(error.slug, str(error), _help(error))
-
-
-def _help(error: Untrusted) -> str:
-    return str(getattr(error, "help", "")) or _REMEDIES.get(error.slug, "")
+    return refuse(Refusal(error.slug, f"{where}{error}", help or remedy(error)))
 
 
 def refuse(refusal: Refusal, code: ExitCode | None = None) -> ExitCode:
     """Fails with a refusal, and with the exit code of its slug unless there is another."""
     return fail(code or code_of(refusal.slug), refusal.text, refusal.help, slug=refusal.slug)
-
-
-def code_of(slug: str) -> ExitCode:
-    """The exit code for a refusal or an `Untrusted`: what cannot be read at all is bad input, whoever signed it."""
-    return _CODES.get(slug, ExitCode.UNTRUSTED)
 
 
 def tell(
@@ -234,22 +199,11 @@ def _flush() -> None:
         sys.stdout.flush()
 
 
-def exit_code_of(error: OSError) -> ExitCode:
-    """The exit code for an error of the operating system: the link, the input, or else the output."""
-    if error.errno in _LINK or (isinstance(error, (ConnectionError, TimeoutError)) and error.errno not in _FULL):
-        return ExitCode.LINK
-    if isinstance(error, PermissionError):
-        from rtshcua.adapters.store.writing import NotWritten
-
-        return ExitCode.FULL if isinstance(error, NotWritten) else ExitCode.INPUT
-    return ExitCode.INPUT if error.errno in _INPUT else ExitCode.FULL
-
-
 def unreadable(error: OSError) -> ExitCode:
     """Fails for what the operating system would not do."""
     text, help = _words_of(error), None
     if isinstance(error, FileNotFoundError) and isinstance(error.filename, str):
-        from rtshcua.front.cli.missing_file import missing
+        from rtshcua.app.files import missing
 
         text, help = missing(Path(error.filename)) or (text, None)
     return fail(exit_code_of(error), text, help)
@@ -268,12 +222,6 @@ def of_each(paths: Iterable[Path], work: Callable[[Path, bool], ExitCode]) -> Ex
                 raise  # what we write on
             codes.append(unreadable(error))
     return next((code for code in codes if code is not ExitCode.OK), ExitCode.OK)
-
-
-def words_of(error: OSError) -> str:
-    """What the system says, as our messages are written."""
-    words = error.strerror or str(error) or "the system gave no reason"
-    return words[:1].lower() + words[1:]
 
 
 def _words_of(error: OSError) -> str:

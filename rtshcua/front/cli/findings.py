@@ -6,7 +6,8 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
+from rtshcua.app.exit_codes import code_of, is_unreadable
+from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.folding import folded
@@ -14,14 +15,11 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import MOST_SHOWN, most_severe, render
 from rtshcua.diagnostics.serialise import as_json
 from rtshcua.diagnostics.span import Source
-from rtshcua.front.cli.faults import code_of, error_object, fail, say, say_lines, say_rendered
+from rtshcua.front.cli.faults import error_object, fail, say, say_lines, say_rendered
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.front.cli.width import columns, fitted
 
 _BOLD, _RED, _YELLOW, _BLUE, _CYAN, _END = "\033[1m", "\033[1;31m", "\033[1;33m", "\033[1;34m", "\033[36m", "\033[0m"
-
-#: findings on a file as a whole; where it was asked for itself, they have no span
-_UNREADABLE = (NO_SUCH_FILE, TOO_LARGE)
 
 
 class Findings:
@@ -68,7 +66,7 @@ class Findings:
 
 def ended(code: ExitCode, found: Iterable[Diagnostic]) -> dict[str, Any]:
     """How a command that reports findings ended; a file that cannot be read is an error in the one form, too."""
-    unread = next((each for each in found if _is_unreadable(each)), None)
+    unread = next((each for each in found if is_unreadable(each)), None)
     error = {} if unread is None or code is not ExitCode.INPUT else _error(code, unread.message, unread.help)
     return {"exit": code.slug, "exit_code": int(code)} | error
 
@@ -78,15 +76,6 @@ def _error(code: ExitCode, text: str, help: str | None, slug: str | None = None)
     told: dict[str, Any] = error_object(code, text, help, slug=slug)
     told["error"]["message"] = text
     return told
-
-
-def _is_unreadable(found: Diagnostic) -> bool:
-    return found.code in _UNREADABLE and found.span is None
-
-
-def exit_code(found: Iterable[Diagnostic]) -> ExitCode:
-    """How a command ends that cannot go on: INPUT where a file that was asked for is none that can be read."""
-    return ExitCode.INPUT if any(_is_unreadable(each) for each in found) else ExitCode.DIAGNOSTICS
 
 
 def _count(found: tuple[Diagnostic, ...]) -> str:

@@ -8,15 +8,16 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.store.project import Projects
+from rtshcua.app.documents import kind_of
+from rtshcua.app.exit_codes import exit_code_of, words_of
+from rtshcua.app.files import SPECIFICATION, source_files
 from rtshcua.diagnostics.codes import UNSAFE_FORMAT
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.asked import SPECIFICATION, unfolded
-from rtshcua.front.cli.faults import exit_code_of, say, tell, words_of
+from rtshcua.front.cli.faults import say, tell
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.formatting.each import Laid, of_file, of_text
 from rtshcua.front.cli.formatting.shown import difference
-from rtshcua.front.cli.recognising import kind_of
 from rtshcua.front.cli.stdout import out, out_rendered
 from rtshcua.ground.format.finding import not_formatted
 from rtshcua.ground.language.size import MAX_SIZE
@@ -64,7 +65,7 @@ def fmt(
     if stdin_filename is not None:
         return findings.refuse(ExitCode.USAGE, "usage", "`--stdin-filename` is for `-`", "leave it out, or write `-`")
     skipped = [path for path in given if path.suffix.lower() == SPECIFICATION and not path.is_dir()]
-    files = unfolded([path for path in given if path not in skipped])
+    files = source_files([path for path in given if path not in skipped])
     if isinstance(files, Refusal):
         return findings.end(files)
     if not as_json:

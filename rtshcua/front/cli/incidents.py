@@ -12,12 +12,12 @@ from pathlib import Path
 from msgspec import structs
 
 from rtshcua.adapters.simulator import Simulator, SimulatorError
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.programs import read_sources
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.findings import exit_code
 from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.sources import read_sources
 from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.ground.testing.scenarios import ScenarioFlight
 from rtshcua.mavlink import dialect

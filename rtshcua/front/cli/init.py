@@ -10,9 +10,10 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.store.laying import Taken, lay
+from rtshcua.app.exit_codes import words_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.faults import fail, words_of
+from rtshcua.front.cli.faults import fail
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.library import root
 
@@ -115,16 +116,15 @@ def _renamed(directory: Path, chosen: str) -> str | None:
 
 def _first_finding(files: Mapping[str, bytes]) -> str | None:
     """What the checker says of it: a name may be a word of the language, or that of something else."""
-    from rtshcua.front.cli.asked import unfolded
-    from rtshcua.front.cli.checking import check_all
-    from rtshcua.front.cli.earlier import Earlier
-    from rtshcua.front.cli.programs import programs
+    from rtshcua.app.check import EarlierPolicies, check_all
+    from rtshcua.app.files import source_files
+    from rtshcua.app.programs import programs
 
     with TemporaryDirectory(prefix="rtshcua-init-") as place:
         lay(files, Path(place))
-        found = unfolded([Path(place)])
+        found = source_files([Path(place)])
         assert not isinstance(found, Refusal)
-        checked = check_all(programs(found), Earlier("", ()))
+        checked = check_all(programs(found), EarlierPolicies("", ()))
     return None if not checked.diagnostics else checked.diagnostics[0].message
 
 

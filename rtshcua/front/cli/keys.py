@@ -27,18 +27,19 @@ from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_fo
 from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.address import parse as parse_address
 from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.app.exit_codes import code_of, untrusted
+from rtshcua.app.wording import utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import attesting
 from rtshcua.front.cli.connection import System
 from rtshcua.front.cli.document_options import AsJson
-from rtshcua.front.cli.faults import code_of, fail, misaddressed, refuse, untrusted
+from rtshcua.front.cli.faults import fail, misaddressed, refuse
 from rtshcua.front.cli.known_roles import warn_of_unknown
 from rtshcua.front.cli.meeting import unopened
 from rtshcua.front.cli.refused import Refused
 from rtshcua.front.cli.showing.keys import as_object, speaks
-from rtshcua.front.cli.shown import utc
 from rtshcua.front.cli.stdout import out, out_json, out_rendered
 from rtshcua.front.cli.trusting import HELPS, trust
 from rtshcua.front.cli.unlock import read_passphrase, unlock

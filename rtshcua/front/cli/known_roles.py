@@ -29,8 +29,7 @@ def _known() -> set[str]:
         return set()
     if not 0 < len(files) <= _MOST:
         return set()
-    from rtshcua.front.cli.programs import programs
-    from rtshcua.front.cli.sources import examine
+    from rtshcua.app.programs import examine, programs
 
     return {
         role for each in programs(files) for lowered in examine(each.reading).policies for role in lowered.policy.roles

@@ -27,13 +27,15 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
+from rtshcua.app.documents import no_bundle
+from rtshcua.app.exit_codes import code_of, untrusted, words_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import simulated, simulation
 from rtshcua.front.cli.agents import Agents
 from rtshcua.front.cli.attesting import UNNAMED, BoundarySession, Elsewhere, boundary_key, elsewhere
 from rtshcua.front.cli.configured import would_set
-from rtshcua.front.cli.faults import code_of, say, untrusted, words_of
+from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.flight import Flight
 from rtshcua.front.cli.interrupts import Interrupts, breakable
 from rtshcua.front.cli.isolating import CODES, IN_USE, Apart, connected, started
@@ -54,7 +56,6 @@ from rtshcua.front.cli.opening import (
 )
 from rtshcua.front.cli.past import Past
 from rtshcua.front.cli.qualified import record_of, unqualified
-from rtshcua.front.cli.recognising import no_bundle
 from rtshcua.front.cli.refused import Refused as Refused
 from rtshcua.front.cli.showing.document import HANDED_IN, kind_of_document
 from rtshcua.front.cli.signing import Signing

@@ -12,10 +12,11 @@ import typer
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.reading import read_regular
+from rtshcua.app.documents import read_bundle
+from rtshcua.app.exit_codes import words_of
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.faults import distrust, fail, say, words_of
+from rtshcua.front.cli.faults import distrust, fail, say
 from rtshcua.front.cli.interrupts import breakable
-from rtshcua.front.cli.recognising import read_bundle
 from rtshcua.front.cli.unlock import check_trusted, unlock
 from rtshcua.front.mcp.access import HOST, PATH, BadToken, token_of
 from rtshcua.wire import cose

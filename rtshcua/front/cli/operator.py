@@ -14,6 +14,8 @@ import typer
 from rtshcua.adapters.agent_socket import Answered, FlightFollower
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.documents import Claimed
+from rtshcua.app.exit_codes import untrusted
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
@@ -22,12 +24,11 @@ from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, Decision, Effect
 from rtshcua.front.cli.document_options import ApprovalKey, AsJson, FlyingBundle, PassphraseFile, Person, SignedRoot
 from rtshcua.front.cli.documents import MOST_S, subject
-from rtshcua.front.cli.faults import refuse, untrusted
+from rtshcua.front.cli.faults import refuse
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
 from rtshcua.front.cli.live.lines import asked
 from rtshcua.front.cli.live.telling import REPLACED, Answering, asks
 from rtshcua.front.cli.recalling import GOOD_S, HELP, Recalled
-from rtshcua.front.cli.showing.bundle import Claimed
 from rtshcua.front.cli.showing.log import Names
 from rtshcua.front.cli.stdout import NewestLines
 from rtshcua.front.cli.unlock import unlock_person

@@ -4,8 +4,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
+from rtshcua.app.wording import shorten
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.front.cli.shown import shorten
 
 T = TypeVar("T", bound=tuple[object, ...])
 

@@ -5,6 +5,8 @@ from typing import TypeAlias
 
 import msgspec
 
+from rtshcua.app.pin import Pin
+from rtshcua.app.wording import many, shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Claim, Flaw
@@ -14,8 +16,6 @@ from rtshcua.evidence.proofs.file import Kind
 from rtshcua.evidence.proofs.trust import Name
 from rtshcua.evidence.records import encode
 from rtshcua.front.cli.claims import listed, write
-from rtshcua.front.cli.pin import Pin
-from rtshcua.front.cli.shown import many, shorten, utc
 
 Told: TypeAlias = Proven | Received | Flaw
 

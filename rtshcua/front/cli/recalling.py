@@ -6,9 +6,10 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.reading import read_regular
+from rtshcua.app.exit_codes import untrusted
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
-from rtshcua.front.cli.faults import fail, refuse, untrusted
+from rtshcua.front.cli.faults import fail, refuse
 from rtshcua.wire import names
 from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.document import MAX_DOCUMENT, kind_of

@@ -13,12 +13,12 @@ from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.last_log import known_end
 from rtshcua.adapters.store.recovery import InUse, Recovered, Signer, examine, recover
 from rtshcua.adapters.utc import UtcWatch
+from rtshcua.app.documents import no_log
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.recovery import RECOVERABLE, Examined, State
 from rtshcua.front.cli.faults import fail, of_each, tell
 from rtshcua.front.cli.outcome import is_log, logs_meant
-from rtshcua.front.cli.recognising import no_log
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.unlock import unlock
 from rtshcua.wire.keys import SEED_BYTES, Duty, SigningKey

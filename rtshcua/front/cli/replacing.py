@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import replace
+from rtshcua.app.exit_codes import code_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.documents import flight_id, subject
-from rtshcua.front.cli.faults import code_of, say
+from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out
 from rtshcua.front.cli.unlock import check_trusted, strangers, unlock_for

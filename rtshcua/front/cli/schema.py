@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
+from rtshcua.app.exit_codes import exit_code
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.front.cli.findings import Findings, exit_code
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.ground.agent.forms import FORMS, Schema
 from rtshcua.ground.agent.schema import schema as mission_schema
@@ -53,7 +54,7 @@ def schema(
 
 def _narrowed(path: Path, name: str | None, findings: Findings) -> Schema | ExitCode:
     """The schema under the policy of a source; or how the command ends without one."""
-    from rtshcua.front.cli.sources import examine, read_sources
+    from rtshcua.app.programs import examine, read_sources
     from rtshcua.ground.agent.narrowed import narrowed
 
     reading = read_sources([path])

@@ -14,9 +14,10 @@ from rtshcua.adapters.store.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.utc import kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError, Way
+from rtshcua.app.exit_codes import code_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import simulated
-from rtshcua.front.cli.faults import code_of, fail, misaddressed
+from rtshcua.front.cli.faults import fail, misaddressed
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.simulation.config import Answers, Boot, Estimate, Kind
 

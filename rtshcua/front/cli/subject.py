@@ -2,11 +2,11 @@
 
 from typing import NamedTuple
 
+from rtshcua.app.documents import claimed, over, recorded_replacement
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import distrust, fail
-from rtshcua.front.cli.showing.bundle import claimed, over, recorded_replacement
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.untrusted import Untrusted

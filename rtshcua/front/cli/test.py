@@ -7,14 +7,14 @@ import typer
 
 from rtshcua.adapters.store.project import Projects
 from rtshcua.adapters.store.writing import write_out
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.files import SPECIFICATION, overwriting_a_source, source_files
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.report.junit import junit
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.front.cli.findings import Findings, exit_code
-from rtshcua.front.cli.overwriting import refusal
-from rtshcua.front.cli.programs import SPECIFICATION, unfolded
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out, out_rendered
 from rtshcua.front.cli.testing.generating import Wanted, generate
 from rtshcua.front.cli.testing.running import Results, run_all
@@ -83,7 +83,7 @@ def run_tests(
         return findings.end(files)
     if generating:
         return generate(files, Wanted(policy, tuple(skill or ()), nominal, output, force), findings, quiet=as_json)
-    refused = None if junit_file is None else refusal(junit_file, files, _REPORT)
+    refused = None if junit_file is None else overwriting_a_source(junit_file, files, _REPORT)
     if refused is not None:
         return findings.end(refused)
     whole = not chosen and all(path.is_dir() for path in paths or [Path()])  # of a part, nobody asked for a share
@@ -97,7 +97,7 @@ def _meant(lost: Path) -> str:
     if str(lost) == "-":
         return "a source must be a file, because imports are found beside it"
     by_name = f"`-k {lost}` chooses tests by name"
-    below = unfolded([Path()])
+    below = source_files([Path()])
     near = None if isinstance(below, Refusal) else nearest(lost.name, {each.stem for each in below})
     if near is None or isinstance(below, Refusal):
         return by_name
@@ -106,7 +106,7 @@ def _meant(lost: Path) -> str:
 
 def _files(paths: list[Path], projects: Projects, *, keep: bool) -> tuple[Path, ...] | Refusal:
     """The sources that are meant, but for those that a configuration leaves out; `keep` says to keep these too."""
-    files = unfolded(paths)
+    files = source_files(paths)
     if isinstance(files, Refusal):
         return files
     left: list[Path] = []
@@ -141,7 +141,7 @@ def _finish(
 ) -> ExitCode:
     """Say what was found, write the report, and end."""
     ran, flown, covered = results.ran, results.flown, results.covered
-    refused = None if junit_file is None else refusal(junit_file, results.sources, _REPORT)
+    refused = None if junit_file is None else overwriting_a_source(junit_file, results.sources, _REPORT)
     if refused is not None:
         return findings.end(refused)
     told = Told(results.sources)

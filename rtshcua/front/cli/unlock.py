@@ -8,8 +8,8 @@ from pathlib import Path
 
 from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore, KeyStoreError, read_key, whose
 from rtshcua.adapters.store.reading import exposed
+from rtshcua.app.exit_codes import untrusted
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.faults import untrusted
 from rtshcua.front.cli.interrupts import breakable
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from rtshcua.app.pin import Pin
+from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
@@ -10,8 +12,6 @@ from rtshcua.evidence.gaps import seconds
 from rtshcua.evidence.report import Report, Verdict, cosigned
 from rtshcua.front.cli.claims import listed, write
 from rtshcua.front.cli.flown import lasted_us
-from rtshcua.front.cli.pin import Pin
-from rtshcua.front.cli.shown import shorten, utc
 from rtshcua.ground.audit.audit import Audit
 
 #: what a kind of failure means to whoever must act on it, by the first part of its slug

@@ -11,6 +11,8 @@ import typer
 
 from rtshcua.adapters.store.keystore import read_root
 from rtshcua.adapters.store.verification import Asked, Progress, verify_carefully, verify_quickly
+from rtshcua.app.documents import no_log
+from rtshcua.app.pin import Pin, pin
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
@@ -19,8 +21,6 @@ from rtshcua.evidence.report import Report, Verdict, cosigned
 from rtshcua.front.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
 from rtshcua.front.cli.faults import distrust, fail, of_each, say
 from rtshcua.front.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_and_others
-from rtshcua.front.cli.pin import Pin, pin
-from rtshcua.front.cli.recognising import no_log
 from rtshcua.front.cli.simulation import with_simulated
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.front.cli.unconfirmed import UnconfirmedFallbacks

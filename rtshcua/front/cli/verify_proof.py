@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.store.reading import read_regular
+from rtshcua.app.pin import Pin, pin
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.kinds import PROOF, recognised
 from rtshcua.evidence.finding import Flaw
@@ -15,7 +16,6 @@ from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import TAG_18, check_receipt
 from rtshcua.evidence.proofs.file import MAX_PROOF
 from rtshcua.front.cli.faults import distrust, of_each
-from rtshcua.front.cli.pin import Pin, pin
 from rtshcua.front.cli.proof_told import Told, as_object, as_text
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.wire.untrusted import Untrusted

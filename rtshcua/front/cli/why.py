@@ -10,18 +10,18 @@ import typer
 from rtshcua.adapters.store.logs import begins_as_log
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.runs import LOG
+from rtshcua.app.documents import no_bundle
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.programs import compile_sources
+from rtshcua.app.wording import moment, utc
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.temporal import lasting
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse
-from rtshcua.front.cli.findings import Findings, exit_code
-from rtshcua.front.cli.moments import moment
-from rtshcua.front.cli.recognising import no_bundle
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.showing.page import Page, for_terminal
 from rtshcua.front.cli.showing.why import Case, show_why
-from rtshcua.front.cli.shown import utc
-from rtshcua.front.cli.sources import compile_sources
 from rtshcua.front.cli.stdout import out_json, out_rendered
 from rtshcua.front.cli.subject import Subject, prepared, unpacked
 from rtshcua.front.cli.why_log import from_log

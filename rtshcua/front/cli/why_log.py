@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
+from rtshcua.app.wording import utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.gaps import STALLED
@@ -22,7 +23,6 @@ from rtshcua.front.cli.showing.log import Names
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.people import People
 from rtshcua.front.cli.showing.why import Case, show_why
-from rtshcua.front.cli.shown import utc
 from rtshcua.front.cli.subject import Subject, after, unpacked
 from rtshcua.ground.why.link import of_contingency, trace_link
 from rtshcua.ground.why.recorded import context_of, now_of, state_of

@@ -15,13 +15,14 @@ from rtshcua.adapters.store.witness import Cosigned, FileWitness, NotCosigned, W
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError, Way
 from rtshcua.adapters.witness_link import WitnessLink
+from rtshcua.app.exit_codes import exit_code_of, untrusted
+from rtshcua.app.wording import many
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
 from rtshcua.front.cli.faults import as_json as saying_json
-from rtshcua.front.cli.faults import distrust, exit_code_of, fail, misaddressed, refuse, untrusted
+from rtshcua.front.cli.faults import distrust, fail, misaddressed, refuse
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
-from rtshcua.front.cli.shown import many
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.unlock import unlock
 from rtshcua.wire import cose

@@ -9,8 +9,8 @@ from random import Random
 from fuzz import board
 from fuzz.mutation.trees import changed
 from reference import world as reference
+from rtshcua.app.documents import claimed
 from rtshcua.decision.prepare import prepare
-from rtshcua.front.cli.showing.bundle import claimed
 from rtshcua.front.cli.showing.mission import show_mission
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.policy import show_policy

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from reference import flat_case as flat
-from rtshcua.front.cli.sources import compile_sources
+from rtshcua.app.programs import compile_sources
 from rtshcua.model import faults
 from rtshcua.model.faults import AgentFault, Fault, HostFault
 from rtshcua.model.scenario import (

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import duckdb
 from msgspec import to_builtins
 
+from rtshcua.app.pin import Pin, pin
+from rtshcua.app.wording import many
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.archiving.given import Skipped
 from rtshcua.front.cli.archiving.told import code_of, counted
 from rtshcua.front.cli.faults import distrust, fail
-from rtshcua.front.cli.pin import Pin, pin
-from rtshcua.front.cli.shown import many
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.wire.untrusted import Untrusted
 

@@ -8,10 +8,10 @@ from typing import NamedTuple, TypeVar
 from rtshcua.adapters.archive.folder import Source
 from rtshcua.adapters.store.logs import begins_as_log
 from rtshcua.adapters.store.runs import LOG, logs_of
+from rtshcua.app.documents import no_log
+from rtshcua.app.wording import moment
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import fail
-from rtshcua.front.cli.moments import moment
-from rtshcua.front.cli.recognising import no_log
 
 _EXTRAS = {"duckdb": "archive", "distributed": "cluster"}
 

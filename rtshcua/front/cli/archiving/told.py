@@ -6,10 +6,10 @@ import sys
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
+from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.outcome import exit_code_of
-from rtshcua.front.cli.shown import shorten, utc
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.width import columns
 

@@ -4,13 +4,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rtshcua.adapters.store.git import Changes, NoChanges, changed_files
+from rtshcua.app.exit_codes import exit_code, exit_code_of, words_of
+from rtshcua.app.files import overwriting_a_source
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import listed, nearest
-from rtshcua.front.cli.faults import exit_code_of, say, tell, words_of
-from rtshcua.front.cli.findings import Findings, exit_code
+from rtshcua.front.cli.faults import say, tell
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.linting.fixing import Fixed, fix
 from rtshcua.front.cli.linting.gathered import Gathered, gathered
 from rtshcua.front.cli.linting.idle import idle
@@ -19,7 +21,6 @@ from rtshcua.front.cli.linting.report import statistics, summary, written
 from rtshcua.front.cli.linting.scope import Scope, scope
 from rtshcua.front.cli.linting.session import Session
 from rtshcua.front.cli.linting.touched import touched
-from rtshcua.front.cli.overwriting import refusal
 from rtshcua.front.cli.stdout import out, out_json, out_rendered
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.project.settings import LEVELS
@@ -47,7 +48,7 @@ def run(options: Options) -> ExitCode:
             return findings.refuse(ExitCode.INPUT, "changed", str(error), error.help)
     told, names = _told(options, about, session, changed)
     read: tuple[Path | str, ...] = (*about.files, *session.names)
-    forbidden = None if options.output is None else refusal(options.output, read, "a report")
+    forbidden = None if options.output is None else overwriting_a_source(options.output, read, "a report")
     if forbidden is not None:
         return findings.end(forbidden)
     mended: Fixed | None = None

@@ -10,8 +10,8 @@ from rtshcua.adapters.store.checkout import checkout_of, lies_in
 from rtshcua.adapters.store.folders import cache_folder
 from rtshcua.adapters.store.lint_cache import LintCache
 from rtshcua.adapters.store.project import Project, Projects
+from rtshcua.app.files import SOURCE, source_files
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.asked import SOURCE, unfolded
 from rtshcua.front.cli.linting.options import Options
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.project.settings import Ignored, misconfigured
@@ -36,7 +36,7 @@ def scope(options: Options) -> Scope | Refusal:
     """The files that are asked for, but for those that their configuration excludes; what is wrong with either ends the
     run.
     """
-    files = unfolded(options.paths)
+    files = source_files(options.paths)
     if isinstance(files, Refusal):
         return files
     projects = Projects(options.config, isolated=options.isolated)

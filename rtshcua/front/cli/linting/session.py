@@ -11,8 +11,8 @@ from pathlib import Path
 from rtshcua import library
 from rtshcua.adapters.store.lint_cache import LintCache
 from rtshcua.adapters.store.readable import Readable
+from rtshcua.app.files import SPECIFICATION, root_programs
 from rtshcua.diagnostics.span import Source
-from rtshcua.front.cli.asked import SPECIFICATION, roots
 from rtshcua.front.cli.linting.examined import Examined, decoded, encoded
 from rtshcua.front.cli.linting.mark import mark
 from rtshcua.ground.language.paths import shown
@@ -112,7 +112,7 @@ class Session:
             fresh = Fresh(self, asked)
             loaded = {number: fresh.loaded(files[number], further[files[number]]) for number in missing}
         every = [known[number] or loaded[number] for number in range(len(files))]
-        chosen = roots(names, [each.members for each in every])
+        chosen = root_programs(names, [each.members for each in every])
         waiting = [number for number in chosen if every[number].result is None]
         if waiting:
             from rtshcua.front.cli.linting.fresh import Fresh

@@ -1,7 +1,7 @@
 """A trust root, and a key file: never its secret."""
 
+from rtshcua.app.wording import utc
 from rtshcua.front.cli.showing.page import Page
-from rtshcua.front.cli.shown import utc
 from rtshcua.wire import cose, key_file
 from rtshcua.wire.keys import ANY, Duty, VerificationKey
 from rtshcua.wire.trust import MAX_ROOT, open_root

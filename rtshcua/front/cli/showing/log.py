@@ -8,6 +8,8 @@ from contextlib import suppress
 import msgspec
 
 from rtshcua.adapters.utc import CLOCK
+from rtshcua.app.documents import Claimed, claimed, replaced
+from rtshcua.app.wording import many, true_to, utc
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.gaps import STALLED
 from rtshcua.evidence.log_writer import BOUNDARY
@@ -16,11 +18,9 @@ from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.bundle import Claimed, claimed, replaced
 from rtshcua.front.cli.showing.document import recorded
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.people import NOBODY, People
-from rtshcua.front.cli.shown import many, true_to, utc
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.dispatcher import OBEYED
 from rtshcua.wire import statement

@@ -1,9 +1,9 @@
 """A mission: its steps with every argument, and where a step is held to more than its skill."""
 
+from rtshcua.app.wording import utc
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.contract import fields
 from rtshcua.front.cli.showing.page import Page
-from rtshcua.front.cli.shown import utc
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.step_number import number_of

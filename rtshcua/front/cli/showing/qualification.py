@@ -7,8 +7,8 @@ from typing import Any, Final
 import msgspec
 
 from rtshcua.adapters.doctor.standing import unflown
+from rtshcua.app.wording import utc
 from rtshcua.front.cli.showing.page import Page
-from rtshcua.front.cli.shown import utc
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire import cose, names
 from rtshcua.wire.qualification import MAX_QUALIFICATION, CheckOutcome, Qualification, read_qualification

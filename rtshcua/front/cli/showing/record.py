@@ -5,14 +5,14 @@ from contextlib import suppress
 
 import msgspec
 
+from rtshcua.app.documents import claimed
+from rtshcua.app.wording import true_to, utc
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Sealing, Signed
 from rtshcua.evidence.report import Report, Verdict
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.bundle import claimed
 from rtshcua.front.cli.showing.log import Names, detail_of
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.people import NOBODY, People
-from rtshcua.front.cli.shown import true_to, utc
 from rtshcua.front.cli.simulation import SIMULATED
 from rtshcua.model.durability import SYNCED
 from rtshcua.model.durability import WORDS as DURABILITIES

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from rtshcua.app.wording import utc
 from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.people import NOBODY, People
-from rtshcua.front.cli.shown import utc
 from rtshcua.ground.why.reads import Read, reads
 from rtshcua.ground.why.trace import Check, Trace, Traced
 from rtshcua.model.decision import Decisive

@@ -6,16 +6,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.store.writing import write_out
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.files import overwriting_a_source
+from rtshcua.app.programs import Reading, examine, read_sources, read_text
+from rtshcua.app.wording import many
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.front.cli.faults import say
-from rtshcua.front.cli.findings import Findings, exit_code
-from rtshcua.front.cli.overwriting import refusal
-from rtshcua.front.cli.shown import many
-from rtshcua.front.cli.sources import Reading, examine, read_sources, read_text
+from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out_source
 from rtshcua.ground.checker.checks.tests import MAX_CASES
 from rtshcua.ground.format.format import formatted
@@ -56,7 +57,7 @@ class _Found(NamedTuple):
 def generate(files: Sequence[Path], wanted: Wanted, findings: Findings, *, quiet: bool) -> ExitCode:
     """Write the tests of one policy; quiet: as a field of the JSON object."""
     output = wanted.output
-    refused = None if output is None else refusal(output, files, _TESTS)
+    refused = None if output is None else overwriting_a_source(output, files, _TESTS)
     if refused is not None:
         return findings.end(refused)
     if output is not None and os.path.lexists(output) and not (wanted.force and output.is_file()):
@@ -65,7 +66,7 @@ def generate(files: Sequence[Path], wanted: Wanted, findings: Findings, *, quiet
     found: dict[tuple[str, str, str], _Found] = {}
     for path in files:
         reading = read_sources([path])
-        refused = None if output is None else refusal(output, reading.program.sources, _TESTS)
+        refused = None if output is None else overwriting_a_source(output, reading.program.sources, _TESTS)
         if refused is not None:
             return findings.end(refused)
         checked = examine(reading)

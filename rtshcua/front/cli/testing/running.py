@@ -5,11 +5,11 @@ from pathlib import Path
 from time import perf_counter_ns
 from typing import Final, NamedTuple
 
+from rtshcua.app.programs import Reading, examine, read_sources
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Source
 from rtshcua.front.cli.progress import watched
-from rtshcua.front.cli.sources import Reading, examine, read_sources
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.suite import scenarios as scenarios_of
 from rtshcua.ground.pipeline.suite import suite

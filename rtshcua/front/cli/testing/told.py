@@ -5,9 +5,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
+from rtshcua.app.wording import many, shorten
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.front.cli.shown import many, shorten
 from rtshcua.ground.testing.coverage.coverage import share
 from rtshcua.ground.testing.coverage.tally import Covered
 from rtshcua.ground.testing.coverage.universe import Goal

@@ -14,8 +14,9 @@ import pytest
 import typer
 
 from rtshcua import __version__
+from rtshcua.app.exit_codes import exit_code_of
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import app, faults, table
+from rtshcua.front.cli import app, table
 
 
 def run_module(*words: str, **options: object) -> subprocess.CompletedProcess[str]:
@@ -338,7 +339,7 @@ def test_a_poor_terminal_is_no_fault() -> None:
 
 
 def test_every_code_of_the_system_leads_somewhere() -> None:
-    assert {faults.exit_code_of(OSError(number, "")) for number in errno.errorcode} == {
+    assert {exit_code_of(OSError(number, "")) for number in errno.errorcode} == {
         ExitCode.INPUT,
         ExitCode.LINK,
         ExitCode.FULL,

@@ -90,10 +90,10 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
 
 def fly_one_again(line: dict[str, Any]) -> Result:
     """Flight 0 once more, in this process, from what the folder says alone."""
+    from rtshcua.app.programs import compile_sources
     from rtshcua.campaign.campaign import Order, drawn
     from rtshcua.campaign.drawing import FLAVOURS
     from rtshcua.front.cli.campaign import _kinds, _space
-    from rtshcua.front.cli.sources import compile_sources
 
     begun = json.loads(Path("made/campaign.json").read_text())
     compiled, _ = compile_sources([Path(SHORT)], mission=None, issued_at_us=begun["issued_at_us"])

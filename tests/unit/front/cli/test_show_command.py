@@ -14,6 +14,7 @@ from reference.forgery import edit, flight, other_flight, read
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import write_new
+from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
@@ -21,7 +22,6 @@ from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.log import detail_of
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.policy import show_policy
-from rtshcua.front.cli.shown import shorten, utc
 from rtshcua.model.flat.contract import CHOICE, Parameter
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.policy import LeftOut, Monitor, MonitorKind, Policy

@@ -7,10 +7,10 @@ import pytest
 
 from rtshcua.adapters.store.keystore import KeyStoreError, read_key
 from rtshcua.adapters.store.signing import LinkKeyError, open_link_key, read_link_key, write_link_key
+from rtshcua.app.documents import no_bundle, no_log
+from rtshcua.app.files import missing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.missing_file import missing
-from rtshcua.front.cli.recognising import no_bundle, no_log
 from rtshcua.wire.key_file import KeyFileError, dump_signing_key
 from rtshcua.wire.keys import Duty, SigningKey
 

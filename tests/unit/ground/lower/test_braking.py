@@ -5,7 +5,7 @@ import pytest
 from reference import sources
 from reference.sources import found
 from rtshcua import library
-from rtshcua.front.cli.sources import compile_sources
+from rtshcua.app.programs import compile_sources
 from virtual.rows import rows
 
 SIGNALS = "".join(

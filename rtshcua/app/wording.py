@@ -1,9 +1,25 @@
-"""How commands show times and counts to a person."""
+"""Times on a command line.
+
+How commands show times and counts to a person.
+"""
 
 from datetime import UTC, datetime
 
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 from rtshcua.model.quantity import Dimension, display
+
+
+def moment(text: str) -> int | None:
+    """UTC in us since the epoch, of an ISO 8601 text with an offset; None for a text that is no such time."""
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    if found.tzinfo is None:
+        return None
+    since = found.astimezone(UTC) - datetime(1970, 1, 1, tzinfo=UTC)
+    return (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
+
 
 _LAST_US = 253_402_300_799_999_999  # the end of the year 9999
 

@@ -1,4 +1,7 @@
-"""How commands read sources and compile them: the file system, the shipped library and the dialect, put together."""
+"""How commands read sources and compile them: the file system, the shipped library and the dialect, put together.
+
+Several sources at once: which programs they make.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -8,6 +11,7 @@ from typing import NamedTuple
 from rtshcua import library
 from rtshcua.adapters.store.readable import Readable
 from rtshcua.adapters.store.reading import open_regular
+from rtshcua.app.files import SPECIFICATION, root_programs
 from rtshcua.diagnostics.codes import DUPLICATE_NAME
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.refusal import Refusal
@@ -124,3 +128,26 @@ def no_source(path: Path) -> Refusal | None:
         return None
     help = "give the source that it was compiled from (.rts), or the specification (.json)"
     return Refusal("usage", f"`{path}` is a bundle, and no source", help) if compiled else None
+
+
+class RootProgram(NamedTuple):
+    """One program, the name of its first file, and all files that were asked for."""
+
+    name: str
+    reading: Reading
+    asked: frozenset[str]
+
+
+def programs(files: Sequence[Path], further: Sequence[Path] = ()) -> tuple[RootProgram, ...]:
+    """The programs that files make: each by itself, with what it imports and what `further` brings.
+
+    So two missions under one policy do not clash, whatever they call their parts. A file that another of them imports
+    is checked in that one's program, and makes none of its own. After a specification all are part of its program.
+    """
+    names = [shown(str(path)) for path in files]
+    asked = frozenset(names)
+    if files[0].suffix.lower() == SPECIFICATION:
+        return (RootProgram(names[0], read_sources([*files, *further]), asked),)
+    made = [RootProgram(name, read_sources([path, *further]), asked) for name, path in zip(names, files, strict=True)]
+    members = [frozenset(unit.file for unit in each.reading.program.units) for each in made]
+    return tuple(made[number] for number in root_programs(names, members))

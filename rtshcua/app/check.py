@@ -1,0 +1,233 @@
+"""The service `check`: everything that is wrong with sources, what missions take at most, and how policies differ."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.app.files import SOURCE, SPECIFICATION, overwriting_a_source, source_files
+from rtshcua.app.programs import RootProgram, examine, programs
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.prove.mission_bounds import Bounds
+from rtshcua.ground.report.changes import told_changes
+from rtshcua.ground.report.model import ChangeTold
+from rtshcua.ground.versions.raised import compare
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.bundle import MAX_BUNDLE
+from rtshcua.wire.untrusted import Untrusted
+
+#: passes programs on one by one, and may show meanwhile which one is in hand
+Progress = Callable[[Sequence[RootProgram]], Iterator[RootProgram]]
+
+
+class CheckRequest(NamedTuple):
+    """What is checked: sources and folders of them, what further sources bring, an earlier version to compare with, and
+    where a map is to go. `issued_at_us` is 0 where the dates of zones do not count.
+    """
+
+    paths: Sequence[Path]
+    since: Path | None = None
+    further: Sequence[Path] = ()
+    map: Path | None = None
+    issued_at_us: int = 0
+    now_us: int = 0
+
+
+class CheckedMission(NamedTuple):
+    """What a mission takes at most, and the file that it stands in."""
+
+    name: str
+    file: str
+    bounds: Bounds
+
+
+class LeftOutCounts(NamedTuple):
+    """What does not count of a policy for a vehicle: how many clauses and rules; and the signals that it lacks."""
+
+    policy: str
+    vehicle: str
+    without: tuple[str, ...]
+    clauses: int
+    rules: int
+
+    def told(self) -> str:
+        """In words."""
+        counts = [
+            f"{count} {what}{'s' * (count != 1)}"
+            for count, what in ((self.clauses, "clause"), (self.rules, "rule"))
+            if count
+        ]
+        without = ", ".join(self.without)
+        return f"{self.policy} on {self.vehicle}: {' and '.join(counts)} `where fitted` left out, without {without}"
+
+
+class ComparedPolicy(NamedTuple):
+    """A policy that an earlier one was found for: both versions, and what differs, on any vehicle."""
+
+    name: str
+    version: int
+    earlier: int
+    changes: tuple[ChangeTold, ...]
+
+
+class CheckResult(NamedTuple):
+    """Everything that was found, each thing once; of what has no errors its bounds, its versions, what is left out.
+
+    `now` are the errors that missions without any would have if they were issued now, where a zone exists on dates;
+    `not_here` the names of earlier policies that no policy here was compared with.
+    """
+
+    diagnostics: tuple[Diagnostic, ...]
+    sources: dict[str, Source]
+    missions: tuple[CheckedMission, ...]
+    versions: tuple[ComparedPolicy, ...]
+    left_out: tuple[LeftOutCounts, ...]
+    now: tuple[Diagnostic, ...]
+    programs: tuple[RootProgram, ...] = ()
+    not_here: tuple[str, ...] = ()
+
+
+class EarlierPolicies(NamedTuple):
+    """Policies, and where they are from."""
+
+    name: str
+    policies: tuple[Policy, ...]
+
+
+def check(request: CheckRequest, progress: Progress = iter) -> CheckResult | Refusal:
+    """Check sources; what cannot be begun with is refused. Raises OSError for a folder that cannot be read."""
+    files = source_files(request.paths)
+    if isinstance(files, Refusal):
+        return files
+    unfit = None if request.map is None else _no_place(request.map, files)
+    if unfit is not None:
+        return unfit
+    earlier = EarlierPolicies("", ()) if request.since is None else earlier_policies(request.since)
+    if isinstance(earlier, Refusal):
+        return earlier
+    roots = programs(files, tuple(request.further))
+    found = check_all(progress(roots), earlier, request.issued_at_us, request.now_us)
+    compared = {each.name for each in found.versions}
+    gone = sorted({each.name for each in earlier.policies} - compared)
+    return found._replace(programs=roots, not_here=tuple(gone))
+
+
+def draw_map(found: CheckResult, request: CheckRequest) -> int | Refusal:
+    """Write the page that was asked for; gives how many missions are drawn. Raises OSError."""
+    from rtshcua.adapters.store.writing import replace
+    from rtshcua.ground.report.checked import Checking, checked_page
+
+    assert request.map is not None
+    imported = overwriting_a_source(request.map, found.sources, "a page")
+    if imported is not None:
+        return imported
+    checked = [(each.reading.program, examine(each.reading, request.issued_at_us)) for each in found.programs]
+    checkings = [Checking(program, one.planned, one.diagnostics) for program, one in checked]
+    replace(request.map, checked_page(checkings).encode("utf-8"))
+    return sum(len(one.planned) for _, one in checked)
+
+
+def nothing_compared(found: CheckResult, since: Path) -> Refusal | None:
+    """That no policy here has an earlier version in `since`, where one was asked for: who asks relies on it."""
+    if found.versions:
+        return None
+    there = f"there: {', '.join(f'`{name}`' for name in found.not_here)}"
+    there = there if found.not_here else "there is no policy for a vehicle in it"
+    help = f"{there}; one of another name or for another vehicle is another policy: name a bundle of this one"
+    return Refusal("since", f"nothing in `{since}` is an earlier version of a policy here", help)
+
+
+def _no_place(target: Path, files: Sequence[Path]) -> Refusal | None:
+    """Why no page can be written to a file."""
+    if not target.parent.is_dir():
+        return Refusal("output", f"there is no folder `{target.parent}` to write to")
+    if target.exists() and not target.is_file():
+        return Refusal("output", f"`{target}` is no regular file, and is not replaced by a page")
+    return overwriting_a_source(target, files, "a page")
+
+
+def earlier_policies(path: Path) -> EarlierPolicies | Refusal:
+    """The policies of a bundle, whoever signed it, or of sources, which must be free of errors."""
+    if not path.is_dir() and path.suffix.lower() not in (SOURCE, SPECIFICATION):
+        return _bundled(path)
+    files = source_files([path])
+    if isinstance(files, Refusal):
+        return files
+    policies: list[Policy] = []
+    for each in programs(files):
+        checked = examine(each.reading)
+        if has_errors(checked.diagnostics):
+            message = f"`{each.name}` has errors, so nothing can be held against it"
+            return Refusal("since", message, f"`rtshcua check {path}` shows them")
+        policies += [lowered.policy for lowered in checked.policies]
+    return EarlierPolicies(str(path), tuple(policies))
+
+
+def _bundled(path: Path) -> EarlierPolicies | Refusal:
+    try:
+        data = read_regular(path, MAX_BUNDLE)
+    except OSError as error:
+        why = (error.strerror or "it is unreadable").lower()
+        return Refusal("since", f"cannot read `{path}`: {why}")
+    from rtshcua.app.documents import claimed  # brings cryptography
+
+    try:
+        return EarlierPolicies(str(path), (claimed(data).policy,))
+    except Untrusted as error:
+        return Refusal(error.slug, f"`{path}`: {error}", "accepted: a bundle, a source or a folder of sources")
+
+
+def check_all(
+    asked: Iterable[RootProgram], earlier: EarlierPolicies, issued_at_us: int = 0, now_us: int = 0
+) -> CheckResult:
+    """Check programs, one after the other, and hold their policies against earlier ones.
+
+    Without a time of issue the dates of zones are not looked at; where one of them is in force, it is told what would
+    be found now.
+    """
+    now: dict[tuple[object, ...], Diagnostic] = {}
+    found: dict[tuple[object, ...], Diagnostic] = {}
+    sources: dict[str, Source] = {}
+    missions: dict[tuple[str, str], CheckedMission] = {}
+    versions: dict[tuple[str, int, int], dict[ChangeTold, None]] = {}
+    left_out: dict[LeftOutCounts, None] = {}
+    for each in asked:
+        program = each.reading.program
+        checked = examine(each.reading, issued_at_us)
+        sources |= program.sources
+        compared = compare(checked.policies, earlier.policies, earlier.name, program.sources)
+        for one in compared:
+            changes = versions.setdefault((one.name, one.version, one.earlier), {})
+            changes |= dict.fromkeys(told_changes(one.old, one.new))
+        left_out |= {_left_out(lowered.policy): None for lowered in checked.policies if lowered.policy.left_out}
+        wrong = [*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)]
+        for diagnostic in wrong:  # a file that two programs share has its findings once
+            found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        if not issued_at_us and checked.bounds and any(_dated(one.policy, now_us) for one in checked.policies):
+            wrong = [one for one in examine(each.reading, now_us).diagnostics if one.code.severity is Severity.ERROR]
+            now |= {(one.code, one.span, one.message): one for one in wrong}
+        files = {mission.name.text: unit.file for unit in program.units for mission in unit.missions}
+        for name, bounds in checked.bounds.items():
+            missions.setdefault((files[name], name), CheckedMission(name, files[name], bounds))
+    return CheckResult(
+        tuple(found.values()),
+        sources,
+        tuple(missions.values()),
+        tuple(ComparedPolicy(*key, tuple(changes)) for key, changes in versions.items()),
+        tuple(left_out),
+        tuple(one for key, one in now.items() if key not in found),
+    )
+
+
+def _dated(policy: Policy, now_us: int) -> bool:
+    """Whether a zone exists now, on its dates."""
+    return any(zone.dates and zone.dates[0] <= now_us <= zone.dates[1] for zone in policy.zones)
+
+
+def _left_out(policy: Policy) -> LeftOutCounts:
+    rules = sum(each.skill < 0 for each in policy.left_out)
+    vehicle = policy.vehicle
+    return LeftOutCounts(policy.name, vehicle.name, vehicle.without, len(policy.left_out) - rules, rules)

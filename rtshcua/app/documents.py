@@ -1,0 +1,110 @@
+"""What a file is, and what a bundle claims: files are recognised by their content, and opened as what was asked for."""
+
+from base64 import b64decode
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from msgspec.structs import replace
+
+from rtshcua.adapters.store.reading import open_regular, read_regular
+from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, EMPTY, LOG, LOOKED_AT, Kind, recognised
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire import cose, names
+from rtshcua.wire.bundle import MAX_BUNDLE, envelopes, parse, parse_unverified, policy_digest
+from rtshcua.wire.digest import BUNDLE as BUNDLE_DIGEST
+from rtshcua.wire.digest import digest
+from rtshcua.wire.replacement import ReplacementDocument
+from rtshcua.wire.untrusted import Untrusted
+
+
+class Claimed(NamedTuple):
+    """What a bundle says, and which keys it says signed it: read for showing, and not to be trusted."""
+
+    policy: Policy
+    mission: Mission
+    digest: bytes
+    policy_digest: bytes
+    policy_kid: bytes
+    mission_kid: bytes
+
+
+def claimed(data: bytes, *, trusted: bool = False) -> Claimed:
+    """Takes a bundle apart without trusting it, and a very large one only if it is `trusted`. Raises `Untrusted`."""
+    first, second = (cose.unverified(envelope) for envelope in envelopes(data))
+    read = parse if trusted else parse_unverified
+    policy, mission = read(names.POLICY, first.payload, Policy), read(names.MISSION, second.payload, Mission)
+    prepared = prepare(policy)
+    checked = prepared if isinstance(prepared, Refusal) else prepare_mission(mission, prepared)
+    if isinstance(checked, Refusal):
+        raise Untrusted("malformed", f"the bundle makes no sense: {checked.text}")
+    return Claimed(policy, mission, digest(BUNDLE_DIGEST, data), policy_digest(first.payload), first.kid, second.kid)
+
+
+def recorded_replacement(detail: str) -> ReplacementDocument:
+    """A replacement that a record holds, which is not verified here. Raises `Untrusted`."""
+    try:
+        document = b64decode(detail, validate=True)
+    except ValueError:
+        raise Untrusted("malformed", "a recorded document is not base64") from None
+    said = parse_unverified(names.REPLACEMENT, cose.unverified(document).payload, ReplacementDocument)
+    return replace(said, kept=max(said.kept, 0))
+
+
+def replaced(detail: str, mission: Mission) -> Mission:
+    """The mission after a recorded replacement, which is not verified here. Raises `Untrusted`."""
+    return over(recorded_replacement(detail), mission)
+
+
+def over(said: ReplacementDocument, mission: Mission) -> Mission:
+    """The mission after a replacement: the steps that stay, then the new ones."""
+    steps = (*mission.invocations[: said.kept], *said.mission.invocations[said.kept :])
+    return replace(said.mission, invocations=steps)
+
+
+_BUNDLES: Final = "accepted: a bundle, as `rtshcua compile` makes it"
+
+
+class Mistaken(Untrusted):
+    """A file of another kind than was asked for; `help` is what is done with one."""
+
+    def __init__(self, text: str, help: str) -> None:
+        super().__init__("wrong-kind", text)
+        self.help = help
+
+
+def kind_of(path: Path) -> Kind | None:
+    """What a file is; None where nothing tells, also where it cannot be read."""
+    try:
+        with open_regular(path) as file:
+            data = file.read(LOOKED_AT)
+            return recognised(data, path.name) if data else EMPTY
+    except OSError:
+        return None
+
+
+def no_log(path: Path, name: Path, help: str) -> tuple[str, str]:
+    """What to say of a file that is no log, which was given by a name: in words, and what would help."""
+    kind = kind_of(path)
+    if kind is None or kind is LOG:
+        return f"`{name}` is not a log of this program", help
+    return f"`{name}` is {kind.name}, and no log", f"{kind.help}; {help}" if kind.help else help
+
+
+def no_bundle(path: Path) -> Mistaken | None:
+    """Why a file is surely no bundle; None where it may be one."""
+    kind = kind_of(path)
+    if kind is None or kind in (BUNDLE, DOCUMENT):
+        return None
+    return Mistaken(f"`{path}` is {kind.name}, and no bundle", kind.help or _BUNDLES)
+
+
+def read_bundle(path: Path) -> bytes:
+    """A bundle's octets. Raises `Mistaken` for what is of another kind, and OSError."""
+    data = read_regular(path, MAX_BUNDLE)
+    mistaken = no_bundle(path)
+    if mistaken is not None:
+        raise mistaken
+    return data

@@ -11,15 +11,15 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 863,
-    "code lines": 84_069,
-    "shared class names": 154,
-    "of them across packages": 126,
-    "shared file names": 110,
+    "modules": 850,
+    "code lines": 84_039,
+    "shared class names": 149,
+    "of them across packages": 123,
+    "shared file names": 107,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 67,
+    "modules below 80 lines with one importer": 57,
     "functions of more than 60 lines": 22,
-    "functions of a complexity over 15": 170,
+    "functions of a complexity over 15": 168,
     "functions of a complexity over 25": 15,
 }
 

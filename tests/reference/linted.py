@@ -5,8 +5,8 @@ from pathlib import Path
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.language.load import Program, load
+from rtshcua.ground.lint.filter import filter_findings
 from rtshcua.ground.lint.lint import lint
-from rtshcua.ground.lint.sift import sift
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 
@@ -42,7 +42,7 @@ def linted(one: Program) -> tuple[Diagnostic, ...]:
     for what its comments ignore.
     """
     grounds = examine_program(one, dialect.load()).grounds
-    return sift(lint(one, None, grounds), one.sources, [one.units[0].file], {}).found
+    return filter_findings(lint(one, None, grounds), one.sources, [one.units[0].file], {}).found
 
 
 def decided(text: str) -> list[tuple[str, str]]:

@@ -24,8 +24,8 @@ from rtshcua.adapters.store.readable import Readable
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.front.lsp.disk import desk
 from rtshcua.ground.editor.desk import Desk, View
+from rtshcua.ground.lint.filter import filter_findings
 from rtshcua.ground.lint.lint import lint
-from rtshcua.ground.lint.sift import sift
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.project.settings import Ignored
 from rtshcua.mavlink import dialect
@@ -81,7 +81,7 @@ def examined(known: Desk, job: Job) -> tuple[Diagnostic, ...]:
     if not failed:
         found += lint(view.program, {asked}, checked.grounds)
     untold = {asked} if failed else ()
-    return sift(found, view.program.sources, {asked}, _configured(view), untold).found
+    return filter_findings(found, view.program.sources, {asked}, _configured(view), untold).found
 
 
 def _configured(view: View) -> dict[str, tuple[Ignored, ...]]:

@@ -3,7 +3,7 @@
 import re
 from typing import NamedTuple
 
-from rtshcua.ground.lint.comments import ignores_line
+from rtshcua.ground.lint.ignores import ignores_line
 
 COMMENT = re.compile(r"//[^\n]*+|/\*(?s:.)*?\*/")
 #: what may be taken away at the end of a line; other characters that Python calls blank are what a comment says

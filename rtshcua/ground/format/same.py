@@ -9,7 +9,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.format.comments import COMMENT, content
 from rtshcua.ground.format.read import Read
-from rtshcua.ground.lint.comments import ignores_line
+from rtshcua.ground.lint.ignores import ignores_line
 
 
 class Difference(NamedTuple):

@@ -1,5 +1,5 @@
-"""Habits: what compiles, and is worth a second look.
+"""Lint rules: warnings about sources that compile and deserve a second look.
 
-One file a rule, each a function from a `Subject` to findings; `lint` runs them. They speak only of files that were
-asked for, never of those that these import: a library is there to be imported, and is somebody else's.
+`lint` runs the rules, each a function from a `LintInput` to findings. They report only files that were requested, never
+the files that these import. `filter` removes the findings that comments (`ignores`) or the configuration ignore.
 """

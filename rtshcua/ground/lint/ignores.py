@@ -1,14 +1,16 @@
-"""Ignores that stand in comments, and what is wrong with them (E1309 to E1311).
+"""Comments that ignore findings, and what is wrong with them (E1309 to E1311).
 
     // rtshcua: ignore E1304 because the authority's letter says 30 m
     // rtshcua: ignore-file naming, E1301 because the register gives the names
 
-The first is about findings that begin on its line, or, where comments alone stand on it, on the next line that has
-something else. The second is about the whole file, and stands before its first declaration. Codes go by their id or
-slug. What has no reason, or names no code that can be ignored, ignores nothing.
+The first is about findings that begin on its line or, where its lines hold only comments, on the next line that holds
+something else. The second is about the whole file, and must stand before its first declaration. Codes go by their id or
+slug. A comment without a reason, or without a code that can be ignored, ignores nothing. Comments are read from the
+text alone, since a text with errors has comments too; the formatter reads the same ones.
 """
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator
 from itertools import islice
 from typing import NamedTuple
@@ -18,8 +20,72 @@ from rtshcua.diagnostics.codes import REGISTRY, Code, Severity, can_be_ignored, 
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.lint.comments import ASKING, FILE, LINE, Comment, asked, comments
 from rtshcua.ground.project.reasons import says_why
+
+#: what a comment may ask for: about a line, or about the whole file
+LINE, FILE = "ignore", "ignore-file"
+#: what a comment holds that asks for anything
+MARKER = "rtshcua:"
+
+_COMMENT_TOKEN = re.compile(
+    r'(?P<text>"[^"\\\n]*+(?:\\[^\n][^"\\\n]*+){0,999}"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)',
+    re.DOTALL,
+)
+#: what a comment asks of the tools, by what stands between its marks
+_REQUEST = re.compile(r"\s*rtshcua:\s*(?P<word>[^\s,]*)(?P<rest>.*)", re.DOTALL)
+
+
+class SourceComment(NamedTuple):
+    """A comment with its marks, what stands between them, and whether a declaration stands before it.
+
+    `alone` is whether nothing but comments stands on its lines; `about` is the line (from 1) that it speaks of: the one
+    that it begins on, or, where it is alone, the next that has something else than comments.
+    """
+
+    span: Span
+    inside: str
+    offset: int  # of `inside` in the text
+    alone: bool
+    about: int
+    begun: bool
+
+
+def ignores_line(comment: str) -> bool:
+    """Whether a comment, with its marks, ignores findings by the line."""
+    if MARKER not in comment:
+        return False
+    request = _REQUEST.match(_inside(comment))
+    return request is not None and request["word"] == LINE
+
+
+def comments(source: Source, holding: str = "") -> Iterator[SourceComment]:
+    """The comments of a text that hold another, in order: there may be millions, and few that ask for anything."""
+    found: list[tuple[int, int, bool]] = []
+    taken: list[int] = []  # lines that have something else
+    begun = False
+    for match in _COMMENT_TOKEN.finditer(source.text):
+        if match["comment"] is not None:
+            if holding in match["comment"]:
+                found.append((*match.span(), begun))
+            continue
+        begun = True
+        line = source.position(match.start()).line  # what is no comment stays on one line
+        if not taken or taken[-1] != line:
+            taken.append(line)
+    for start, end, later in found:
+        first, last = source.position(start).line, source.position(end).line
+        after = bisect_left(taken, first)
+        alone = after == len(taken) or taken[after] > last
+        about = first if not alone else taken[after] if after < len(taken) else last + 1
+        inside = _inside(source.text[start:end]).rstrip("\r")
+        yield SourceComment(Span(source.file, start, end), inside, start + 2, alone, about, later)
+
+
+def _inside(written: str) -> str:
+    """What stands between the marks of a comment; a block at the end of a text may lack the second."""
+    closed = written.startswith("/*") and written.endswith("*/") and len(written) >= 4
+    return written[2:-2] if closed else written[2:]
+
 
 _REASON = re.compile(r"(?:^|(?<=[\s,]))because(?!\S)")
 _NAME = re.compile(r"[^\s,]+")
@@ -51,18 +117,20 @@ class Ignores(NamedTuple):
 
 def ignores(source: Source) -> Ignores:
     """The ignores of a text."""
-    if ASKING not in source.text:
+    if MARKER not in source.text:
         return Ignores((), ())
     faults: list[Diagnostic] = []
     given: list[Ignore] = []
-    for comment in comments(source, ASKING):
-        found = asked(comment.inside)
-        if found is not None:
-            given += _read(source, comment, found, faults)
+    for comment in comments(source, MARKER):
+        request = _REQUEST.match(comment.inside)
+        if request is not None:
+            given += _parse_ignore(source, comment, request, faults)
     return Ignores(tuple(given), tuple(faults))
 
 
-def _read(source: Source, comment: Comment, what: "re.Match[str]", faults: list[Diagnostic]) -> Iterator[Ignore]:
+def _parse_ignore(
+    source: Source, comment: SourceComment, what: "re.Match[str]", faults: list[Diagnostic]
+) -> Iterator[Ignore]:
     word = what["word"]
     if word not in (LINE, FILE):
         near = nearest(word, (LINE, FILE))
@@ -92,19 +160,19 @@ def _read(source: Source, comment: Comment, what: "re.Match[str]", faults: list[
     for at, (name, span) in enumerate(names):
         code = code_named(name)
         if code is None or not can_be_ignored(code):
-            faults.append(_unknown(name, code, span, guess=len(faults) < MOST_GUESSES))
+            faults.append(_unknown_ignore(name, code, span, guess=len(faults) < MOST_GUESSES))
         else:
             yield Ignore(
                 code, None if word == FILE else comment.about, reason, span, _removal(source, comment, names, at)
             )
 
 
-def _without_reason(comment: Comment) -> Diagnostic:
+def _without_reason(comment: SourceComment) -> Diagnostic:
     message = "this does not say why, so it ignores nothing"
     return Diagnostic(codes.IGNORE_WITHOUT_REASON, message, comment.span, "end it with `because ...`")
 
 
-def _unknown(name: str, code: Code | None, span: Span, *, guess: bool) -> Diagnostic:
+def _unknown_ignore(name: str, code: Code | None, span: Span, *, guess: bool) -> Diagnostic:
     if code is not None:
         why = "is an error, and errors cannot be ignored"
         if code.severity is not Severity.ERROR:
@@ -119,7 +187,7 @@ def _unknown(name: str, code: Code | None, span: Span, *, guess: bool) -> Diagno
     return Diagnostic(codes.UNKNOWN_IGNORE, f"there is no code `{name}`", span, help, fixes=fixes)
 
 
-def _removal(source: Source, comment: Comment, names: list[tuple[str, Span]], at: int) -> Fix:
+def _removal(source: Source, comment: SourceComment, names: list[tuple[str, Span]], at: int) -> Fix:
     """Take one code out of a comment; with the last one the comment goes, and its line if nothing else stands there."""
     text, span = source.text, names[at][1]
     if len(names) > 1:
@@ -136,7 +204,7 @@ def _removal(source: Source, comment: Comment, names: list[tuple[str, Span]], at
     return Fix(Span(source.file, start, end), "", "delete the comment", Applicability.SAFE)
 
 
-def unused(ignore: Ignore) -> Diagnostic:
+def unused_ignore(ignore: Ignore) -> Diagnostic:
     """The finding on an ignore that ignores nothing."""
     where = "in this file" if ignore.line is None else "there"
     message = f"nothing of `{ignore.code.id}` ({ignore.code.slug}) is found {where}, so this ignores nothing"

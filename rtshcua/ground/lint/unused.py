@@ -1,28 +1,90 @@
-"""E1301: what is declared, and used by nothing.
+"""Unused declarations and parameters (E1301), and unused imports (E1305).
 
-Parameters count where they stand: those of a template or a mission are read in it or nowhere, those of a skill also by
-rules. Other declarations count only in a file that ends something, with a mission or a policy: any other is there to be
-imported. What a policy offers to missions elsewhere is used: its zones and vehicles.
+E1301: a parameter of a template or a mission must be read in it, one of a skill in it or by a rule. Other declarations
+are reported only in a file with a mission or a policy, since any other file may be meant for import. The zones and
+vehicles of a policy are used by missions elsewhere.
+
+E1305: an import is used where the importing file mentions a declaration of the imported file, or where some file that
+stays mentions a declaration that only this import brings. A policy also uses without mention its zones and its vehicle,
+the signals that every flight reads, and under `permit any` all skills. A file without a mission or a policy may import
+for the files that import it, so there only imports count whose files all come by another import too; the imports of a
+file that declares nothing are all used. Nobody knows who else imports a file, so to delete an import is safe only where
+another import brings everything that it brings.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import cache
+from typing import Any
 
 from rtshcua.diagnostics import codes
-from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
+from rtshcua.diagnostics.removal import whole_line
+from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Parametric
 from rtshcua.ground.checker.symbols import WORDS, Declaration
 from rtshcua.ground.checker.well_known import MEASURED, WELL_KNOWN
-from rtshcua.ground.lint.mentions import mentions
-from rtshcua.ground.lint.subject import Subject
-from rtshcua.model.ir.program import Unit
+from rtshcua.ground.lint.lint_input import LintInput
+from rtshcua.ground.pipeline.closure import Imports
+from rtshcua.model.ir.expression import Reference
+from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.places import ENTRY
+from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.skills import Parameter, SkillDecl
+from rtshcua.model.ir.tests import Named
+
+
+def mentions(*nodes: Node | None) -> frozenset[str]:
+    """The names that nodes mention, but for those that they give: to a declaration, a parameter, an argument.
+
+    `bridge_a.entry` mentions `bridge_a` too. The type of a parameter is a word of the language.
+    """
+    found: set[str] = set()
+    for node in nodes:
+        _mentioned(node, found)
+    return frozenset(found)
+
+
+def mentioned_by(unit: Unit) -> frozenset[str]:
+    """The names that the declarations of a file mention."""
+    return mentions(*_declarations(unit))
+
+
+def _declarations(unit: Unit) -> Iterator[Node]:
+    yield from (*unit.enums, *unit.signals, *unit.zones, *unit.vehicles)
+    yield from (*unit.skills, *unit.templates, *unit.policies, *unit.missions)
+    yield from (*unit.nominals, *unit.tests, *unit.scenarios, *unit.sizes)
+
+
+def _mentioned(node: Any, found: set[str]) -> None:
+    kind = type(node)
+    if kind is tuple:
+        for part in node:
+            _mentioned(part, found)
+    elif kind is Reference:
+        found.add(node.name)
+        found.add(node.name.removesuffix(ENTRY))
+    elif kind is Name:
+        found.add(node.text)
+    elif kind is Named:  # in a test: a signal, or a parameter of a skill
+        found.add(node.name.text)
+    elif isinstance(node, Node):
+        for field in _fields(type(node)):
+            _mentioned(getattr(node, field), found)
+
+
+@cache
+def _fields(kind: type[Node]) -> tuple[str, ...]:
+    """The fields of a node that may mention something."""
+    given = ("span", "name", "type") if issubclass(kind, Parameter) else ("span", "name")
+    return tuple(field for field in kind.__struct_fields__ if field not in given)
+
 
 #: in the place of a skill's name: whichever
 _ANY = "any"
 
 
-def check(subject: Subject) -> Iterator[Diagnostic]:
-    """Report parameters that nothing reads, and declarations that nothing uses."""
+def unused_declarations(subject: LintInput) -> Iterator[Diagnostic]:
+    """Report parameters that nothing reads, and declarations that nothing uses (E1301)."""
     used: dict[str, set[str]] = {}
     for name, declaration in subject.symbols.declared.items():
         for mention in mentions(declaration):
@@ -30,18 +92,18 @@ def check(subject: Subject) -> Iterator[Diagnostic]:
     for unit in subject.asked:
         owners: list[Parametric] = [*unit.templates, *unit.missions]
         for owner in owners:
-            yield from _parameters(owner, mentions(owner))
+            yield from _unread_parameters(owner, mentions(owner))
         if unit.missions or unit.policies:
             rules = _read_by_rules(subject) if unit.skills else {}
             for skill in unit.skills:
                 of_rules = rules.get(skill.name.text, set()) | rules.get(_ANY, set())
-                yield from _parameters(skill, mentions(skill) | of_rules)
-            for declaration in _declared(subject, unit):
+                yield from _unread_parameters(skill, mentions(skill) | of_rules)
+            for declaration in _private_declarations(subject, unit):
                 if not used.get(declaration.name.text, set()) - {declaration.name.text}:
-                    yield _unused(declaration)
+                    yield _unused_declaration(declaration)
 
 
-def _declared(subject: Subject, unit: Unit) -> Iterator[Declaration]:
+def _private_declarations(subject: LintInput, unit: Unit) -> Iterator[Declaration]:
     """What a file declares for itself alone."""
     yield from unit.enums
     yield from (signal for signal in unit.signals if signal.name.text not in WELL_KNOWN.keys() | MEASURED.keys())
@@ -54,13 +116,13 @@ def _declared(subject: Subject, unit: Unit) -> Iterator[Declaration]:
             yield from unit.zones
 
 
-def _any_zone(subject: Subject) -> bool:
+def _any_zone(subject: LintInput) -> bool:
     """Whether a mission has a parameter whose value may be any zone, or the entry of any."""
     missions = subject.symbols.missions.values()
     return any(each.type.text in ("zone", "position") for mission in missions for each in mission.parameters)
 
 
-def _read_by_rules(subject: Subject) -> dict[str, set[str]]:
+def _read_by_rules(subject: LintInput) -> dict[str, set[str]]:
     """By skill, the names that rules and delegations about it mention."""
     found: dict[str, set[str]] = {}
     for rule in subject.rules():
@@ -70,13 +132,13 @@ def _read_by_rules(subject: Subject) -> dict[str, set[str]]:
     return found
 
 
-def _parameters(owner: Parametric, read: frozenset[str]) -> Iterator[Diagnostic]:
+def _unread_parameters(owner: Parametric, read: frozenset[str]) -> Iterator[Diagnostic]:
     for parameter in owner.parameters:
         if parameter.name.text not in read:
-            yield _unread(owner, parameter)
+            yield _unread_parameter(owner, parameter)
 
 
-def _unread(owner: Parametric, parameter: Parameter) -> Diagnostic:
+def _unread_parameter(owner: Parametric, parameter: Parameter) -> Diagnostic:
     by = "neither the skill nor a rule reads" if isinstance(owner, SkillDecl) else "nothing in it reads"
     return Diagnostic(
         codes.UNUSED,
@@ -86,10 +148,94 @@ def _unread(owner: Parametric, parameter: Parameter) -> Diagnostic:
     )
 
 
-def _unused(declaration: Declaration) -> Diagnostic:
+def _unused_declaration(declaration: Declaration) -> Diagnostic:
     return Diagnostic(
         codes.UNUSED,
         f"`{declaration.name.text}` is {WORDS[type(declaration)]} that nothing uses",
         declaration.name.span,
         "remove it; what is for others to import stands in a file without a mission or a policy",
     )
+
+
+def unused_imports(subject: LintInput) -> Iterator[Diagnostic]:
+    """Report unused imports (E1305), each given that those before it were removed."""
+    needs = _ImportNeeds(subject)
+    for unit in subject.asked:
+        if needs.declared[unit.file]:
+            for each in unit.imports:
+                lost = needs.lost(unit.file, each)
+                if lost is not None:
+                    yield _unused_import(subject, each, alone=bool(lost))
+
+
+class _ImportNeeds:
+    """What the files of a program need, while imports are taken away."""
+
+    def __init__(self, subject: LintInput) -> None:
+        symbols = subject.symbols
+        self._stable = subject.program.stable
+        self._units = {unit.file: unit for unit in subject.program.units}
+        self._imports = subject.imports
+        self._mentioned = {file: mentioned_by(unit) for file, unit in self._units.items()}
+        self.declared: dict[str, set[str]] = {file: set() for file in self._units}
+        for name, declaration in symbols.declared.items():
+            self.declared[declaration.span.file].add(name)
+        for enum in symbols.enums.values():
+            self.declared[enum.span.file] |= {member.name.text for member in enum.members}
+        for file, unit in self._units.items():
+            self.declared[file] |= {name.text for declaration in unit.roles for name in declaration.names}
+        imported = {self._imports.target(file, each) for file, unit in self._units.items() for each in unit.imports}
+        self._roots = {unit.file for unit in subject.asked} | (self._units.keys() - imported)
+        self._any = subject.permits_any()
+
+    def lost(self, file: str, gone: Import) -> frozenset[str] | None:
+        """The files that `file` no longer has without one of its imports, if nothing of that is needed; then it is
+        taken away. None where something is.
+        """
+        unit = self._units[file]
+        left = unit.copied(imports=tuple(each for each in unit.imports if each is not gone))
+        target = self._imports.target(file, gone)
+        again = any(self._imports.target(file, each) == target for each in left.imports)
+        if target is None or (not again and self._is_needed((unit,), frozenset({target}))):
+            return None
+        units = {**self._units, file: left}
+        imports = Imports(tuple(units.values()), self._stable)
+        lost = self._imports.closure(file) - imports.closure(file)
+        if lost and not unit.policies and not unit.missions:
+            return None
+        if lost:
+            left_over = frozenset[str]().union(*map(imports.closure, self._roots)) - lost
+            if self._is_needed((units[name] for name in left_over), lost):
+                return None
+        self._units, self._imports = units, imports
+        return lost
+
+    def _is_needed(self, by: Iterable[Unit], files: frozenset[str]) -> bool:
+        """Whether a file of `by` needs what `files` declare."""
+        names = {name for file in files for name in self.declared[file]}
+        units = [self._units[file] for file in files]
+        implied = bool(names & WELL_KNOWN.keys()) or any(
+            each.zones or each.vehicles or each.sizes or (each.skills and self._any) for each in units
+        )
+        return any((implied and unit.policies) or names & self._mentioned[unit.file] for unit in by)
+
+
+def _unused_import(subject: LintInput, each: Import, *, alone: bool) -> Diagnostic:
+    """The finding on an import; `alone` is whether no other brings along what it does.
+
+    A comment on its line stays. It may then speak of something else, so that a person has to look.
+    """
+    text = subject.program.sources[each.span.file].text
+    commented = _is_commented(text, each.span)
+    title = "delete the import" if commented else "delete the line"
+    help = f"{title}, if no file that imports this one needs it" if alone else title
+    how = Applicability.SUGGESTED if alone or commented else Applicability.SAFE
+    fix = Fix(each.span if commented else whole_line(text, each.span), "", title, how)
+    return Diagnostic(codes.UNUSED_IMPORT, f"nothing of `{each.path}` is used", each.span, help, fixes=(fix,))
+
+
+def _is_commented(text: str, span: Span) -> bool:
+    """Whether a comment stands on the line of an import, or ends there."""
+    start, end = text.rfind("\n", 0, span.start) + 1, text.find("\n", span.end)
+    beside = text[start : span.start], text[span.end : end if end >= 0 else len(text)]
+    return any(mark in part for part in beside for mark in ("//", "/*", "*/"))

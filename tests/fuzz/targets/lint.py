@@ -13,10 +13,10 @@ from rtshcua.front.cli.linting.fixing import fix
 from rtshcua.front.cli.linting.gathered import Gathered
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
-from rtshcua.ground.lint.comments import comments
+from rtshcua.ground.lint.filter import filter_findings
 from rtshcua.ground.lint.fixes import chosen
+from rtshcua.ground.lint.ignores import comments
 from rtshcua.ground.lint.lint import lint
-from rtshcua.ground.lint.sift import sift
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.node import Node
@@ -94,7 +94,7 @@ class Held:
         if not has_errors(found):
             found += lint(program, None, checked.grounds)
         untold = [world.PROBE] if has_errors(found) else []
-        sifted = sift(found, program.sources, [world.PROBE], {}, untold)
+        sifted = filter_findings(found, program.sources, [world.PROBE], {}, untold)
         source = program.sources.get(world.PROBE)
         if source is not None:
             expected = ignoring.ignored(source, found)

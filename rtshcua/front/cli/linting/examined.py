@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.ground.lint.stored import as_lists, from_lists, places
+from rtshcua.ground.lint.cached_findings import findings_as_lists, findings_from_lists, spans_of
 
 
 class Result(NamedTuple):
@@ -46,7 +46,7 @@ def encoded(examined: Examined, mark: str) -> bytes:
             "reads": dict(examined.reads),
             "packs": dict(examined.packs),
             "asked": dict(examined.asked),
-            "result": None if result is None else [as_lists(result.found), as_lists(result.habits)],
+            "result": None if result is None else [findings_as_lists(result.found), findings_as_lists(result.habits)],
         }
     ).encode()
 
@@ -88,10 +88,10 @@ def _texts(found: Any) -> tuple[str, ...]:
 
 
 def _result(lists: Any, reads: Mapping[str, str | None], length: Callable[[str], int | None]) -> Result:
-    """A result, if it speaks of nothing but what was read for it. Raises as `from_lists` does."""
+    """A result, if it speaks of nothing but what was read for it. Raises as `findings_from_lists` does."""
     found, habits = lists
-    result = Result(from_lists(found), from_lists(habits))
-    for place in places((*result.found, *result.habits)):
+    result = Result(findings_from_lists(found), findings_from_lists(habits))
+    for place in spans_of((*result.found, *result.habits)):
         whole = length(place.file) if place.file in reads else None
         if whole is None or place.end > whole:
             raise ValueError("it speaks of what was not read")

@@ -6,8 +6,7 @@ from typing import NamedTuple
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.front.cli.linting.examined import Examined
-from rtshcua.ground.lint.agreed import Linted, agreed
-from rtshcua.ground.lint.sift import Suppressed, sift
+from rtshcua.ground.lint.filter import Linted, Suppressed, agreed, filter_findings
 from rtshcua.ground.project.settings import Ignored
 
 
@@ -46,7 +45,7 @@ def gathered(
     spans = [each.span for each in found] + [label.span for each in found for label in each.labels]
     names = {*asked, *(span.file for span in spans if span is not None)}
     texts = sources(sorted(names))
-    sifted = sift(found, texts, asked, configured, untold, laid)
+    sifted = filter_findings(found, texts, asked, configured, untold, laid)
 
     def place(found: Diagnostic) -> tuple[int, Span]:
         span = found.span

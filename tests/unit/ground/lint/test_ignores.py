@@ -1,4 +1,4 @@
-"""Comments that ignore: `sift` says what a naive reading says, of any text and any findings."""
+"""Comments that ignore: `filter_findings` says what a naive reading says, of any text and any findings."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -8,9 +8,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.format.comments import gap_of
-from rtshcua.ground.lint.comments import comments
-from rtshcua.ground.lint.ignores import ignores
-from rtshcua.ground.lint.sift import sift
+from rtshcua.ground.lint.filter import filter_findings
+from rtshcua.ground.lint.ignores import comments, ignores
 from virtual.rows import rows
 
 CODES = (codes.NAMING, codes.UNUSED, codes.UNDECIDED, codes.SYNTAX, codes.UNUSED_IGNORE)
@@ -30,7 +29,7 @@ TEXTS = st.lists(PIECES, max_size=24).map("".join)
 def test_as_a_naive_reading_has_it(text: str, places: list[tuple[codes.Code, int]]) -> None:
     source = Source("x", text)
     found = {Diagnostic(code, "it is so", Span("x", min(at, len(text)), len(text))) for code, at in places}
-    sifted = sift(found, {"x": source}, ["x"], {})
+    sifted = filter_findings(found, {"x": source}, ["x"], {})
     assert {each.diagnostic for each in sifted.ignored} == ignoring.ignored(source, found)
     assert {each for each in sifted.found if each in found} == found - {each.diagnostic for each in sifted.ignored}
 

@@ -7,7 +7,7 @@ import pytest
 from reference.linted import CHECKOUT, HEAD, POLICY, RISE, found, program
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lint.agreed import Linted, agreed
+from rtshcua.ground.lint.filter import Linted, agreed
 from rtshcua.ground.lint.lint import lint
 from virtual.rows import rows
 

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from reference.deciding import IMPORT, NOMINAL, WHEN, made, program, ran
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lint.mentions import mentioned_by
+from rtshcua.ground.lint.unused import mentioned_by
 from rtshcua.ground.pipeline.program import compile_program, examine_program
 from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing.cases import REMAINING_US

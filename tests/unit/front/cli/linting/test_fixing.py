@@ -90,15 +90,13 @@ def test_a_difference_is_printed_and_nothing_written(here: Path, capsys: pytest.
 def test_a_fix_that_would_bring_an_error_is_not_made(
     here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Rule:
-        @staticmethod
-        def check(subject):  # type: ignore[no-untyped-def]
-            for unit in subject.asked:
-                for each in unit.imports[:1]:
-                    fix = Fix(each.span, "", "away with it", Applicability.SAFE)
-                    yield Diagnostic(codes.UNUSED_IMPORT, "no import is any good", each.span, fixes=(fix,))
+    def rule(subject):  # type: ignore[no-untyped-def]
+        for unit in subject.asked:
+            for each in unit.imports[:1]:
+                fix = Fix(each.span, "", "away with it", Applicability.SAFE)
+                yield Diagnostic(codes.UNUSED_IMPORT, "no import is any good", each.span, fixes=(fix,))
 
-    monkeypatch.setattr(rules, "RULES", (Rule,))
+    monkeypatch.setattr(rules, "RULES", (rule,))
     assert main(["lint", "one.rts", "policy.rts", "--fix", "--no-cache"]) == ExitCode.DIAGNOSTICS
     assert (Path("one.rts").read_text(), Path("policy.rts").read_text()) == (MISSION, POLICY)
     said = capsys.readouterr().err

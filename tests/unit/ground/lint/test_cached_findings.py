@@ -7,7 +7,7 @@ import pytest
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix, Label
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.lint.stored import as_lists, from_lists
+from rtshcua.ground.lint.cached_findings import findings_as_lists, findings_from_lists
 from virtual.rows import rows
 
 WHOLE = Diagnostic(
@@ -23,7 +23,7 @@ LEAST = Diagnostic(codes.NAMING, "it is so")
 
 
 def test_there_and_back() -> None:
-    assert from_lists(json.loads(json.dumps(as_lists((WHOLE, LEAST))))) == (WHOLE, LEAST)
+    assert findings_from_lists(json.loads(json.dumps(findings_as_lists((WHOLE, LEAST))))) == (WHOLE, LEAST)
 
 
 @rows(
@@ -38,8 +38,8 @@ def test_there_and_back() -> None:
     ids=str,
 )  # fmt: skip
 def test_any_others_are_none(harm: dict[int, object]) -> None:
-    (lists,) = json.loads(json.dumps(as_lists((WHOLE,))))
+    (lists,) = json.loads(json.dumps(findings_as_lists((WHOLE,))))
     for place, found in harm.items():
         lists[place] = found
     with pytest.raises((ValueError, KeyError, TypeError)):
-        from_lists([lists])
+        findings_from_lists([lists])

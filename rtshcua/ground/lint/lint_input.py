@@ -1,4 +1,4 @@
-"""What the rules look at."""
+"""The input of the lint rules."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from rtshcua.model.ir.program import Unit
 
 
 @dataclass(frozen=True, slots=True)
-class Subject:
+class LintInput:
     """A program as it is written, and which of its sources were asked for; `grounds` are its policies as lowered, each
     for a vehicle, with which the analysis can be asked.
 
@@ -27,27 +27,29 @@ class Subject:
     grounds: tuple[ProofContext, ...] = ()
 
     @staticmethod
-    def of(program: Program, asked: Collection[str], grounds: tuple[ProofContext, ...] = ()) -> "Subject":
+    def of(program: Program, asked: Collection[str], grounds: tuple[ProofContext, ...] = ()) -> "LintInput":
         """A program without errors."""
         units = tuple(unit for unit in program.units if unit.file in asked and PurePath(unit.file).suffix != ".json")
-        return Subject(program, collect(program.units), units, Imports(program.units, program.stable), grounds)
+        return LintInput(program, collect(program.units), units, Imports(program.units, program.stable), grounds)
 
     def lowered(self) -> Iterator[ProofContext]:
         """The lowered policies of the files that were asked for."""
         asked = {unit.file for unit in self.asked}
         return (ground for ground in self.grounds if ground.lowered.declaration.span.file in asked)
 
-    @property
-    def policies(self) -> tuple[PolicyDecl, ...]:
-        """Every policy of the program."""
-        return tuple(self.symbols.policies.values())
-
     def rules(self) -> tuple[Rule | Delegation, ...]:
         """Every rule and delegation of the program, those of templates once, as they are written."""
-        owners: list[PolicyDecl | TemplateDecl] = [*self.policies, *self.symbols.templates.values()]
+        policies = tuple(self.symbols.policies.values())
+        owners: list[PolicyDecl | TemplateDecl] = [*policies, *self.symbols.templates.values()]
         found: list[Rule | Delegation] = [rule for owner in owners for rule in owner.rules]
-        return (*found, *(each for policy in self.policies for each in policy.delegations))
+        return (*found, *(each for policy in policies for each in policy.delegations))
 
     def permits_any(self) -> bool:
         """Whether a rule permits every skill that there is."""
         return any(isinstance(rule, Rule) and rule.kind == "permit" and not rule.skills for rule in self.rules())
+
+
+def rules_of(unit: Unit) -> list[Rule]:
+    """The rules of a file's policies and templates."""
+    owners: list[PolicyDecl | TemplateDecl] = [*unit.policies, *unit.templates]
+    return [rule for owner in owners for rule in owner.rules]

@@ -1,4 +1,4 @@
-"""Findings as plain lists for a cache, and back again: exactly those, or none."""
+"""Findings as plain lists for a cache, and back; anything else in the lists is refused."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -8,7 +8,7 @@ from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix, Label
 from rtshcua.diagnostics.span import Span
 
 
-def as_lists(found: tuple[Diagnostic, ...]) -> list[Any]:
+def findings_as_lists(found: tuple[Diagnostic, ...]) -> list[Any]:
     """Findings as lists that `json` takes."""
     return [
         [
@@ -24,7 +24,7 @@ def as_lists(found: tuple[Diagnostic, ...]) -> list[Any]:
     ]
 
 
-def from_lists(lists: Any) -> tuple[Diagnostic, ...]:
+def findings_from_lists(lists: Any) -> tuple[Diagnostic, ...]:
     """The findings that these lists were made of. Raises ValueError, KeyError or TypeError for any others.
 
     Whether their places are in a text is for the caller to see, who has it.
@@ -32,21 +32,21 @@ def from_lists(lists: Any) -> tuple[Diagnostic, ...]:
     return tuple(
         Diagnostic(
             REGISTRY[code],
-            _text(message),
+            _str(message),
             None if span is None else _span(*span),
-            _perhaps(help),
-            tuple(Label(_span(*place), _text(text)) for place, text in labels),
+            _optional_str(help),
+            tuple(Label(_span(*place), _str(text)) for place, text in labels),
             tuple(
-                Fix(_span(*place), _text(replacement), _text(title), Applicability(applicability))
+                Fix(_span(*place), _str(replacement), _str(title), Applicability(applicability))
                 for place, replacement, title, applicability in fixes
             ),
-            _perhaps(pointer),
+            _optional_str(pointer),
         )
         for code, message, span, help, labels, fixes, pointer in lists
     )
 
 
-def places(found: tuple[Diagnostic, ...]) -> Iterator[Span]:
+def spans_of(found: tuple[Diagnostic, ...]) -> Iterator[Span]:
     """All places that findings speak of."""
     for each in found:
         if each.span is not None:
@@ -55,17 +55,17 @@ def places(found: tuple[Diagnostic, ...]) -> Iterator[Span]:
         yield from (fix.span for fix in each.fixes)
 
 
-def _text(found: Any) -> str:
+def _str(found: Any) -> str:
     if type(found) is not str:
         raise TypeError("no text")
     return found
 
 
-def _perhaps(found: Any) -> str | None:
-    return None if found is None else _text(found)
+def _optional_str(found: Any) -> str | None:
+    return None if found is None else _str(found)
 
 
 def _span(file: Any, start: Any, end: Any) -> Span:
     if type(start) is not int or type(end) is not int or not 0 <= start <= end:
         raise TypeError("no place")
-    return Span(_text(file), start, end)
+    return Span(_str(file), start, end)

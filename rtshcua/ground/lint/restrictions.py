@@ -1,33 +1,111 @@
-"""Whether a rule's condition decides anything: asked of the analysis, over all that the vehicle can be met in.
+"""Whether a condition or a zone of a policy restricts anything, over every situation in which a step can be decided.
 
-A step is admitted or refused while the vehicle is within its reach, with at least its reserve of charge, in the ranges
-of the skill's parameters and of what its sensors can report. What fails in no such situation restricts nothing,
-whatever it looks like. A window that leaves out the last minute of the day alone counts as the whole day: who writes
-`00:00 .. 23:59` means that. A missing reading makes a condition unknown and so refuses even here: that is the
-language's doing, and no policy's.
+A step is decided while the vehicle is within its reach, has at least its battery reserve, and each argument and reading
+is in its range. A condition that fails in no such situation restricts nothing. A missing reading makes a condition
+unknown, and so refuses even here: that is the language's rule, not the policy's.
+
+The reach is how far the vehicle flies from home at its highest speed on a full battery, and how high it climbs in that
+time, plus the distance by which home may be off (`within`) and one per cent. A zone that contains all of the reach
+restricts nothing, nor does a zone that has nothing in common with it. Every estimate here errs towards a longer reach,
+so towards "restricted". Lengths are in mm.
 """
 
 from collections.abc import Iterator, Sequence
+from math import isqrt
+from typing import NamedTuple
 
-from rtshcua.decision.times import LocalTime
+from rtshcua.decision.times import LocalTime, timed
 from rtshcua.decision.values import FALSE, MAYBE, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.values import Span as Between
 from rtshcua.ground.analysis.box import clipped, present
+from rtshcua.ground.analysis.plane import rings_of
 from rtshcua.ground.analysis.solve import Goal, No
 from rtshcua.ground.analysis.space import Space
-from rtshcua.ground.lint.reach import Reach, reach_of
+from rtshcua.ground.geometry.shapes import Disc, Region, lies_within, polygonal
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
 from rtshcua.model.flat.contract import PLACE, Contract
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
-from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle
 from rtshcua.model.flat.signal import NUMBER
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 from rtshcua.model.ir.policies import Delegation, Rule
+
+_SECOND = 1_000_000
+#: the local plane is true to 1 part in 1,000 within 5 km; a per cent is more than it errs by within what flies
+_MARGIN = 100
+
+
+class VehicleReach(NamedTuple):
+    """All places less than `across` from home, and from `down` to `up` above it."""
+
+    across: int
+    up: int
+    down: int
+
+    def belongs_to(self, zone: Zone) -> bool:
+        """Whether it is proved that a zone holds all of it, at all times."""
+        if timed(zone) or zone.floor > self.down or zone.ceiling < self.up:
+            return False
+        if zone.shape == CIRCLE:
+            x, y, squared = zone.data
+            return isqrt(squared) - isqrt(x * x + y * y) - 1 > self.across
+        plan = Region(polygonal(rings_of(zone)), LOWEST, HIGHEST)
+        return lies_within(Region(Disc((0, 0), self.across), LOWEST, HIGHEST), plan)
+
+    def misses(self, zone: Zone) -> bool:
+        """Whether it is proved that a zone has nothing of it."""
+        return zone.floor > self.up or zone.ceiling < self.down or _distance(zone) > self.across
+
+
+def reach_of(vehicle: Vehicle) -> VehicleReach:
+    """Where a vehicle may come. Down it may come faster than it climbs, but not further than it flies."""
+
+    def flown(speed: int) -> int:
+        way = -(-speed * vehicle.endurance_us // _SECOND) + vehicle.home_within + vehicle.position_error
+        return way + way // _MARGIN
+
+    return VehicleReach(flown(vehicle.speed), flown(vehicle.climb), -flown(max(vehicle.speed, vehicle.climb)))
+
+
+def is_open(policy: Policy) -> bool:
+    """Whether nothing in a policy's airspace restricts where its vehicle comes, or it has none."""
+    reach = reach_of(policy.vehicle)
+    without = () if policy.airspace is None else policy.airspace.outside
+    return is_unbounded(policy) and all(reach.misses(policy.zones[number]) for number in without)
+
+
+def is_unbounded(policy: Policy) -> bool:
+    """Whether a policy has no zone to stay inside of that restricts where its vehicle comes."""
+    reach = reach_of(policy.vehicle)
+    within = () if policy.airspace is None else policy.airspace.inside
+    return all(reach.belongs_to(policy.zones[number]) for number in within)
+
+
+def region_of(zone: Zone) -> Region:
+    """A zone as a region of the plane, without its times; a circle is no smaller than it is."""
+    if zone.shape == CIRCLE:
+        x, y, squared = zone.data
+        return Region(Disc((x, y), isqrt(squared) + 1), zone.floor, zone.ceiling)
+    return Region(polygonal(rings_of(zone)), zone.floor, zone.ceiling)
+
+
+def _distance(zone: Zone) -> int:
+    """A distance from home that a zone keeps at least; 0 where home may lie in it."""
+    if zone.shape == CIRCLE:
+        x, y, squared = zone.data
+        return max(0, isqrt(x * x + y * y) - isqrt(squared) - 1)
+    corners = [corner for ring in rings_of(zone) for corner in ring]
+    xs, ys = [x for x, _ in corners], [y for _, y in corners]
+    # the box around it is nearer than the zone is, never further
+    dx, dy = max(min(xs), -max(xs), 0), max(min(ys), -max(ys), 0)
+    return isqrt(dx * dx + dy * dy)
+
 
 _MINUTE = 60_000_000  # us
 
 
-class Deciding:
+class ConditionEffects:
     """The rules of a lowered policy, each with whether it ever makes a difference to a skill."""
 
     def __init__(self, ground: ProofContext) -> None:
@@ -76,19 +154,19 @@ class Deciding:
         found = self._spaces.get(skill)
         if found is None:
             policy = self._ground.prepared.policy
-            found = self._spaces[skill] = _narrowed(self.rules.space(skill), policy, policy.contracts[skill])
+            found = self._spaces[skill] = _when_admitted(self.rules.space(skill), policy, policy.contracts[skill])
         return found
 
 
-def _narrowed(space: Space, policy: Policy, contract: Contract) -> Space:
+def _when_admitted(space: Space, policy: Policy, contract: Contract) -> Space:
     """The situations of a space in which a step may be admitted, and perhaps more; every sensor reports."""
     vehicle, reach = policy.vehicle, reach_of(policy.vehicle)
     arguments, slots = list(space.arguments), list(space.slots)
     for parameter in contract.parameters:
         if parameter.kind == PLACE:
-            _within(arguments, parameter.cell, reach)
+            _within_reach(arguments, parameter.cell, reach)
     if vehicle.position >= 0:
-        _within(slots, vehicle.position, reach)
+        _within_reach(slots, vehicle.position, reach)
     for signal in policy.signals:
         # two ways to read one quantity: where one of them is the length of a vector, the other is no less than nothing
         if signal.kind == NUMBER and any(len(source.fields) > 1 for source in signal.sources):
@@ -98,11 +176,11 @@ def _narrowed(space: Space, policy: Policy, contract: Contract) -> Space:
     if vehicle.battery >= 0:
         _clip(slots, vehicle.battery, max(1, vehicle.reserve), MAX_VALUE)
     slots = [present(value) if value[2] == MAYBE else value for value in slots]
-    utc = tuple(_days(space.utc, space.tables.local)) or space.utc
+    utc = tuple(_without_last_minute(space.utc, space.tables.local)) or space.utc
     return space._replace(arguments=tuple(arguments), slots=tuple(slots), utc=utc)
 
 
-def _within(values: list[Value], at: int, reach: Reach) -> None:
+def _within_reach(values: list[Value], at: int, reach: VehicleReach) -> None:
     _clip(values, at, -reach.across, reach.across)
     _clip(values, at + 1, -reach.across, reach.across)
 
@@ -111,7 +189,7 @@ def _clip(values: list[Value], at: int, low: int, high: int) -> None:
     values[at] = clipped(values[at], low, high) or values[at]
 
 
-def _days(utc: Sequence[Between], local: LocalTime) -> Iterator[Between]:
+def _without_last_minute(utc: Sequence[Between], local: LocalTime) -> Iterator[Between]:
     """Moments without the last minute of each local day, where the local time is known."""
     stretches = ((low, after - 1, offset) for span in utc for low, after, offset in local.stretches(*span))
     for low, high, offset in stretches:
@@ -121,11 +199,11 @@ def _days(utc: Sequence[Between], local: LocalTime) -> Iterator[Between]:
                 yield first, last
 
 
-class Vacuous:
+class VacuousRules:
     """Which rules of a program, as they are written, make no difference, in every policy that has them."""
 
     def __init__(self, grounds: Sequence[ProofContext]) -> None:
-        self._every = [Deciding(ground) for ground in grounds]
+        self._every = [ConditionEffects(ground) for ground in grounds]
 
     def __call__(self, rule: Rule, skill: str) -> bool:
         """Whether the condition of a rule makes no difference to a skill; False where it cannot be told."""

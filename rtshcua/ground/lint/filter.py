@@ -1,0 +1,85 @@
+"""Which findings are reported: those that are not ignored, and that every program with the file agrees on."""
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from rtshcua.diagnostics.codes import NOT_FORMATTED, can_be_ignored
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.lint.ignores import Ignore, ignores, unused_ignore
+from rtshcua.ground.project.settings import Ignored
+
+
+class Suppressed(NamedTuple):
+    """A finding that is ignored, why, and where that is written; None where it is written in a configuration."""
+
+    diagnostic: Diagnostic
+    reason: str
+    at: Span | None
+
+
+class FilteredFindings(NamedTuple):
+    """What is found all the same, what is ignored, and the ignores of configurations that ignored something."""
+
+    found: tuple[Diagnostic, ...]
+    ignored: tuple[Suppressed, ...]
+    used: frozenset[Ignored]
+
+
+def filter_findings(
+    found: Iterable[Diagnostic],
+    sources: Mapping[str, Source],
+    asked: Collection[str],
+    configured: Mapping[str, Sequence[Ignored]],
+    incomplete: Collection[str] = (),
+    formatted: Collection[str] = (),
+) -> FilteredFindings:
+    """Take out what is ignored by a comment in the same file, or by the configuration of that file (`configured`).
+
+    Only the files that were `asked` for are searched for comments. Files with errors are `incomplete`: an ignore there
+    may well be used when these are corrected. `formatted` are the files whose layout was checked: in others an ignore
+    of a wrong layout is neither used nor unused.
+    """
+    written = {file: ignores(sources[file]) for file in asked if file in sources}
+    kept: list[Diagnostic] = []
+    taken: list[Suppressed] = []
+    by_comment: set[Ignore] = set()
+    by_project: set[Ignored] = set()
+    for each in found:
+        span = each.span
+        comments, settings = [], []
+        if span is not None and can_be_ignored(each.code):
+            line = sources[span.file].position(span.start).line if span.file in sources else 0
+            given = written[span.file].given if span.file in written else ()
+            comments = [one for one in given if one.code is each.code and one.line in (None, line)]
+            settings = [one for one in configured.get(span.file, ()) if one.code is each.code]
+        by_comment.update(comments)
+        by_project.update(settings)
+        if comments:
+            taken.append(Suppressed(each, comments[0].reason, comments[0].span))
+        elif settings:
+            taken.append(Suppressed(each, settings[0].reason, None))
+        else:
+            kept.append(each)
+    for file, here in written.items():
+        unused = [] if file in incomplete else [one for one in here.given if one not in by_comment]
+        kept += here.faults
+        kept += [unused_ignore(one) for one in unused if one.code is not NOT_FORMATTED or file in formatted]
+    return FilteredFindings(tuple(kept), tuple(taken), frozenset(by_project))
+
+
+class Linted(NamedTuple):
+    """The files of one program, and what was found in them."""
+
+    files: frozenset[str]
+    found: tuple[Diagnostic, ...]
+
+
+def agreed(programs: Sequence[Linted]) -> tuple[Diagnostic, ...]:
+    """What is found in a file by every program that it is part of: what one of them uses is used."""
+    counts = Counter(found for program in programs for found in program.found)
+    members = Counter(file for program in programs for file in program.files)
+    return tuple(
+        found for found, count in counts.items() if found.span is not None and count == members[found.span.file]
+    )

@@ -22,9 +22,9 @@ import pytest
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import BoundaryError, ListeningBoundary, Measure
 from rtshcua.adapters.clock import monotonic_ns
+from rtshcua.app.fly import boundary
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli import isolating
-from rtshcua.front.cli.refused import Refused
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import ENFORCE, LOAD, LOST, SEAL, Caller
 from rtshcua.onboard.enforcement.load import Loaded, Mode, load
@@ -224,7 +224,7 @@ def test_it_does_not_believe_a_time_that_is_made_up(provisioned: Provisioned) ->
     process.close()
     provisioned.made.await_gone(1)
     with pytest.raises(Refused, match="its own clock"):
-        isolating.connected(provisioned.socket, paced=True)
+        boundary.connected(provisioned.socket, paced=True)
 
 
 @pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed"])

@@ -35,11 +35,11 @@ from rtshcua.adapters.boundary_process import (
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.store.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.adapters.store.writing import lock
+from rtshcua.app.fly.boundary import started
+from rtshcua.app.fly.refused import Refused
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.isolating import started
-from rtshcua.front.cli.refused import Refused
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.ahead import NO_COPY

@@ -21,8 +21,8 @@ from hostile.documents import enveloped, head, hostile
 from reference.documents import large, low, low_mission, recall, replacement
 from reference.world import MISSION_KEY, ROOT, START, VEHICLE, Run, loaded, sealed_again
 from rtshcua.adapters.agent_socket import GAP_US, SHORT, WORK_AT_ONCE, WORK_RATE, AgentSocket, Encoded
-from rtshcua.front.cli import agents
-from rtshcua.front.cli.agents import Agents
+from rtshcua.app.fly import agents
+from rtshcua.app.fly.agents import Agents
 from rtshcua.front.cli.showing import words
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands

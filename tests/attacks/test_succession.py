@@ -22,13 +22,13 @@ from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.replay import FileReplayStore, looked_up
 from rtshcua.adapters.store.roots import RootStore, opened
 from rtshcua.adapters.store.signing import fingerprint, read_link_key
+from rtshcua.app.fly.link_signing import Signing
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.trust import trust
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import launch
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.signing import Signing
-from rtshcua.front.cli.trusting import trust
 from rtshcua.library import root as library
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession

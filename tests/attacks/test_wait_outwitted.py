@@ -14,11 +14,11 @@ import pytest
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.fly.trust import trust
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import launch
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.trusting import trust
 from rtshcua.library import root as library
 from rtshcua.onboard.enforcement.load import Loaded, Mode
 from rtshcua.wire.keys import Duty

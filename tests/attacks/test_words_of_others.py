@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.roots import opened
+from rtshcua.app.fly.story import Plan
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import visible
@@ -20,7 +21,6 @@ from rtshcua.front.cli.app import main
 from rtshcua.front.cli.documents import deliver
 from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.live.lines import plain
-from rtshcua.front.cli.live.story import Plan
 from rtshcua.front.cli.unlock import unlock_person
 from rtshcua.ground.agent.specification import parse_specification
 from rtshcua.ground.language.parse import parse

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.session import Flight
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.flight import Flight
-from rtshcua.front.cli.refused import Refused
 from rtshcua.wire.keys import Duty, SigningKey
 
 

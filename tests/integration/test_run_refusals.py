@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters import utc
-from rtshcua.front.cli import meeting
+from rtshcua.app.fly import connect
 from rtshcua.front.cli.app import main
 
 IDENTITY = ("--vehicle", "quad-07")
@@ -21,7 +21,7 @@ IDENTITY = ("--vehicle", "quad-07")
 def here(ground: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """In the ground's folder, with little patience, and no simulated vehicle that could be spoken to."""
     monkeypatch.chdir(ground.folder)
-    monkeypatch.setattr(meeting, "HEARTBEAT_S", 0.3)
+    monkeypatch.setattr(connect, "HEARTBEAT_S", 0.3)
     yield
     assert not Path("runs").exists()
 

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters import utc
+from rtshcua.app.fly import connect
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import meeting
 from rtshcua.front.cli.app import main
 
 
@@ -49,7 +49,7 @@ def test_the_vehicles_time_bounds_ours(ground: Any, capfd: Any, port: int) -> No
 def test_without_it_freshness_is_unknown_until_somebody_states_a_bound(
     ground: Any, capfd: Any, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(meeting, "UTC_S", 0.5)
+    monkeypatch.setattr(connect, "UTC_S", 0.5)
     ground.vehicle(port, 1, "--flavour", "ardupilot", "--fault", "mute,at=0s,message=SYSTEM_TIME")
     step = rehearsed(ground, capfd, port)
     assert (step["outcome"], step["reason"]) == ("defer", "freshness/clock-uncertain"), step

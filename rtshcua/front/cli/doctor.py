@@ -39,6 +39,11 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.app.exit_codes import code_of
+from rtshcua.app.fly.connect import unmet, unopened
+from rtshcua.app.fly.link_signing import Signing
+from rtshcua.app.fly.qualified import record_of
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.replay_check import too_old
 from rtshcua.app.programs import compile_sources
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
@@ -56,11 +61,6 @@ from rtshcua.front.cli.connection import (
 )
 from rtshcua.front.cli.faults import distrust, fail, misaddressed, refuse
 from rtshcua.front.cli.launch import expect_no_source
-from rtshcua.front.cli.meeting import unmet, unopened
-from rtshcua.front.cli.opening import too_old
-from rtshcua.front.cli.qualified import record_of
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.signing import Signing
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.mavlink.parameters import shown
 from rtshcua.model.flat.mission import Mission

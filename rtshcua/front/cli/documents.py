@@ -14,13 +14,13 @@ from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.roots import opened
 from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
 from rtshcua.app.documents import read_bundle
+from rtshcua.app.fly.trust import LAPSED, REVOKED
 from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import error_object, fail
 from rtshcua.front.cli.stdout import out, out_json
-from rtshcua.front.cli.trusting import LAPSED, REVOKED
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now

@@ -9,10 +9,10 @@ from msgspec import structs
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.utc import certain_from_us
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.app.fly.interrupts import Interrupts
+from rtshcua.app.fly.parameters import untold
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.configured import untold
 from rtshcua.front.cli.faults import say
-from rtshcua.front.cli.interrupts import Interrupts
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.page import Page, for_terminal
 from rtshcua.front.cli.showing.why import would_pass

@@ -28,20 +28,21 @@ from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.address import parse as parse_address
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.app.exit_codes import code_of, untrusted
+from rtshcua.app.fly import attesting
+from rtshcua.app.fly.connect import unopened
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.trust import HELPS, trust
 from rtshcua.app.wording import utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli import attesting
 from rtshcua.front.cli.connection import System
+from rtshcua.front.cli.console import TerminalConsole
 from rtshcua.front.cli.document_options import AsJson
 from rtshcua.front.cli.faults import fail, misaddressed, refuse
 from rtshcua.front.cli.known_roles import warn_of_unknown
-from rtshcua.front.cli.meeting import unopened
-from rtshcua.front.cli.refused import Refused
 from rtshcua.front.cli.showing.keys import as_object, speaks
 from rtshcua.front.cli.stdout import out, out_json, out_rendered
-from rtshcua.front.cli.trusting import HELPS, trust
 from rtshcua.front.cli.unlock import read_passphrase, unlock
 from rtshcua.front.cli.width import columns, typed
 from rtshcua.mavlink.signing import KEY_OCTETS
@@ -231,7 +232,8 @@ def provision(
         if slug is not None:
             text = f"the trust root lets no log key {log.kid.hex()} speak for `{vehicle}` now"
             return fail(ExitCode.UNTRUSTED, text, "`--log-key` gives one that it names", slug=slug)
-        own = attesting.boundary_key(root, vehicle, now_us, store, boundary_key, passphrase_file)
+        console = TerminalConsole("lines", data_folder(), passphrase_file)
+        own = attesting.boundary_key(root, vehicle, now_us, console.unlock, boundary_key)
         before = store.provisioned(vehicle)
         if before is not None and (not again or own is None or own.kid == before):
             return _provisioned_before(vehicle, own, again=again)

@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import gettempdir
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP, ListeningBoundary
 from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock, PacedClock, SystemClock
@@ -29,22 +29,21 @@ from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
 from rtshcua.app.documents import no_bundle
 from rtshcua.app.exit_codes import code_of, untrusted, words_of
-from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli import simulated, simulation
-from rtshcua.front.cli.agents import Agents
-from rtshcua.front.cli.attesting import UNNAMED, BoundarySession, Elsewhere, boundary_key, elsewhere
-from rtshcua.front.cli.configured import would_set
-from rtshcua.front.cli.faults import say
-from rtshcua.front.cli.flight import Flight
-from rtshcua.front.cli.interrupts import Interrupts, breakable
-from rtshcua.front.cli.isolating import CODES, IN_USE, Apart, connected, started
-from rtshcua.front.cli.live.feed import Feed
-from rtshcua.front.cli.live.story import Note
-from rtshcua.front.cli.live.telling import Answering
-from rtshcua.front.cli.log_signer import LogSigner
-from rtshcua.front.cli.meeting import APART_UTC_NOTE, LISTENING_UTC_NOTE, UTC_NOTE, await_utc, meet, unopened
-from rtshcua.front.cli.opening import (
+from rtshcua.app.fly import simulated_flight
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.attesting import UNNAMED, BoundarySession, Elsewhere, boundary_key, elsewhere
+from rtshcua.app.fly.boundary import CODES, IN_USE, Apart, connected, started
+from rtshcua.app.fly.connect import APART_UTC_NOTE, LISTENING_UTC_NOTE, UTC_NOTE, await_utc, meet, unopened
+from rtshcua.app.fly.frame_buffer import Tape
+from rtshcua.app.fly.interrupts import Interrupts
+from rtshcua.app.fly.link_signing import Signing
+from rtshcua.app.fly.log_signer import LogSigner
+from rtshcua.app.fly.narrator import Answering
+from rtshcua.app.fly.parameters import would_set
+from rtshcua.app.fly.previous_log import Past
+from rtshcua.app.fly.qualified import record_of, unqualified
+from rtshcua.app.fly.refused import Refused as Refused
+from rtshcua.app.fly.replay_check import (
     broke_off,
     expired,
     flown_before,
@@ -54,16 +53,20 @@ from rtshcua.front.cli.opening import (
     obeys,
     still_flies,
 )
-from rtshcua.front.cli.past import Past
-from rtshcua.front.cli.qualified import record_of, unqualified
-from rtshcua.front.cli.refused import Refused as Refused
+from rtshcua.app.fly.session import Flight
+from rtshcua.app.fly.story import Note
+from rtshcua.app.fly.trust import REVOKED, Trusted, trust
+from rtshcua.app.fly.waiting import Admitted, Waiting
+from rtshcua.app.fly.witnesses import Witnessing
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli import simulated
+from rtshcua.front.cli.console import TerminalConsole
+from rtshcua.front.cli.faults import say
+from rtshcua.front.cli.interrupts import breakable
+from rtshcua.front.cli.live.feed import Feed
 from rtshcua.front.cli.showing.document import HANDED_IN, kind_of_document
-from rtshcua.front.cli.signing import Signing
-from rtshcua.front.cli.tape import Tape
-from rtshcua.front.cli.trusting import REVOKED, Trusted, trust
 from rtshcua.front.cli.unlock import unlock
-from rtshcua.front.cli.waiting import Admitted, Waiting
-from rtshcua.front.cli.witnessed import Witnessing
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.calls import call
@@ -81,7 +84,7 @@ from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 if TYPE_CHECKING:
-    from rtshcua.front.cli.incidents import Incidents
+    from rtshcua.app.fly.incidents import Incidents
 
 #: up to this many times as fast as life, a real vehicle's time limits leave the machine enough
 _UNHURRIED = 5
@@ -140,7 +143,7 @@ class Launch:
     data: Path
     state: Path
     runs: Path
-    style: str
+    style: Literal["screen", "lines", "json"]
     fence: bool = True
     signing_key: Path | None = None
     unsigned_radio: bool = False
@@ -258,14 +261,14 @@ def _launch(order: Launch) -> ExitCode:
             inside = BoundarySession(BoundaryStore(_left_in(order), loaded.vehicle), own_key, aloft=resumed)
             told = trust.settle(resumed=resumed)
             run, moved = _run_folder(order, loaded, bundle, clock, resumed=resumed)
-            feed = view.enter_context(Feed(order.style))
+            feed = view.enter_context(_console(order).view())
             flight = Flight(
                 loaded, vehicle, clock, feed, interrupts, tape, bundle=bundle, root=signed_root, log_key=log_key,
                 run=run, speed=order.speed, live=order.style == "screen", resumed=resumed, events=events,
                 past=past, witnesses=witnesses, agents=agents, incidents=order.incidents, utc=utc, debts=debts,
                 lapsed=lambda: None if resumed else _lapsed(bundle, signed_root, log_key.kid, loaded, clock),
-                simulated=simulation.told(order.speed, own=order.link is None), boundary=inside,
-                answering=_answering(order, run),
+                simulated=simulated_flight.told(order.speed, own=order.link is None), boundary=inside,
+                answering=_answering(order, run), detail_of=_console(order).detail_of,
             )  # fmt: skip
             log_key.hand_over(_signs_no_more)  # nothing in flight needs it, so nothing in flight holds it
             if refusal is not None:
@@ -319,6 +322,10 @@ class _Begun(NamedTuple):
     absent: Refused | OSError | None
     transport: Transport | None = None
     agents: Agents | None = None
+
+
+def _console(order: Launch) -> TerminalConsole:
+    return TerminalConsole(order.style, order.data, order.passphrase_file)
 
 
 def _left_in(order: Launch) -> Path:
@@ -448,13 +455,13 @@ def _boundary_key(
     order: Launch, root: TrustRoot, loaded: Loaded, clock: LinkClock
 ) -> tuple[SigningKey | Elsewhere | None, Refused | None]:
     """The key that the boundary signs with, or why there is none."""
-    store, now_us = KeyStore(order.data), clock.now().utc_us
+    now_us = clock.now().utc_us
     if isinstance(order.listening, Refused):
         return None, _keyless()
     try:
         if order.listening is not None:
             return elsewhere(root, loaded.vehicle, now_us, order.listening.own_public), None
-        return boundary_key(root, loaded.vehicle, now_us, store, order.boundary_key, order.passphrase_file), None
+        return boundary_key(root, loaded.vehicle, now_us, _console(order).unlock, order.boundary_key), None
     except Refused as refused:
         return None, refused
 
@@ -615,7 +622,7 @@ def _wait(
 
         waiting = Waiting(
             base, admit, expect, vehicle, clock, interrupts, agents,
-            most_s=order.wait_s, as_json=order.style == "json", notes=notes,
+            console=_console(order), most_s=order.wait_s, notes=notes,
         )  # fmt: skip
         return waiting.follow(events), trusted
 

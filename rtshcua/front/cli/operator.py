@@ -16,6 +16,7 @@ from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.documents import Claimed
 from rtshcua.app.exit_codes import untrusted
+from rtshcua.app.fly.narrator import REPLACED, Answering, asks
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
@@ -27,7 +28,6 @@ from rtshcua.front.cli.documents import MOST_S, subject
 from rtshcua.front.cli.faults import refuse
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
 from rtshcua.front.cli.live.lines import asked
-from rtshcua.front.cli.live.telling import REPLACED, Answering, asks
 from rtshcua.front.cli.recalling import GOOD_S, HELP, Recalled
 from rtshcua.front.cli.showing.log import Names
 from rtshcua.front.cli.stdout import NewestLines

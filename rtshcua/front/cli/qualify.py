@@ -28,15 +28,15 @@ from rtshcua.adapters.vehicle.bounds import Reach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.app.exit_codes import code_of, exit_code, untrusted
+from rtshcua.app.fly.interrupts import Interrupts
+from rtshcua.app.fly.replay_check import AIR_S
+from rtshcua.app.fly.session import EXIT_CODES
 from rtshcua.app.programs import compile_sources, read_text
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.connection import Connect, LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_us
 from rtshcua.front.cli.faults import fail, misaddressed, say
 from rtshcua.front.cli.findings import Findings
-from rtshcua.front.cli.flight import EXIT_CODES
-from rtshcua.front.cli.interrupts import Interrupts
 from rtshcua.front.cli.launch import IDENTITY_HELP, Launch, Refused, launch
-from rtshcua.front.cli.opening import AIR_S
 from rtshcua.front.cli.refused import say_refused
 from rtshcua.front.cli.showing.qualification import described, told
 from rtshcua.front.cli.stdout import out, out_json

@@ -1,19 +1,17 @@
 """`rtshcua recover`: end the log of a flight that broke off."""
 
 import json
-import secrets
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.last_log import known_end
 from rtshcua.adapters.store.recovery import InUse, Recovered, Signer, examine, recover
-from rtshcua.adapters.utc import UtcWatch
 from rtshcua.app.documents import no_log
+from rtshcua.app.fly.previous_log import signer_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.recovery import RECOVERABLE, Examined, State
@@ -21,7 +19,7 @@ from rtshcua.front.cli.faults import fail, of_each, tell
 from rtshcua.front.cli.outcome import is_log, logs_meant
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.unlock import unlock
-from rtshcua.wire.keys import SEED_BYTES, Duty, SigningKey
+from rtshcua.wire.keys import Duty
 
 app = typer.Typer(add_completion=False)
 
@@ -64,17 +62,6 @@ def recover_logs(
         signer = signer_of(key)
     state = state_dir or state_folder()
     return of_each(logs_meant(logs), lambda path, _: _recover(path, signer, state, as_json=as_json))
-
-
-def signer_of(log_key: SigningKey) -> Signer:
-    """Who ends logs with this key, by this machine's clock, in no more time than a flight can wait."""
-
-    def certify(text: bytes) -> bytes:
-        return log_key.sign(text, duty=Duty.LOG)
-
-    clock = SystemClock()
-    UtcWatch(clock)  # the kernel may vouch for it; nobody else is there
-    return Signer(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), clock.now)
 
 
 def _recover(path: Path, signer: Signer | None, state: Path, *, as_json: bool) -> ExitCode:

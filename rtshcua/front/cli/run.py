@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -17,8 +17,10 @@ from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address, AddressError, Way
 from rtshcua.adapters.vehicle.transport import Transport, open_transport
+from rtshcua.app.fly import witnesses as witnessed
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import simulated, witnessed
+from rtshcua.front.cli import simulated
 from rtshcua.front.cli.configured import Settings, settings_of
 from rtshcua.front.cli.connection import (
     DecidesIn,
@@ -32,12 +34,12 @@ from rtshcua.front.cli.connection import (
     mode_of,
 )
 from rtshcua.front.cli.faults import fail, misaddressed
-from rtshcua.front.cli.refused import Refused, say_refused
+from rtshcua.front.cli.refused import say_refused
 from rtshcua.onboard.enforcement.load import Mode
 from rtshcua.simulation.config import Kind
 
 if TYPE_CHECKING:
-    from rtshcua.front.cli.incidents import Incidents
+    from rtshcua.app.fly.incidents import Incidents
 
 app = typer.Typer(add_completion=False)
 
@@ -230,7 +232,8 @@ def _listening(link: Address | None, stack: ExitStack) -> Transport | None:
 
 
 def _incidents(text: str, flavour: Kind | None, seed: int | None) -> "Incidents":
-    from rtshcua.front.cli.incidents import Incidents, chosen  # compiles sources, which no other run does
+    from rtshcua.app.fly.incidents import Incidents
+    from rtshcua.front.cli.scenario_option import chosen  # compiles sources, which no other run does
 
     return Incidents(chosen(text, time.time_ns() // 1_000), flavour, seed)
 
@@ -312,7 +315,7 @@ def _group(agent_socket: Path | None, operator_socket: Path | None, name: str | 
         return f"there is no group `{name}`"
 
 
-def _style(*, plain: bool, as_json: bool) -> str:
+def _style(*, plain: bool, as_json: bool) -> Literal["screen", "lines", "json"]:
     if as_json:
         return "json"
     terminal = sys.stdout is not None and sys.stdout.isatty() and os.environ.get("TERM", "dumb") != "dumb"

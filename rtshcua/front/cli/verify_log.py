@@ -12,6 +12,7 @@ import typer
 from rtshcua.adapters.store.keystore import read_root
 from rtshcua.adapters.store.verification import Asked, Progress, verify_carefully, verify_quickly
 from rtshcua.app.documents import no_log
+from rtshcua.app.fly.simulated_flight import with_simulated
 from rtshcua.app.pin import Pin, pin
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -21,7 +22,6 @@ from rtshcua.evidence.report import Report, Verdict, cosigned
 from rtshcua.front.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
 from rtshcua.front.cli.faults import distrust, fail, of_each, say
 from rtshcua.front.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_and_others
-from rtshcua.front.cli.simulation import with_simulated
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.front.cli.unconfirmed import UnconfirmedFallbacks
 from rtshcua.front.cli.verdict import as_object, as_text

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 import msgspec
 
+from rtshcua.app.fly.story import Happened, Message
 from rtshcua.front.cli.live.lines import as_json, plain
-from rtshcua.front.cli.live.story import Happened, Message
 from rtshcua.front.cli.width import fitted
 
 EXIT_OK, EXIT_GONE = 0, 1

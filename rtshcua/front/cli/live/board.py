@@ -3,8 +3,8 @@
 from collections import deque
 from typing import NamedTuple
 
+from rtshcua.app.fly.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, tenths
 from rtshcua.front.cli.live.lines import alarm, sentence, waiting_for
-from rtshcua.front.cli.live.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, tenths
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.onboard.runtime.view import Reading, Stage, View
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from rtshcua.front.cli.live.story import Area
+from rtshcua.app.fly.story import Area
 
 #: dots a character: two wide, four high; their bits in U+2800
 _WIDE, _HIGH = 2, 4

@@ -10,7 +10,7 @@ from typing import Self
 
 import msgspec
 
-from rtshcua.front.cli.live.story import Message
+from rtshcua.app.fly.story import Message
 
 _MODULE = "rtshcua.front.cli.live"
 _MOST = 10_000  # messages kept for a view that does not keep up

@@ -6,10 +6,10 @@ from typing import Final
 
 import msgspec
 
+from rtshcua.app.fly.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.evidence.gaps import seconds
-from rtshcua.front.cli.live.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
 from rtshcua.front.cli.width import typed
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED

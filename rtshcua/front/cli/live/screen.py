@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from rtshcua.app.fly.story import Area, Message, duration, tenths
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.front.cli.live.board import Board
 from rtshcua.front.cli.live.chart import FENCE, FLOWN, HOMEWARD, KEEP_OUT, MARK, ZONE, Cell, Chart, chart
 from rtshcua.front.cli.live.lines import ending
-from rtshcua.front.cli.live.story import Area, Message, duration, tenths
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.runtime.view import Stage
 

@@ -6,6 +6,7 @@ from contextlib import suppress
 import msgspec
 
 from rtshcua.app.documents import claimed
+from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import true_to, utc
 from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Sealing, Signed
 from rtshcua.evidence.report import Report, Verdict
@@ -13,7 +14,6 @@ from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.log import Names, detail_of
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.people import NOBODY, People
-from rtshcua.front.cli.simulation import SIMULATED
 from rtshcua.model.durability import SYNCED
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.policy import Policy

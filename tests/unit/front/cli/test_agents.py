@@ -17,10 +17,10 @@ import pytest
 from reference.documents import approval, low, recall, replacement
 from reference.world import Run
 from rtshcua.adapters.agent_socket import GAP_US
+from rtshcua.app.fly.agents import ALIKE, Agents
+from rtshcua.app.fly.narrator import Teller
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.agents import ALIKE, Agents
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.live.telling import Teller
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending, Event, Presented, Reply
 from rtshcua.wire.keys import Duty, SigningKey

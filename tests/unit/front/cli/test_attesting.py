@@ -1,5 +1,6 @@
 """The boundary's key and its sessions, as a run has them."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,12 +9,13 @@ from msgspec.structs import replace
 from rtshcua.adapters.store.boundary import BoundaryStore
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.fly.attesting import BoundarySession, Elsewhere, boundary_key
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.attesting import BoundarySession, Elsewhere, boundary_key
-from rtshcua.front.cli.refused import Refused
+from rtshcua.front.cli.unlock import unlock
 from rtshcua.wire.boundary_chain import START
-from rtshcua.wire.keys import Duty
+from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot, open_root
 from virtual import case
 
@@ -30,9 +32,14 @@ def root(store: KeyStore) -> TrustRoot:
     return open_root(store.root(), pinned=store.pin(), now_us=0)
 
 
+def opened(store: KeyStore) -> Callable[[Duty, Path | None], SigningKey]:
+    """What opens its keys."""
+    return lambda duty, path: unlock(store, duty, path=path)
+
+
 def slug(store: KeyStore, of: TrustRoot, path: Path | None = None) -> str:
     with pytest.raises(Refused) as refused:
-        boundary_key(of, "quad-07", NOW_US, store, path, None)
+        boundary_key(of, "quad-07", NOW_US, opened(store), path)
     return refused.value.slug
 
 
@@ -40,7 +47,7 @@ def test_the_key_store_s_key_or_another_file(store: KeyStore) -> None:
     own = store.signing_key(Duty.BOUNDARY)
     path = store.key_path(Duty.BOUNDARY)
     for given in (None, path):
-        found = boundary_key(root(store), "quad-07", NOW_US, store, given, None)
+        found = boundary_key(root(store), "quad-07", NOW_US, opened(store), given)
         assert found is not None
         assert found.kid == own.kid
 
@@ -50,7 +57,7 @@ def test_a_root_that_names_none_asks_for_none(store: KeyStore) -> None:
     others = tuple(key for key in of.keys if key.duty is not Duty.BOUNDARY)
     elsewhere = replace(store.signing_key(Duty.BOUNDARY).verification(vehicles=("quad-08",)))
     for keys in (others, (*others, elsewhere)):
-        assert boundary_key(replace(of, keys=keys), "quad-07", NOW_US, store, None, None) is None
+        assert boundary_key(replace(of, keys=keys), "quad-07", NOW_US, opened(store), None) is None
 
 
 def test_no_key_or_another_is_refused(store: KeyStore) -> None:

@@ -11,13 +11,13 @@ from reference.documents import approval, cancellation, hand, low, recall, repla
 from reference.flat_case import BATTERY, WIND, S
 from reference.forgery import edit
 from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT_KEY, TICK, FakeVehicle, Run
+from rtshcua.app.fly.narrator import NOTHING_FLIES, Teller
+from rtshcua.app.fly.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.live.lines import ending
-from rtshcua.front.cli.live.story import Summary
-from rtshcua.front.cli.live.telling import NOTHING_FLIES, Teller
 from rtshcua.front.cli.showing.log import Names, detail_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Interrupted, TakenOver
@@ -145,7 +145,7 @@ def test_the_summary_counts_every_decision_as_the_log_does() -> None:
     assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
     run.tick(Interrupted(run.clock.now().monotonic_us))
     run.until_over()
-    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0)
+    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0, detail_of=detail_of)
     counts = dict.fromkeys(teller.outcomes, 0)
     for line in run.lines:
         what, record = teller.tell(line), json.loads(line)
@@ -166,7 +166,7 @@ def test_a_fallback_of_which_no_landing_was_seen_is_in_the_summary_of_run_and_au
     run.until_flies("return_home")
     run.tick(TakenOver(run.clock.now().monotonic_us, "POSCTL"))
     run.until_over()
-    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0)
+    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0, detail_of=detail_of)
     for line in run.lines:
         teller.tell(line)
     (what,) = teller.unconfirmed
@@ -253,7 +253,7 @@ def test_a_step_refused_on_the_ground_flies_nothing(tmp_path: Path, capsys: pyte
     vehicle.values[BATTERY] = 2_000
     run = Run(vehicle=vehicle).until_over()
     assert run.flown == []
-    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0)
+    teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0, detail_of=detail_of)
     told = [what for what in map(teller.tell, run.lines) if what is not None and what.outcome == "fallback"]
     assert told
     assert all(what.target in ("", NOTHING_FLIES) for what in told)

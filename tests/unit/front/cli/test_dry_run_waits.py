@@ -10,9 +10,9 @@ import pytest
 from reference.flat_case import LINK
 from reference.world import START, FakeVehicle, loaded
 from rtshcua.adapters.vehicle.px4 import PX4
+from rtshcua.app.fly.interrupts import Wish
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import dry_run
-from rtshcua.front.cli.interrupts import Wish
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Event, Readings, Ready
 

@@ -14,11 +14,11 @@ from reference.seeds import epoch_seeds
 from rtshcua.adapters.store import runs, telemetry
 from rtshcua.adapters.store.runs import RunFolder
 from rtshcua.adapters.store.writer import EvidenceWriter
+from rtshcua.app.fly.closing import close_log, keep_summary
+from rtshcua.app.fly.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.front.cli.closing import close_log, keep_summary
 from rtshcua.front.cli.live.lines import ending
-from rtshcua.front.cli.live.story import Summary
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.front.cli.flight import Flight
+from rtshcua.app.fly.session import Flight
 
 
 @pytest.mark.parametrize("error", [RuntimeError("bug"), KeyboardInterrupt(), MemoryError(), OSError(5, "gone")])

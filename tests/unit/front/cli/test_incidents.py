@@ -6,10 +6,11 @@ import msgspec
 import pytest
 
 from rtshcua.adapters.simulator import SimulatorError
+from rtshcua.app.fly.incidents import Incidents
+from rtshcua.app.fly.refused import Refused
 from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.incidents import Incidents, chosen
-from rtshcua.front.cli.refused import Refused
+from rtshcua.front.cli.scenario_option import chosen
 from rtshcua.model.flat.situation import Now
 
 S = 1_000_000

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from rtshcua.front.cli import interrupts
-from rtshcua.front.cli.interrupts import Interrupts, Stopped, StopRequest, Wish
+from rtshcua.app.fly import interrupts
+from rtshcua.app.fly.interrupts import Interrupts, Wish
+from rtshcua.front.cli.interrupts import Stopped, StopRequest
 
 
 @pytest.fixture

@@ -18,10 +18,11 @@ from rtshcua.adapters.store.owed import OwedParameters
 from rtshcua.adapters.store.replay import FileReplayStore
 from rtshcua.adapters.store.signing import LinkStore, write_link_key
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.app.fly import replay_check
+from rtshcua.app.fly.previous_log import Past
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import launch, opening
+from rtshcua.front.cli import launch
 from rtshcua.front.cli.configured import settings_of
-from rtshcua.front.cli.past import Past
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.signal import SignalSource
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
@@ -34,7 +35,7 @@ START_CLOCK: Any = SimpleNamespace(now=lambda: START)
 def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
     FileReplayStore(tmp_path, VEHICLE).open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
     with pytest.raises(launch.Refused, match="a later version of `bridge_inspection` than 7") as refused:
-        opening.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), [])
+        replay_check.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), [])
     assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "old-policy")
 
 
@@ -46,16 +47,16 @@ def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_abou
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, armed: bool, landed_state: int, resumes: bool
 ) -> None:
     """On the ground and armed, it may have been told to take off by a run that was killed."""
-    monkeypatch.setattr(opening, "AIR_S", 0.01)
+    monkeypatch.setattr(replay_check, "AIR_S", 0.01)
     of = loaded()
-    opening.mark_opened(tmp_path, of, SystemClock(), cast("Any", Grounded()))
+    replay_check.mark_opened(tmp_path, of, SystemClock(), cast("Any", Grounded()))
     seen = ObservedVehicle(armed=armed, landed_state=landed_state)
     vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
     if resumes:
-        assert opening.broke_off(tmp_path, of, vehicle, SystemClock(), [])
+        assert replay_check.broke_off(tmp_path, of, vehicle, SystemClock(), [])
         return
     with pytest.raises(launch.Refused) as refused:
-        opening.broke_off(tmp_path, of, vehicle, SystemClock(), [])
+        replay_check.broke_off(tmp_path, of, vehicle, SystemClock(), [])
     assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "replayed")
 
 
@@ -64,7 +65,7 @@ def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_abou
 def test_whatever_the_state_folder_says_what_flies_comes_down(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str, armed: bool
 ) -> None:
-    monkeypatch.setattr(opening, "AIR_S", 0.01)
+    monkeypatch.setattr(replay_check, "AIR_S", 0.01)
     folder = FileReplayStore(tmp_path, VEHICLE).folder
     if damage == "empty":
         (folder / "floor").touch()
@@ -83,16 +84,16 @@ def test_whatever_the_state_folder_says_what_flies_comes_down(
     seen = ObservedVehicle(armed=armed, landed_state=2 if armed else 1)
     vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
     if armed:
-        assert opening.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+        assert replay_check.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
         return
     with pytest.raises((launch.Refused, OSError)) as refused:
-        opening.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+        replay_check.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
     if damage in ("empty", "no-versions"):
         assert isinstance(refused.value, launch.Refused)
         assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "damaged")
         flight = Grounded()
         with pytest.raises(launch.Refused, match="damaged"):
-            opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
+            replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
         assert flight.refused
 
 
@@ -149,13 +150,13 @@ class Grounded:
 
 def test_a_bundle_is_marked_once_and_of_two_runs_at_a_time_one_flies(tmp_path: Path) -> None:
     first, second = Grounded(), Grounded()
-    assert opening.flown_before(tmp_path, loaded()) is None
-    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", first))
+    assert replay_check.flown_before(tmp_path, loaded()) is None
+    replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", first))
     assert not first.refused
     with pytest.raises(launch.Refused, match="a bundle flies once"):
-        opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", second))
+        replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", second))
     assert second.refused, "and its log is closed"
-    assert opening.flown_before(tmp_path, loaded()) is not None
+    assert replay_check.flown_before(tmp_path, loaded()) is not None
 
 
 @pytest.mark.parametrize("own", [True, False])
@@ -166,7 +167,7 @@ def test_a_simulated_flight_and_a_real_one_use_up_no_bundle_of_each_other(tmp_pa
     ]
     flew, other = orders if own else reversed(orders)
     of = loaded()
-    opening.mark_opened(launch._left_in(flew), of, SystemClock(), cast("Any", Grounded()))
+    replay_check.mark_opened(launch._left_in(flew), of, SystemClock(), cast("Any", Grounded()))
     assert "a bundle flies once" in (launch._not_begun(flew, of, START_CLOCK) or "")
     assert launch._not_begun(other, of, START_CLOCK) is None
     assert (launch._may_have_flown(flew, of), launch._may_have_flown(other, of)) == (True, False)
@@ -179,7 +180,7 @@ def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -
     (tmp_path / "replay").write_bytes(b"")
     flight = Grounded()
     with pytest.raises(OSError, match=r"exists|Not a directory"):
-        opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
+        replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
     assert flight.refused
 
 
@@ -201,12 +202,12 @@ class Over:
 
 
 def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Path) -> None:
-    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
-    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
+    replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    told = replay_check.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
     assert told == "no command was sent: the bundle can be run again"
-    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
-    assert opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True)), START) is None
-    assert opening.flown_before(tmp_path, loaded()) is not None
+    replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    assert replay_check.give_back(tmp_path, loaded(), cast("Any", Over(used_up=True)), START) is None
+    assert replay_check.flown_before(tmp_path, loaded()) is not None
 
 
 def test_a_flight_whose_log_is_gone_is_not_said_to_have_broken_off(tmp_path: Path) -> None:
@@ -249,29 +250,29 @@ def late(us: int) -> Now:
 
 
 def test_a_bundle_that_expired_is_said_to_have_and_may_not_be_handed_in_again(tmp_path: Path) -> None:
-    refusal = opening.expired(loaded(), late(1))
+    refusal = replay_check.expired(loaded(), late(1))
     assert refusal is not None
     assert refusal.slug == "bundle-expired"
     assert "the bundle expired at 2" in refusal.text
     assert "compile the mission again" in refusal.help
-    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
-    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), late(1))
+    replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    told = replay_check.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), late(1))
     assert told == f"no command was sent, and {refusal.text}; {refusal.help}"
 
 
 def test_a_bundle_that_may_be_fresh_still_is_no_expired_one() -> None:
-    assert opening.expired(loaded(), late(0)) is None
+    assert replay_check.expired(loaded(), late(0)) is None
     unknown = replace(late(1 << 40), utc_error_us=UTC_UNKNOWN_US)
-    assert opening.expired(loaded(), unknown) is None, "nobody knows the time of day"
+    assert replay_check.expired(loaded(), unknown) is None, "nobody knows the time of day"
 
 
 def test_a_disk_that_does_not_give_a_bundle_back_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    opening.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
+    replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
 
     def fails(store: FileReplayStore, digest: bytes) -> None:
         raise OSError(30, "read-only file system")
 
     monkeypatch.setattr(FileReplayStore, "give_back", fails)
-    told = opening.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
+    told = replay_check.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
     assert told == "no command was sent, but the bundle counts as flown: read-only file system"
-    assert opening.flown_before(tmp_path, loaded()) is not None
+    assert replay_check.flown_before(tmp_path, loaded()) is not None

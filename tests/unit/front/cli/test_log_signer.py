@@ -4,9 +4,9 @@ import gc
 
 import pytest
 
+from rtshcua.app.fly.log_signer import LogSigner
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.log_signer import LogSigner
-from rtshcua.front.cli.refused import Refused
 from rtshcua.wire.keys import Duty, SigningKey
 
 SEED, TEXT = bytes(range(32)), b"a checkpoint"

@@ -9,9 +9,9 @@ from rtshcua.adapters.clock import PacedClock, SystemClock
 from rtshcua.adapters.utc import UtcWatch
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.source_time import SourceTime
+from rtshcua.app.fly import connect
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import meeting
-from rtshcua.front.cli.refused import Refused
 from rtshcua.simulation.simulated_mark import marked
 
 
@@ -40,10 +40,10 @@ def test_what_hangs_in_the_air_does_not_wait_for_the_time_of_day(
     hurried: bool, armed: bool, waits: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """3 s of each restart on a machine whose clock nobody sets, where the operator said how far it is off."""
-    monkeypatch.setattr(meeting, "UTC_S", 0.05)
+    monkeypatch.setattr(connect, "UTC_S", 0.05)
     clock, vehicle = SystemClock(), Silent(armed=armed)
     utc = UtcWatch(clock, 500_000, kernel_us=lambda: None)
-    meeting.await_utc(utc, vehicle, clock, 0, patient=True, hurried=hurried)  # type: ignore[arg-type]
+    connect.await_utc(utc, vehicle, clock, 0, patient=True, hurried=hurried)  # type: ignore[arg-type]
     assert (vehicle.polls > 0) == waits
     assert utc.bound.source == "operator"
 
@@ -52,15 +52,15 @@ def test_it_is_not_ready_before_all_that_is_asked_of_it_first_is_known(monkeypat
     """On a busy machine it had all else while a second vehicle was waited for: its first step was deferred as
     uncertain, until the deadline of that was over.
     """
-    monkeypatch.setattr(meeting, "UTC_S", 0.05)
-    monkeypatch.setattr(meeting, "ANOTHER_S", 0.05)
+    monkeypatch.setattr(connect, "UTC_S", 0.05)
+    monkeypatch.setattr(connect, "ANOTHER_S", 0.05)
     clock, vehicle = SystemClock(), Silent(armed=False)
     utc = UtcWatch(clock, 500_000, kernel_us=lambda: None)
     now = clock.now()
     link: Any = object()
     never: Any = SimpleNamespace(wish=lambda: None)
-    meeting.meet(link, None, vehicle, clock, never, signing=never, hurried=False)  # type: ignore[arg-type]
-    meeting.await_utc(utc, vehicle, clock, now.utc_us, patient=True)  # type: ignore[arg-type]
+    connect.meet(link, None, vehicle, clock, never, signing=never, hurried=False)  # type: ignore[arg-type]
+    connect.await_utc(utc, vehicle, clock, now.utc_us, patient=True)  # type: ignore[arg-type]
     assert vehicle.polls > 2
     assert min(vehicle.ready_from_us) > now.monotonic_us + 10**15
     wait_us = vehicle.driver.issued_from_us - now.monotonic_us
@@ -91,12 +91,12 @@ class Telling(Silent):
 
 
 def met_at(speed: float, custom: tuple[list[int], list[int]] | None, monkeypatch: pytest.MonkeyPatch) -> Telling:
-    monkeypatch.setattr(meeting, "ANOTHER_S", 0)
-    monkeypatch.setattr(meeting, "SPEED_S", 0.02)
+    monkeypatch.setattr(connect, "ANOTHER_S", 0)
+    monkeypatch.setattr(connect, "SPEED_S", 0.02)
     vehicle, link = Telling(custom), object()
     never: Any = SimpleNamespace(wish=lambda: None)
     clock = PacedClock(speed)
-    meeting.meet(link, None, vehicle, clock, never, never, hurried=False, speed=speed)  # type: ignore[arg-type]
+    connect.meet(link, None, vehicle, clock, never, never, hurried=False, speed=speed)  # type: ignore[arg-type]
     return vehicle
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from reference.crashed import LOG_KEY, signer, writes
 from rtshcua.adapters.store.recovery import InUse, recover
-from rtshcua.front.cli.past import Past
+from rtshcua.app.fly.previous_log import Past
 
 
 @pytest.fixture

@@ -14,11 +14,11 @@ from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store import memory
 from rtshcua.adapters.store.signing import LinkStore, read_link_key, write_link_key
 from rtshcua.adapters.vehicle import address
+from rtshcua.app.fly.connect import unmet
+from rtshcua.app.fly.link_signing import Signing
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app, launch
-from rtshcua.front.cli.meeting import unmet
-from rtshcua.front.cli.signing import Signing
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink, State

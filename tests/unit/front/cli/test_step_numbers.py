@@ -9,12 +9,12 @@ import pytest
 
 from reference.documents import low, replacement
 from reference.world import Run
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.story import Happened, Happening
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.records import Decision
-from rtshcua.front.cli.agents import Agents
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.live.lines import as_json, plain
-from rtshcua.front.cli.live.story import Happened, Happening
 from rtshcua.front.mcp.server import TOOLS
 from rtshcua.ground.audit.named import ref_words
 from rtshcua.model.step_number import index_of, number_of, step_words

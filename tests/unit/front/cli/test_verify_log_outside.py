@@ -9,12 +9,12 @@ import pytest
 from reference.forgery import LOG_KEY, edit, flight, signed
 from reference.marked import mark, note_of
 from rtshcua.adapters.store.recovery import examine
+from rtshcua.app.fly.simulated_flight import SIMULATED, told
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.recovery import ending
 from rtshcua.evidence.report import Report
 from rtshcua.evidence.witnessing.anchors import Anchored, Witnessed
 from rtshcua.front.cli import app, verify_log
-from rtshcua.front.cli.simulation import SIMULATED, told
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty
 from virtual import case

@@ -16,13 +16,14 @@ from reference.documents import approval, low, recall, replacement
 from reference.world import START
 from rtshcua.adapters.agent_socket import flight_at, hand_in
 from rtshcua.adapters.clock import SystemClock
+from rtshcua.app.fly import waiting
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.interrupts import Interrupts, Wish
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.waiting import Admitted, Waiting
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli import waiting
-from rtshcua.front.cli.agents import Agents
-from rtshcua.front.cli.interrupts import Interrupts, Wish
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.waiting import Admitted, Waiting
+from rtshcua.front.cli.console import TerminalConsole
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event, Presented, Readings
@@ -80,7 +81,7 @@ class World:
         vehicle: Any = self.vehicle
         self.waiting = Waiting(
             base, self.admit, self.expect, vehicle, Clock(), self.interrupts, self.agents,
-            most_s=most_s, as_json=True, notes=["a note"],
+            console=TerminalConsole("json", Path(), None), most_s=most_s, notes=["a note"],
         )  # fmt: skip
         self.ended: Admitted | Refused | None = None
         self.thread = threading.Thread(target=self.run)

@@ -7,10 +7,10 @@ import pytest
 
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.witness_link import Anchor, Trouble
+from rtshcua.app.fly import witnesses
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.witnesses import Witnessing, addresses
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import witnessed
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.witnessed import Witnessing, addresses
 from rtshcua.onboard.ports import Anchored, Noted
 
 THERE = Address("udpout", "127.0.0.1", 14_600)
@@ -58,14 +58,14 @@ def test_a_host_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
     def unknown(host: str) -> str:
         raise socket.gaierror(-2, "Name or service not known")
 
-    monkeypatch.setattr(witnessed.socket, "gethostbyname", unknown)
+    monkeypatch.setattr(witnesses.socket, "gethostbyname", unknown)
     with pytest.raises(Refused) as refused:
         Witnessing([Address("udpout", "nowhere", 1)], KEYS)
     assert (refused.value.code, refused.value.slug) == (ExitCode.LINK, "witness-address")
 
 
 def test_what_comes_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(witnessed, "WitnessClient", Client)
+    monkeypatch.setattr(witnesses, "WitnessClient", Client)
     for closed, waited in ((True, ()), (False, (0,))):
         made = Witnessing([THERE], KEYS)
         made.begin(tmp_path / "log.jsonl", lambda: 0)

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
+from rtshcua.app.fly.story import Happened, Happening, Message, Note, Plan, Signal, Snapshot, Step, Summary
 from rtshcua.front.cli.live.board import Board
 from rtshcua.front.cli.live.chart import chart
 from rtshcua.front.cli.live.lines import as_json, plain, sentence
 from rtshcua.front.cli.live.screen import picture
-from rtshcua.front.cli.live.story import Happened, Happening, Message, Note, Plan, Signal, Snapshot, Step, Summary
 from rtshcua.onboard.runtime.view import Reading, Stage, View
 
 PLAN = Plan(

@@ -4,9 +4,9 @@ import time
 
 import pytest
 
+from rtshcua.app.fly.story import Happened, Happening, Note
 from rtshcua.front.cli.live import feed as feed_module
 from rtshcua.front.cli.live.feed import Feed
-from rtshcua.front.cli.live.story import Happened, Happening, Note
 
 
 def event(number: int) -> Happened:

@@ -5,11 +5,11 @@ from msgspec.structs import replace
 from reference.flat_case import CONTRACTS, MISSION, POLICY, TAKEOFF, WIND, M, S, apply, clause, const, signal
 from reference.forgery import edit
 from reference.world import START, FakeVehicle, Run, loaded
+from rtshcua.app.fly.narrator import Teller
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.front.cli import dry_run
 from rtshcua.front.cli.live.lines import sentence
-from rtshcua.front.cli.live.telling import Teller
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import State

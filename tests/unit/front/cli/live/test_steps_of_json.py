@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from rtshcua.app.fly.narrator import plan_of
 from rtshcua.app.programs import compile_sources
-from rtshcua.front.cli.live.telling import plan_of
 from rtshcua.onboard.calls import call
 
 CHECKOUT = Path(__file__).resolve().parents[5]

@@ -18,12 +18,8 @@ from rich.console import Console
 from reference.documents import ASKED, approval, low, recall
 from reference.flat_case import POLICY, S
 from reference.world import START, Run
-from rtshcua.front.cli.live import screen
-from rtshcua.front.cli.live.board import Board
-from rtshcua.front.cli.live.chart import FENCE, HOMEWARD, KEEP_OUT, ZONE, chart
-from rtshcua.front.cli.live.lines import as_json, plain, typed
-from rtshcua.front.cli.live.screen import picture
-from rtshcua.front.cli.live.story import (
+from rtshcua.app.fly.narrator import Answering, Teller, plan_of
+from rtshcua.app.fly.story import (
     Area,
     Asks,
     Happened,
@@ -37,7 +33,11 @@ from rtshcua.front.cli.live.story import (
     Summary,
     tenths,
 )
-from rtshcua.front.cli.live.telling import Answering, Teller, plan_of
+from rtshcua.front.cli.live import screen
+from rtshcua.front.cli.live.board import Board
+from rtshcua.front.cli.live.chart import FENCE, HOMEWARD, KEEP_OUT, ZONE, chart
+from rtshcua.front.cli.live.lines import as_json, plain, typed
+from rtshcua.front.cli.live.screen import picture
 from rtshcua.onboard.ports import Presented
 from rtshcua.onboard.runtime.view import Reading, Stage, View
 

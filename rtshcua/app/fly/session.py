@@ -17,24 +17,24 @@ from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.adapters.utc import CLOCK, UtcWatch, certain_from_us
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.drain import drained
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.attesting import BoundarySession
+from rtshcua.app.fly.closing import close_log, keep_summary
+from rtshcua.app.fly.console import LiveView
+from rtshcua.app.fly.frame_buffer import Tape
+from rtshcua.app.fly.interrupts import Interrupts, Wish
+from rtshcua.app.fly.log_signer import LogSigner
+from rtshcua.app.fly.narrator import Answering, Teller, plan_of
+from rtshcua.app.fly.parameters import foreign
+from rtshcua.app.fly.previous_log import LOG_BEFORE, Past
+from rtshcua.app.fly.read_back import ReadBack, read_back
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.simulated_flight import SIMULATED
+from rtshcua.app.fly.story import Note, Plan, Snapshot, Summary
+from rtshcua.app.fly.watching import Watching
+from rtshcua.app.fly.witnesses import Witnessing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.front.cli.agents import Agents
-from rtshcua.front.cli.attesting import BoundarySession
-from rtshcua.front.cli.closing import close_log, keep_summary
-from rtshcua.front.cli.configured import foreign
-from rtshcua.front.cli.interrupts import Interrupts, Wish
-from rtshcua.front.cli.live.feed import Feed
-from rtshcua.front.cli.live.story import Note, Plan, Snapshot, Summary
-from rtshcua.front.cli.live.telling import Answering, Teller, plan_of
-from rtshcua.front.cli.live.watching import Watching
-from rtshcua.front.cli.log_signer import LogSigner
-from rtshcua.front.cli.past import LOG_BEFORE, Past
-from rtshcua.front.cli.read_back import ReadBack, read_back
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.simulation import SIMULATED
-from rtshcua.front.cli.tape import Tape
-from rtshcua.front.cli.witnessed import Witnessing
 from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
@@ -43,7 +43,7 @@ from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.runtime import Runtime
 
 if TYPE_CHECKING:
-    from rtshcua.front.cli.incidents import Incidents, Watch
+    from rtshcua.app.fly.incidents import Incidents, Watch
 
 _SEED_BYTES = 32
 
@@ -95,12 +95,13 @@ class Flight:
     """
 
     def __init__(
-        self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: Feed, interrupts: Interrupts,
+        self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: LiveView, interrupts: Interrupts,
         tape: Tape,
         *, bundle: bytes, root: bytes, log_key: LogSigner, run: RunFolder, speed: float, live: bool, resumed: bool,
         events: Sequence[Event], past: Past, boundary: BoundarySession, witnesses: Witnessing, utc: UtcWatch,
         lapsed: Callable[[], Refused | None], debts: OwedParameters, agents: Agents | None = None,
         simulated: str | None = None, incidents: "Incidents | None" = None, answering: Answering | None = None,
+        detail_of: Callable[[str, str], str],
     ) -> None:  # fmt: skip
         self._loaded = loaded
         self._vehicle = vehicle
@@ -122,7 +123,7 @@ class Flight:
         now = clock.now()
         self._start_us = now.monotonic_us
         policy, mission = loaded.bundle.policy, loaded.bundle.mission
-        self._teller = Teller(policy, mission, self._start_us, answering)
+        self._teller = Teller(policy, mission, self._start_us, answering, detail_of)
         self._steps = StepWatch()
         self._sink = EvidenceWriter(log)
         genesis = self._recorder.genesis(

@@ -3,10 +3,10 @@
 import time
 from collections.abc import Callable, Sequence
 
-from rtshcua.front.cli.agents import Agents
-from rtshcua.front.cli.live.feed import Feed
-from rtshcua.front.cli.live.story import Happened, Note, Plan, Snapshot
-from rtshcua.front.cli.live.telling import REPLACED, Teller
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.console import LiveView
+from rtshcua.app.fly.narrator import REPLACED, Teller
+from rtshcua.app.fly.story import Happened, Note, Plan, Snapshot
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Event
 from rtshcua.onboard.runtime.view import Stage, View
@@ -22,8 +22,8 @@ class Watching:
     """
 
     def __init__(
-        self, feed: Feed, teller: Teller, view: Callable[[Now], View], unready: Callable[[], str | None], *, live: bool,
-        replan: Callable[[], Plan] | None = None, agents: Agents | None = None,
+        self, feed: LiveView, teller: Teller, view: Callable[[Now], View], unready: Callable[[], str | None], *,
+        live: bool, replan: Callable[[], Plan] | None = None, agents: Agents | None = None,
     ) -> None:  # fmt: skip
         self._feed = feed
         self._teller = teller

@@ -15,10 +15,10 @@ import msgspec
 from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import NO_LINE, AgentSocket, Encoded
-from rtshcua.front.cli.showing import words
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import number_of
+from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Action, Append, Event, Presented, Reply
 from rtshcua.wire import names
@@ -302,7 +302,7 @@ class Agents:
                 "step_number": number_of(each.step),
                 "phase": mission.phases[each.phase],
                 "skill": each.contract.name,
-                "text": words.call(bundle.policy, each),
+                "text": call(bundle.policy, each),
                 "id": each.invocation_id.hex(),
                 "binding": each.binding.hex(),
             }

@@ -13,20 +13,20 @@ import msgspec
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.console import Console
+from rtshcua.app.fly.interrupts import Interrupts
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.agents import Agents
-from rtshcua.front.cli.faults import say
-from rtshcua.front.cli.interrupts import Interrupts
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.showing.document import kind_of_document
-from rtshcua.front.cli.stdout import out_json
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event, Presented, Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.onboard.runtime.seen import value_in_words
 from rtshcua.wire import names
+from rtshcua.wire.document import kind_of
 from rtshcua.wire.receipt import Receipt, decode
+from rtshcua.wire.untrusted import Untrusted
 
 #: how often who follows is told how the vehicle is, in seconds
 TOLD_S: Final = 1.0
@@ -58,7 +58,7 @@ class Waiting:
     def __init__(
         self, base: Loaded, admit: Callable[[bytes], Loaded | Refusal], expect: Callable[[], None],
         vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, agents: Agents, *,
-        most_s: float, as_json: bool, notes: Sequence[str] = (),
+        console: Console, most_s: float, notes: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self._base = base
         self._admit = admit
@@ -68,7 +68,7 @@ class Waiting:
         self._interrupts = interrupts
         self._agents = agents
         self._most_s = most_s
-        self._as_json = as_json
+        self._console = console
         self._notes = notes
         self._monitor = StateMonitor(base.policy)
         self._refused = 0
@@ -108,7 +108,7 @@ class Waiting:
     def _handed_in(self) -> Admitted | None:
         found = self._agents.events(self._clock.now())
         for text in self._agents.notes():
-            say(f"note: {text}")
+            self._console.say(f"note: {text}")
         for number, event in enumerate(found):
             if isinstance(event, Presented):
                 admitted = self._take(event)
@@ -118,7 +118,7 @@ class Waiting:
         return None
 
     def _take(self, event: Presented) -> Admitted | None:
-        kind = kind_of_document(event.document)
+        kind = _kind_of(event.document)
         if kind is names.RECALL:
             receipt = decode(self._base.boundary.present(event.document, self._clock.now(), 0))
             assert isinstance(receipt, Receipt)
@@ -170,7 +170,15 @@ class Waiting:
 
     def _tell(self, event: str, text: str, **more: object) -> None:
         """Say how it stands: a line for a person, an object for a program."""
-        if self._as_json:
-            out_json(_encode({"event": event, "text": text} | more).decode(), flush=True)
+        if self._console.as_json:
+            self._console.emit({"event": event, "text": text} | more)
         else:
-            say(text)
+            self._console.say(text)
+
+
+def _kind_of(data: bytes) -> names.Artefact | None:
+    """Which kind of document these bytes are, if they are one."""
+    try:
+        return kind_of(data)
+    except Untrusted:
+        return None

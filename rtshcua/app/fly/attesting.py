@@ -1,15 +1,14 @@
 """The boundary's key and its sessions, for a flight: what it signs its own evidence with."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from errno import ENOSPC
 from pathlib import Path
 
 from rtshcua.adapters.store.boundary import BoundaryStore, DamagedState
-from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.exit_codes import code_of, untrusted
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.unlock import unlock
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.keys import Duty, SigningKey, key_id
@@ -22,14 +21,14 @@ UNNAMED = "the trust root names no boundary key for it: what is decided is not s
 
 
 def boundary_key(
-    root: TrustRoot, vehicle: str, now_us: int, store: KeyStore, path: Path | None, passphrase_file: Path | None
+    root: TrustRoot, vehicle: str, now_us: int, unlock: Callable[[Duty, Path | None], SigningKey], path: Path | None
 ) -> SigningKey | None:
     """The key that the boundary signs with; None where the root asks for none. Raises `Refused`."""
     good = _named(root, vehicle, now_us)
     if not good:
         return None
     try:
-        key = unlock(store, Duty.BOUNDARY, path=path, passphrase_file=passphrase_file)
+        key = unlock(Duty.BOUNDARY, path)
     except Untrusted as error:
         raise Refused(code_of(error.slug), *untrusted(error)) from None
     except FileNotFoundError as error:

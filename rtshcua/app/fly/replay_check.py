@@ -10,11 +10,11 @@ from typing import Final
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.store.replay import FileReplayStore, looked_up
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.session import Flight
 from rtshcua.app.wording import utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.flight import Flight
-from rtshcua.front.cli.refused import Refused
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now

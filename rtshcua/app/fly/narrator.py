@@ -1,20 +1,16 @@
 """From evidence lines and the loaded bundle to what the view is told, and to the counts of the summary."""
 
 from base64 import b64decode
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import cos, isqrt, pi, sin
 from typing import Final, NamedTuple
 
 import msgspec
 
 from rtshcua.adapters.preparation import PERMITTED
+from rtshcua.app.fly.story import Area, Asks, Happening, Plan, Signal, Step
 from rtshcua.decision.outline import rings
 from rtshcua.evidence.log_writer import BOUNDARY
-from rtshcua.front.cli.live.story import Area, Asks, Happening, Plan, Signal, Step
-from rtshcua.front.cli.showing.document import said
-from rtshcua.front.cli.showing.log import detail_of
-from rtshcua.front.cli.showing.words import call, duration
-from rtshcua.front.cli.unconfirmed import is_unconfirmed
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
@@ -22,8 +18,14 @@ from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.flat.zone import CIRCLE, Zone
 from rtshcua.model.outcome import Reason
+from rtshcua.model.quantity import Dimension, display
 from rtshcua.model.step_number import number_of, step_words
+from rtshcua.onboard.calls import call
+from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
+from rtshcua.wire import cose, names
 from rtshcua.wire.approval import ApprovalDocument
+from rtshcua.wire.bundle import parse_unverified
+from rtshcua.wire.document import kind_of
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
@@ -123,9 +125,14 @@ class Teller:
 
     `outcomes` counts every decision of the log, on steps and on links alike: as `rtshcua verify-log` does.
     `unconfirmed` names the fallbacks of which no landing was seen. `answering`: how a person answers, where one can.
+    `detail_of` gives an effect's detail in words, by its event.
     """
 
-    def __init__(self, policy: Policy, mission: Mission, start_us: int, answering: Answering | None = None) -> None:
+    def __init__(
+        self, policy: Policy, mission: Mission, start_us: int, answering: Answering | None = None,
+        detail_of: Callable[[str, str], str] = lambda event, detail: detail,
+    ) -> None:  # fmt: skip
+        self._detail_of = detail_of
         self._policy = policy
         self._mission = mission
         self._start_us = start_us
@@ -162,11 +169,11 @@ class Teller:
         self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
         if record.event == "succeeded" and record.kind == STEP:
             self.done.add(record.step)
-        if is_unconfirmed(record.kind, record.detail):
+        if record.kind > STEP and record.detail == UNCONFIRMED:
             self.unconfirmed.append(subject)
         if record.event == REPLACED:
             return Happening(record.event, t_us, record.step, detail=f"from {step_words(record.step)} on")
-        detail = detail_of(record.event, record.detail)
+        detail = self._detail_of(record.event, record.detail)
         role = _agreed(record.detail) if record.event == "approval" else ""
         return Happening(record.event, t_us, record.step, subject, detail=detail, role=role)
 
@@ -184,7 +191,7 @@ class Teller:
         window_us = max((self._looks_back(code) for code in self._codes(text)), default=0)
         if window_us <= t_us:
             return ""
-        return f"it looks back {duration(window_us)}, and observation began with the run"
+        return f"it looks back {display(window_us, Dimension.DURATION)}, and observation began with the run"
 
     def _codes(self, text: str) -> Iterator[tuple[int, ...]]:
         """The codes of the rules and clauses of the policy and the mission that are written so."""
@@ -245,7 +252,10 @@ def _commands(answering: Answering, step: int, roles: tuple[str, ...], replaced:
 def _agreed(detail: str) -> str:
     """The role of whoever agreed by the document that a log holds; empty where it is no yes."""
     try:
-        body = said(b64decode(detail, validate=True)).body
+        document = b64decode(detail, validate=True)
+        if kind_of(document) is not names.APPROVAL:
+            return ""
+        body = parse_unverified(names.APPROVAL, cose.unverified(document).payload, ApprovalDocument)
     except (ValueError, Untrusted):
         return ""
-    return body.role if isinstance(body, ApprovalDocument) and body.granted else ""
+    return body.role if body.granted else ""

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.refused import Refused
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 
 

@@ -11,11 +11,11 @@ from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.app.fly.interrupts import Interrupts
+from rtshcua.app.fly.link_signing import Signing
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.interrupts import Interrupts
-from rtshcua.front.cli.refused import Refused
-from rtshcua.front.cli.signing import Signing
 from rtshcua.onboard.ports import Event
 from rtshcua.simulation.simulated_mark import hundredths, marked_speed
 

@@ -9,9 +9,9 @@ from rtshcua.adapters.loop import append_all
 from rtshcua.adapters.store.runs import LOG, SUMMARY, TELEMETRY, RunFolder
 from rtshcua.adapters.store.telemetry import TelemetryFile
 from rtshcua.adapters.store.writer import EvidenceWriter
+from rtshcua.app.fly.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.front.cli.live.story import Summary
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending

@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 from rtshcua.adapters.store.keystore import KeyStore, read_root
 from rtshcua.adapters.store.roots import RootStore, in_force, opened
 from rtshcua.app.exit_codes import code_of, exit_code_of, untrusted, words_of
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.refused import Refused
 from rtshcua.wire import cose
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted

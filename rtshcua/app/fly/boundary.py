@@ -7,9 +7,9 @@ from typing import Final
 from msgspec.structs import replace
 
 from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, ListeningBoundary
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.refused import Refused
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedExecutor, IsolatedGate, OwnTime

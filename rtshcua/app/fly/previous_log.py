@@ -1,16 +1,18 @@
 """What was before a flight: the vehicle's last log, ended if it was not, and named by the next one."""
 
+import secrets
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
+from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.last_log import Earlier, LastLog
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
-from rtshcua.adapters.store.recovery import alone, look, recover
-from rtshcua.front.cli.recover import signer_of
+from rtshcua.adapters.store.recovery import Signer, alone, look, recover
+from rtshcua.adapters.utc import UtcWatch
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.left import Left, left_by
-from rtshcua.wire.keys import SigningKey
+from rtshcua.wire.keys import SEED_BYTES, Duty, SigningKey
 
 #: the effect that says, in the signed log, what there was to tell of the one before
 LOG_BEFORE = "log-before"
@@ -80,3 +82,14 @@ class Past:
         with suppress(OSError):
             self._last.end(self._log, self.hash, last)
         self._held.close()
+
+
+def signer_of(log_key: SigningKey) -> Signer:
+    """Who ends logs with this key, by this machine's clock, in no more time than a flight can wait."""
+
+    def certify(text: bytes) -> bytes:
+        return log_key.sign(text, duty=Duty.LOG)
+
+    clock = SystemClock()
+    UtcWatch(clock)  # the kernel may vouch for it; nobody else is there
+    return Signer(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), clock.now)

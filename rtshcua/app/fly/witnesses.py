@@ -7,8 +7,8 @@ from pathlib import Path
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address, Way
 from rtshcua.adapters.witness_link import Anchor, WitnessClient
+from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.refused import Refused
 from rtshcua.onboard.ports import Anchored, Event, Noted
 
 

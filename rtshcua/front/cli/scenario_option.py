@@ -1,0 +1,36 @@
+"""`run --scenario FILE:NAME`: the scenario that is meant."""
+
+from pathlib import Path
+
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.fly.refused import Refused
+from rtshcua.app.programs import read_sources
+from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.ground.pipeline.suite import scenarios
+from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.mavlink import dialect
+
+
+def chosen(text: str, issued_at_us: int) -> ScenarioFlight:
+    """The scenario that `FILE` or `FILE:NAME` means. Raises `Refused`, and OSError for a file that cannot be read."""
+    path, name = _split(text)
+    program = read_sources([path]).program
+    found = scenarios(program, dialect.load(), issued_at_us)
+    if has_errors(found.diagnostics):
+        code = exit_code(found.diagnostics)
+        if code is ExitCode.INPUT:
+            raise Refused(code, "input", found.diagnostics[0].message, found.diagnostics[0].help)
+        raise Refused(code, "sources", f"`{path}` has errors", f"`rtshcua check {path}` shows them")
+    names = [each.scenario.name for each in found.found]
+    fits = [each for each in found.found if name in ("", each.scenario.name)]
+    if len(fits) == 1:
+        return fits[0]
+    listed = ", ".join(f'"{each}"' for each in names) or "none"
+    what = f"no scenario `{name}`" if name else "no scenario" if not names else f"{len(names)} scenarios"
+    raise Refused(ExitCode.USAGE, "usage", f"`{path}` has {what}", f"name one, as in `{path}:NAME`; there are {listed}")
+
+
+def _split(text: str) -> tuple[Path, str]:
+    path, _, name = text.partition(".rts:")
+    return (Path(path + ".rts"), name) if name else (Path(text), "")

@@ -10,10 +10,9 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Decision
-from rtshcua.ground.testing.coverage.coverage import Reached
-from rtshcua.ground.testing.coverage.reached import reached
-from rtshcua.ground.testing.coverage.universe import universe
-from rtshcua.ground.testing.flown import JUDGED, Tried, Wrong
+from rtshcua.ground.testing.clause_coverage import ReachedGoals, reached_goals
+from rtshcua.ground.testing.coverage_goals import universe_of
+from rtshcua.ground.testing.reporting import JUDGED, FlightFailure, FlightResult
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.scenario import Scenario
@@ -40,18 +39,18 @@ class Trial:
     field: Field
     with_coverage: bool = False
 
-    def fly(self, flight: Try) -> Tried:
+    def fly(self, flight: Try) -> FlightResult:
         """One of them."""
         began_ns = perf_counter_ns()
         was = self.field.flown(flight.scenario, flight.flavour, flight.seed)
         verdict = judge(was)
-        wrong = [Wrong(JUDGED, each.slug, each.text) for each in verdict.failures]
+        wrong = [FlightFailure(JUDGED, each.slug, each.text) for each in verdict.failures]
         wrong += [
-            Wrong(number, "expectation", each.found)
+            FlightFailure(number, "expectation", each.found)
             for number, each in enumerate(expectations(was, verdict))
             if not each.met
         ]
-        return Tried(
+        return FlightResult(
             flight.number,
             flight.flavour,
             flight.seed,
@@ -64,10 +63,10 @@ class Trial:
             was.notes,
         )
 
-    def lost(self, flight: Try) -> Tried:
+    def lost(self, flight: Try) -> FlightResult:
         """One that no process survived."""
-        wrong = (Wrong(JUDGED, LOST, DIED),)
-        return Tried(flight.number, flight.flavour, flight.seed, "none", wrong, (), (), ())
+        wrong = (FlightFailure(JUDGED, LOST, DIED),)
+        return FlightResult(flight.number, flight.flavour, flight.seed, "none", wrong, (), (), ())
 
 
 def tries(scenario: Scenario) -> Iterator[Try]:
@@ -79,7 +78,7 @@ def tries(scenario: Scenario) -> Iterator[Try]:
             number += 1
 
 
-def _reached(was: ScenarioFlown) -> Iterator[Reached]:
+def _reached(was: ScenarioFlown) -> Iterator[ReachedGoals]:
     """What each decision on a step covers, as `rtshcua why` explains it from its record.
 
     One that was not decided as the step that was compiled would be is of a replacement, which covers nothing.
@@ -90,7 +89,7 @@ def _reached(was: ScenarioFlown) -> Iterator[Reached]:
     invocations = prepare_mission(was.mission, policy)
     if isinstance(invocations, Refusal):
         return
-    goals = universe(policy)
+    goals = universe_of(policy)
     for life in was.lives:
         for line in life.lines:
             record = read(line)
@@ -100,4 +99,4 @@ def _reached(was: ScenarioFlown) -> Iterator[Reached]:
                 invocation = invocations[record.step]
                 found = trace(invocation, state_of(record), policy, context_of(record), now_of(record))
                 if (found.decision.outcome.name.lower(), found.decision.reason) == (record.outcome, record.reason):
-                    yield reached(goals, invocation, found)
+                    yield reached_goals(goals, invocation, found)

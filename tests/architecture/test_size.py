@@ -11,11 +11,11 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 850,
+    "modules": 845,
     "code lines": 84_039,
-    "shared class names": 149,
-    "of them across packages": 123,
-    "shared file names": 107,
+    "shared class names": 139,
+    "of them across packages": 117,
+    "shared file names": 101,
     "import cycles": 0,
     "modules below 80 lines with one importer": 57,
     "functions of more than 60 lines": 22,

@@ -13,7 +13,7 @@ from rtshcua.front.cli import app
 from rtshcua.front.cli.table import COMMANDS
 from rtshcua.front.cli.testing.running import ISSUED_AT_US
 from rtshcua.ground.pipeline.suite import scenarios
-from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.mavlink import dialect
 from rtshcua.virtual import development
 from rtshcua.virtual.expectations import expectations

@@ -5,8 +5,8 @@ from pathlib import Path
 from reference.sources import LIBRARY
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.case import Suite
-from rtshcua.ground.testing.run import Ran, run_case
+from rtshcua.ground.testing.case import CaseSuite
+from rtshcua.ground.testing.case_result import CaseResult, run_case
 from rtshcua.mavlink import dialect
 
 IMPORT = 'import "lib:policies/bridge_inspection.rts"\n'
@@ -34,7 +34,7 @@ def program(text: str, **files: str) -> Program:
     return load(["probe.rts"], read, LIBRARY)
 
 
-def made(text: str, before: str = IMPORT + NOMINAL, **files: str) -> Suite:
+def made(text: str, before: str = IMPORT + NOMINAL, **files: str) -> CaseSuite:
     """The cases of a source."""
     return suite(program(before + text, **files), dialect.load())
 
@@ -44,7 +44,7 @@ def found(text: str, before: str = IMPORT + NOMINAL, **files: str) -> list[tuple
     return [(each.code.id, each.message, each.help) for each in made(text, before, **files).diagnostics]
 
 
-def ran(text: str, before: str = IMPORT + NOMINAL, **files: str) -> list[Ran]:
+def ran(text: str, before: str = IMPORT + NOMINAL, **files: str) -> list[CaseResult]:
     """The cases of a source in which nothing is found, decided."""
     cases = made(text, before, **files)
     assert cases.diagnostics == (), cases.diagnostics

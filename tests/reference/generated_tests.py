@@ -8,9 +8,8 @@ from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.testing import case as cases
-from rtshcua.ground.testing.boundaries.generate import Generated, generate
-from rtshcua.ground.testing.boundaries.plan import Plan
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.boundaries.generation import GeneratedTests, GenerationPlan, generate
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -18,7 +17,7 @@ DIALECT = dialect.load()
 ENTRY = ((104_967, 113_402),)  # of bridge_a, local mm
 
 
-def play(text: str, others: Mapping[str, str]) -> cases.Suite:
+def play(text: str, others: Mapping[str, str]) -> cases.CaseSuite:
     """The cases of a text; `others` are files beside it."""
 
     def read(path: str) -> bytes:
@@ -30,7 +29,7 @@ def play(text: str, others: Mapping[str, str]) -> cases.Suite:
     return suite(load(["tests.rts"], read, str(CHECKOUT)), DIALECT)
 
 
-def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) -> Generated:
+def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) -> GeneratedTests:
     """What is generated of the one policy in a text, which is in the file `name`, and imported as `imports`."""
 
     def read(path: str) -> bytes:
@@ -38,11 +37,13 @@ def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) 
 
     checked = examine_program(load([name], read, str(CHECKOUT)), DIALECT)
     (ground,) = checked.grounds
-    plan = Plan(skills, (imports,), None, None, ENTRY)
-    return generate(cases.Tested(ground.lowered, ground.prepared), plan, lambda draft: play(draft, {name: text}))
+    plan = GenerationPlan(skills, (imports,), None, None, ENTRY)
+    return generate(
+        cases.PolicyUnderTest(ground.lowered, ground.prepared), plan, lambda draft: play(draft, {name: text})
+    )
 
 
-def wrong(of: Generated, others: Mapping[str, str]) -> Iterator[str]:
+def wrong(of: GeneratedTests, others: Mapping[str, str]) -> Iterator[str]:
     """The cases that the language refuses, then those that are not met, as they are found."""
     assert of.text is not None
     played = play(of.text, others)
@@ -50,11 +51,11 @@ def wrong(of: Generated, others: Mapping[str, str]) -> Iterator[str]:
     yield from (case.name for case in played.cases if not run_case(case).met)
 
 
-def failures(of: Generated, others: Mapping[str, str]) -> list[str]:
+def failures(of: GeneratedTests, others: Mapping[str, str]) -> list[str]:
     """The cases that are not met, or that the language refuses."""
     return list(wrong(of, others))
 
 
-def noticed(of: Generated, others: Mapping[str, str]) -> bool:
+def noticed(of: GeneratedTests, others: Mapping[str, str]) -> bool:
     """Whether any is; the first one is enough."""
     return next(wrong(of, others), None) is not None

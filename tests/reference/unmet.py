@@ -3,7 +3,7 @@
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 
 

@@ -14,7 +14,7 @@ from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.app.fly.refused import Refused
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.model.faults import AgentFault, HostFault
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

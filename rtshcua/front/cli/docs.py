@@ -28,7 +28,7 @@ from rtshcua.ground.pipeline.program import Checked, compile_program
 from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.report.cases import Tried
 from rtshcua.ground.report.handbook import Flown, Part, called, handbook
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.ground.versions.raised import compare
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.scenarios import ScenarioDecl

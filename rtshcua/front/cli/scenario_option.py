@@ -8,7 +8,7 @@ from rtshcua.app.programs import read_sources
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.ground.pipeline.suite import scenarios
-from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.mavlink import dialect
 
 

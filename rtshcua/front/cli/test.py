@@ -20,9 +20,15 @@ from rtshcua.front.cli.testing.generating import Wanted, generate
 from rtshcua.front.cli.testing.running import Results, run_all
 from rtshcua.front.cli.testing.told import Told
 from rtshcua.front.cli.width import fitted
-from rtshcua.ground.testing.coverage.coverage import enough, share
-from rtshcua.ground.testing.flown import flown_json, flown_suites
-from rtshcua.ground.testing.report import coverage_json, suites, summary_json, tests_json
+from rtshcua.ground.testing.clause_coverage import enough, share
+from rtshcua.ground.testing.reporting import (
+    case_suites,
+    coverage_json,
+    scenario_suites,
+    scenarios_json,
+    summary_json,
+    tests_json,
+)
 
 app = typer.Typer(add_completion=False)
 
@@ -154,7 +160,8 @@ def _finish(
     findings.report((*results.diagnostics, *failed), results.sources)
     if junit_file is not None:
         write_out(
-            junit_file, junit((*suites(ran, results.sources, covered), *flown_suites(flown, results.sources))).encode()
+            junit_file,
+            junit((*case_suites(ran, results.sources, covered), *scenario_suites(flown, results.sources))).encode(),
         )
     code = exit_code(results.diagnostics) if has_errors(results.diagnostics) else ExitCode.OK
     short = covered is not None and least is not None and not enough([one.coverage for one in covered], least)
@@ -173,7 +180,7 @@ def _finish(
     return findings.finish(
         code,
         tests=tests_json(ran, results.sources),
-        scenarios=flown_json(flown, results.sources),
+        scenarios=scenarios_json(flown, results.sources),
         summary=summary_json(ran) | {"left_out": results.left_out},
         coverage=None if shares is None else shares | {"least": least, "enough": not short},
     )

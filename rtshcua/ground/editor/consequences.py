@@ -14,8 +14,8 @@ from rtshcua.ground.editor.desk import View
 from rtshcua.ground.editor.moved import parts
 from rtshcua.ground.editor.targets import Occurrence, Sort, Target
 from rtshcua.ground.pipeline.program import Compilation
-from rtshcua.ground.testing.case import Case
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case import PolicyCase
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name, Node
@@ -29,7 +29,7 @@ class Judged(NamedTuple):
     """What is found in a program without proofs, and the cases of its tests; none where it has errors."""
 
     found: tuple[Diagnostic, ...]
-    cases: tuple[Case, ...]
+    cases: tuple[PolicyCase, ...]
 
 
 class Renamed(NamedTuple):
@@ -124,7 +124,7 @@ def _moved(span: Span, made: Renamed) -> Span:
     return Span(span.file, span.start + by_start, span.end + by_end)
 
 
-def _decisions(cases: Iterable[Case]) -> list[tuple[object, ...]]:
+def _decisions(cases: Iterable[PolicyCase]) -> list[tuple[object, ...]]:
     """What the cases come to, in order."""
     ran = [run_case(case) for case in cases]
     return [(each.case.row, each.met, each.trace.decision.outcome, each.trace.decision.reason) for each in ran]

@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.editor.desk import View
-from rtshcua.ground.testing.case import Case
-from rtshcua.ground.testing.clauses import REST
+from rtshcua.ground.testing.case import PolicyCase
+from rtshcua.ground.testing.clause_quotes import REST
 from rtshcua.model.flat.policy import Rule
 from rtshcua.model.ir.scenarios import Decides
 from rtshcua.model.ir.tests import Expectation, Quoted, TestDecl
@@ -20,7 +20,7 @@ from rtshcua.model.ir.tests import Expectation, Quoted, TestDecl
 Characters = list[tuple[str, Span | None]]
 
 
-def quoted(view: View, cases: Iterable[Case], places: Collection[Span]) -> tuple[Span, ...]:
+def quoted(view: View, cases: Iterable[PolicyCase], places: Collection[Span]) -> tuple[Span, ...]:
     """The parts of a program's quotations that stand for `places`; `cases` are those of its tests."""
     by_file: dict[str, list[Span]] = {}
     for place in places:
@@ -30,7 +30,7 @@ def quoted(view: View, cases: Iterable[Case], places: Collection[Span]) -> tuple
     return tuple(dict.fromkeys(found))
 
 
-def unread(view: View, cases: Iterable[Case], name: str) -> Span | None:
+def unread(view: View, cases: Iterable[PolicyCase], name: str) -> Span | None:
     """A quotation with `name` in it whose test has an error, so that nobody knows what it quotes; None if none."""
     word = _word(name)
     known = {case.expected.span for case in cases}
@@ -62,7 +62,7 @@ def _expectations(test: TestDecl) -> Sequence[Expectation]:
     return (*own, *(row.expectation for row in rows))
 
 
-def _within(view: View, case: Case, clause: Quoted, places: dict[str, list[Span]]) -> Iterator[Span]:
+def _within(view: View, case: PolicyCase, clause: Quoted, places: dict[str, list[Span]]) -> Iterator[Span]:
     file, start, end = clause.span
     if view.slice(Span(file, start + 1, end - 1)) != clause.text:
         return  # characters are escaped in it

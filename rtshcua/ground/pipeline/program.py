@@ -26,9 +26,9 @@ from rtshcua.ground.pipeline.pins import Pins, claims
 from rtshcua.ground.prove.mission_bounds import Bounds, bounds_of, greatest
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.proofs import prove_mission, prove_policy, report_refused
-from rtshcua.ground.testing.case import Case, Tested
-from rtshcua.ground.testing.cases import cases_of
-from rtshcua.ground.testing.scenarios import ScenarioFlight, UnderScenario, scenarios_of
+from rtshcua.ground.testing.case import PolicyCase, PolicyUnderTest
+from rtshcua.ground.testing.case_lowering import cases_of
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight, ScenarioMission, scenarios_of
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -166,8 +166,8 @@ class Compilation:
         self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], ProofContext | None] = {}
-        self._tested: dict[tuple[str, str], Tested | None] = {}
-        self._flown: dict[str, UnderScenario] = {}
+        self._tested: dict[tuple[str, str], PolicyUnderTest | None] = {}
+        self._flown: dict[str, ScenarioMission] = {}
         data = DataFiles(program.data, program.data_names)
         self.context = Context(collect(program.units, program.broken), self.report, dialect, data=data)
         if self.whole:
@@ -244,8 +244,8 @@ class Compilation:
         self.planned.setdefault(mission.name.text, Planned(under.lowered, flat, mission))
         bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat))
         self.bounds[mission.name.text] = greatest(bounds, self.bounds.get(mission.name.text))
-        tested = Tested(under.lowered, under.prepared)
-        self._flown.setdefault(mission.name.text, UnderScenario(tested, flat, mission))  # the first has the defaults
+        tested = PolicyUnderTest(under.lowered, under.prepared)
+        self._flown.setdefault(mission.name.text, ScenarioMission(tested, flat, mission))  # the first has the defaults
         return under.lowered.policy, flat
 
     def _issued(self, mission: MissionDecl) -> int:
@@ -284,7 +284,7 @@ class Compilation:
             if vehicle is not None and all(name != policy.name.text for name, _ in self._tested):
                 self._under_test(policy, vehicle)
 
-    def cases(self) -> tuple[Case, ...]:
+    def cases(self) -> tuple[PolicyCase, ...]:
         """What the tests of the file that was asked for come to, if nothing is wrong with the declarations."""
         if self.report.failed() or not self.context.symbols.tests:
             return ()
@@ -296,17 +296,19 @@ class Compilation:
             return ()
         return tuple(scenarios_of(self.context, self._flown, self.program.stable))
 
-    def _under_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Tested | None:
+    def _under_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> PolicyUnderTest | None:
         """A policy as tests need it; None where it has errors. It is not proved for them."""
         key = (policy.name.text, vehicle.name.text)
         if key not in self._tested:
             proved = self._policies.get(key)
             self._tested[key] = (
-                self._unproved_test(policy, vehicle) if proved is None else Tested(proved.lowered, proved.prepared)
+                self._unproved_test(policy, vehicle)
+                if proved is None
+                else PolicyUnderTest(proved.lowered, proved.prepared)
             )
         return self._tested[key]
 
-    def _unproved_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> Tested | None:
+    def _unproved_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> PolicyUnderTest | None:
         lowered = self._unproved(policy, vehicle)
         prepared = None if lowered is None else prepare(lowered.policy)
         if lowered is None or prepared is None:
@@ -314,7 +316,7 @@ class Compilation:
         if isinstance(prepared, Refusal):
             report_refused(self.context, lowered, prepared)
             return None
-        return Tested(lowered, prepared)
+        return PolicyUnderTest(lowered, prepared)
 
     def _unproved(self, policy: PolicyDecl, vehicle: VehicleDecl) -> LoweredPolicy | None:
         files = self._imports.closure(policy.span.file)

@@ -6,13 +6,13 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.program import Compilation
-from rtshcua.ground.testing.case import Suite
-from rtshcua.ground.testing.scenarios import ScenarioFlight, Scenarios
+from rtshcua.ground.testing.case import CaseSuite
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight, ScenarioSuite
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.ir.scenarios import Begins, ScenarioDecl
 
 
-def suite(program: Program, dialect: Dialect) -> Suite:
+def suite(program: Program, dialect: Dialect) -> CaseSuite:
     """The cases of the first file of a program; findings on the declarations and the tests.
 
     What is proved of policies and missions is not asked here: that is `check_program`'s business.
@@ -22,12 +22,12 @@ def suite(program: Program, dialect: Dialect) -> Suite:
     cases = run.cases()
     found = run.diagnostics()
     if run.report.failed():
-        return Suite((), found, (), run.report.sources)
+        return CaseSuite((), found, (), run.report.sources)
     policies = tuple(dict.fromkeys(case.policy for case in cases))
-    return Suite(cases, found, policies, run.report.sources)
+    return CaseSuite(cases, found, policies, run.report.sources)
 
 
-def scenarios(program: Program, dialect: Dialect, issued_at_us: int, later_us: int = 0) -> Scenarios:
+def scenarios(program: Program, dialect: Dialect, issued_at_us: int, later_us: int = 0) -> ScenarioSuite:
     """The scenarios of the first file of a program; all findings on the program, its proofs included.
 
     Their missions are issued at a UTC time in us; that of a scenario which says when it begins, `later_us` before. What
@@ -46,7 +46,7 @@ def scenarios(program: Program, dialect: Dialect, issued_at_us: int, later_us: i
         found |= dict.fromkeys(run.diagnostics())
         sources = run.report.sources
         if run.report.failed():
-            return Scenarios((), tuple(found), sources)
+            return ScenarioSuite((), tuple(found), sources)
         flights += [
             each
             for each in made
@@ -54,7 +54,7 @@ def scenarios(program: Program, dialect: Dialect, issued_at_us: int, later_us: i
             and _issued(each.declaration, issued_at_us, later_us) == starts[each.mission.name][number]
         ]
     flights.sort(key=lambda each: each.declaration.span)
-    return Scenarios(tuple(flights), tuple(found), sources)
+    return ScenarioSuite(tuple(flights), tuple(found), sources)
 
 
 def _starts(program: Program, issued_at_us: int, later_us: int) -> dict[str, list[int]]:

@@ -16,8 +16,8 @@ from rtshcua.ground.report.words.cases import (
     told_request,
 )
 from rtshcua.ground.report.words.vocabulary import Vocabulary
-from rtshcua.ground.testing.boundaries.suite import GENERATED
-from rtshcua.ground.testing.run import Ran
+from rtshcua.ground.testing.boundaries.draft import GENERATED
+from rtshcua.ground.testing.case_result import CaseResult
 from rtshcua.model.ir.tests import TestDecl
 
 
@@ -26,7 +26,7 @@ class Tried:
     """The cases of one file that was asked for, decided; `program` is that file with what it imports."""
 
     program: Program
-    ran: tuple[Ran, ...]
+    ran: tuple[CaseResult, ...]
 
 
 def starts_and_cases(tried: Sequence[Tried]) -> tuple[tuple[Start, ...], tuple[CaseTold, ...]]:
@@ -68,19 +68,19 @@ def told_test(test: TestDecl, start: str, names: Vocabulary) -> Iterator[CaseTol
         yield CaseTold(test.name.text, (*given, *more), asked, told_expectation(row.expectation), "", met=False)
 
 
-def _case(ran: Ran, start: str, names: Vocabulary) -> CaseTold:
+def _case(ran: CaseResult, start: str, names: Vocabulary) -> CaseTold:
     told = list(told_test(ran.case.test, start, names))
     contracts = ran.case.policy.lowered.policy.contracts
     decided = told_decision(ran.trace.decision, [contract.name for contract in contracts])
     return replace(told[ran.case.row or 0], decided=decided, met=ran.met)
 
 
-def _generated(program: Program, ran: Ran) -> bool:
+def _generated(program: Program, ran: CaseResult) -> bool:
     """Whether a case stands in a file that `rtshcua test --generate` wrote."""
     source = program.sources.get(ran.case.test.span.file)
     return source is not None and source.text.lstrip().startswith(GENERATED)
 
 
-def _start(program: Program, ran: Ran, names: Vocabulary) -> Start:
+def _start(program: Program, ran: CaseResult, names: Vocabulary) -> Start:
     nominal = ran.case.nominal
     return Start(nominal.name.text, place_of(program, nominal.span), tuple(told_nominal(nominal, names)))

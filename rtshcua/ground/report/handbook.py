@@ -17,8 +17,8 @@ from rtshcua.ground.report.words.places import utc
 from rtshcua.ground.report.words.scenarios import told_scenario
 from rtshcua.ground.report.words.values import told_value
 from rtshcua.ground.report.words.vocabulary import Vocabulary, listed
-from rtshcua.ground.testing.case import Tested
-from rtshcua.ground.testing.run import Ran
+from rtshcua.ground.testing.case import PolicyUnderTest
+from rtshcua.ground.testing.case_result import CaseResult
 from rtshcua.ground.versions.raised import before
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -127,9 +127,9 @@ def _scenarios(part: Part) -> Iterator[tuple[Policy, ScenarioTold]]:
             yield policy, ScenarioTold(scenario.name.text, place, tuple(told_scenario(scenario, names)))
 
 
-def _by_policy(tried: Tried) -> Mapping[Tested, list[Ran]]:
+def _by_policy(tried: Tried) -> Mapping[PolicyUnderTest, list[CaseResult]]:
     """The cases of a file by the policy that each is under: that of its nominal, whatever else the file declares."""
-    found: dict[Tested, list[Ran]] = {}
+    found: dict[PolicyUnderTest, list[CaseResult]] = {}
     for ran in tried.ran:
         found.setdefault(ran.case.policy, []).append(ran)
     return found

@@ -1,4 +1,5 @@
-"""Tests of policies: what they mean, how they are run, and how much of a policy they reach.
+"""Tests of policies: what they mean, how a case is decided, how much of a policy cases reach, and generated tests.
 
-`case` what is decided on, `suite` a program's cases, `run` decides them, `coverage` and `boundaries` what is missing.
+`case_lowering` and `scenario_lowering` make cases and scenarios of a program, `case_result` decides a case,
+`clause_coverage` adds up what cases reach, `boundaries` generates the tests that are missing.
 """

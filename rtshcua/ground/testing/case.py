@@ -1,6 +1,6 @@
 """A case: one request in one situation, and what must be decided. A test is one; with a table, each row is.
 
-`suite.suite` makes the cases of a program, `run.run_case` decides one of them.
+`case_lowering` makes the cases of a program, `case_result.run_case` decides one of them.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from rtshcua.model.ir.tests import Expectation, NominalDecl, TestDecl
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tested:
+class PolicyUnderTest:
     """A policy for a vehicle as tests need it: lowered, and prepared as on board. Made once for all its cases."""
 
     lowered: LoweredPolicy
@@ -44,7 +44,7 @@ class Tested:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Case:
+class PolicyCase:
     """What is decided on, and what must be decided.
 
     `name` is stable: that of the test, and for a row its cells in brackets. `span` is the row, or the test's name.
@@ -57,7 +57,7 @@ class Case:
     row: int | None
     span: Span
     expected: Expectation
-    policy: Tested
+    policy: PolicyUnderTest
     invocation: PreparedInvocation
     state: State
     context: Context
@@ -68,14 +68,14 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True)
-class Suite:
+class CaseSuite:
     """The cases of the file that was asked for, in the order of the text; none where the sources have errors.
 
     `diagnostics` are all findings on the declarations and on the tests (not on what they decide), `policies` those that
     cases are under, `sources` the texts that findings speak of.
     """
 
-    cases: tuple[Case, ...]
+    cases: tuple[PolicyCase, ...]
     diagnostics: tuple[Diagnostic, ...]
-    policies: tuple[Tested, ...] = ()
+    policies: tuple[PolicyUnderTest, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)

@@ -9,8 +9,8 @@ from rtshcua.campaign.flights import Field
 from rtshcua.campaign.trying import Trial, tries
 from rtshcua.campaign.workers import Here, Processes, Workers, cores
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.ground.testing.flown import Flown, Tried, findings
-from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.ground.testing.reporting import FlightResult, ScenarioResult, findings
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.virtual import development
 
 #: fewer are flown in this process
@@ -26,7 +26,7 @@ class Flying:
         self._shows = not quiet and sys.stderr is not None and sys.stderr.isatty()
         self._workers: Workers | None = None
 
-    def fly(self, scenarios: Sequence[ScenarioFlight]) -> Iterator[Flown]:
+    def fly(self, scenarios: Sequence[ScenarioFlight]) -> Iterator[ScenarioResult]:
         """Fly all of them, in their order."""
         with closing(self):
             for scenario in scenarios:
@@ -38,7 +38,7 @@ class Flying:
             self._workers.close()
             self._workers = None
 
-    def _fly(self, scenario: ScenarioFlight) -> Flown:
+    def _fly(self, scenario: ScenarioFlight) -> ScenarioResult:
         policy, mission, start = scenario.policy.lowered.policy, scenario.mission, scenario.scenario.start
         if start.utc_us is not None:
             mission = development.flies_at(mission, start.utc_us)
@@ -47,13 +47,13 @@ class Flying:
         workers: Workers = Here()
         if len(wanted) >= _FEW and cores() > 1:
             workers = self._workers = self._workers or Processes()
-        flown: list[Tried] = []
+        flown: list[FlightResult] = []
         for each in workers.fly(Trial(field, self._with_coverage), wanted):
             flown.append(each)
             self._say(f"{scenario.scenario.name}: {len(flown)} of {len(wanted)} flights")
         self._say("")
         flights = tuple(sorted(flown, key=lambda each: each.number))
-        return Flown(scenario, flights, tuple(findings(scenario, flights)))
+        return ScenarioResult(scenario, flights, tuple(findings(scenario, flights)))
 
     def _say(self, text: str) -> None:
         if self._shows:

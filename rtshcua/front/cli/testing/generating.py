@@ -22,10 +22,9 @@ from rtshcua.ground.checker.checks.tests import MAX_CASES
 from rtshcua.ground.format.format import formatted
 from rtshcua.ground.language.paths import on_a_shelf, shown
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.boundaries.generate import Generated
-from rtshcua.ground.testing.boundaries.generate import generate as generated
-from rtshcua.ground.testing.boundaries.plan import Plan
-from rtshcua.ground.testing.case import Suite, Tested
+from rtshcua.ground.testing.boundaries.generation import GeneratedTests, GenerationPlan
+from rtshcua.ground.testing.boundaries.generation import generate as generated
+from rtshcua.ground.testing.case import CaseSuite, PolicyUnderTest
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.zone import MAX_COORDINATE, project
 from rtshcua.model.ir.tests import NominalDecl
@@ -50,7 +49,7 @@ class Wanted(NamedTuple):
 class _Found(NamedTuple):
     """A policy, and the program that it was found in."""
 
-    tested: Tested
+    tested: PolicyUnderTest
     reading: Reading
 
 
@@ -75,7 +74,7 @@ def generate(files: Sequence[Path], wanted: Wanted, findings: Findings, *, quiet
         for ground in checked.grounds:
             lowered = ground.lowered
             place = (lowered.declaration.name.span.file, lowered.policy.name, lowered.vehicle.name.text)
-            found.setdefault(place, _Found(Tested(lowered, ground.prepared), reading))
+            found.setdefault(place, _Found(PolicyUnderTest(lowered, ground.prepared), reading))
     one = _chosen(list(found.values()), {shown(str(path)) for path in files}, wanted, findings)
     if isinstance(one, ExitCode):
         return one
@@ -129,7 +128,7 @@ def _write(one: _Found, wanted: Wanted, findings: Findings, *, quiet: bool) -> E
     name = str(wanted.output or _IN_MEMORY)
     sources: dict[str, Source] = {}
 
-    def play(text: str) -> Suite:
+    def play(text: str) -> CaseSuite:
         found = suite(read_text(name, text).program, dialect.load())
         sources.update(found.sources)
         return found
@@ -162,7 +161,7 @@ def _write(one: _Found, wanted: Wanted, findings: Findings, *, quiet: bool) -> E
     )
 
 
-def _tell(made: Generated, policy: str, output: Path | None, *, quiet: bool) -> None:
+def _tell(made: GeneratedTests, policy: str, output: Path | None, *, quiet: bool) -> None:
     """On the standard error, for the text may be on the standard output."""
     if quiet:
         return
@@ -183,7 +182,7 @@ def _nominal(one: _Found, wanted: Wanted) -> NominalDecl | None:
     return next((each for each in fitting if wanted.nominal in (None, each.name.text)), None)
 
 
-def _plan(one: _Found, nominal: NominalDecl | None, wanted: Wanted, name: str) -> Plan:
+def _plan(one: _Found, nominal: NominalDecl | None, wanted: Wanted, name: str) -> GenerationPlan:
     program, lowered = one.reading.program, one.tested.lowered
     files = [lowered.declaration.name.span.file, lowered.vehicle.name.span.file]
     if nominal is not None:
@@ -193,7 +192,7 @@ def _plan(one: _Found, nominal: NominalDecl | None, wanted: Wanted, name: str) -
     places = [project(lowered.policy.projection, each.latitude, each.longitude) for each in entries]
     phase = None if nominal is None or nominal.premises.phase is None else nominal.premises.phase.phase.text
     near = tuple(place for place in places if max(map(abs, place)) < MAX_COORDINATE)
-    return Plan(wanted.skills, tuple(imports), None if nominal is None else nominal.name.text, phase, near)
+    return GenerationPlan(wanted.skills, tuple(imports), None if nominal is None else nominal.name.text, phase, near)
 
 
 def _import(file: str, stable: str, importer: str) -> str:

@@ -13,11 +13,11 @@ from rtshcua.front.cli.progress import watched
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.suite import scenarios as scenarios_of
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.case import Case, Suite, Tested
-from rtshcua.ground.testing.coverage.tally import Covered, Tally
-from rtshcua.ground.testing.flown import Flown
-from rtshcua.ground.testing.run import Ran, run_case
-from rtshcua.ground.testing.scenarios import ScenarioFlight
+from rtshcua.ground.testing.case import CaseSuite, PolicyCase, PolicyUnderTest
+from rtshcua.ground.testing.case_result import CaseResult, run_case
+from rtshcua.ground.testing.clause_coverage import CoverageTally, PolicyCoverage
+from rtshcua.ground.testing.reporting import ScenarioResult
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.mavlink import dialect
 from rtshcua.virtual.flight import LATER_US
 
@@ -31,11 +31,11 @@ class Results(NamedTuple):
     of all there are the names.
     """
 
-    ran: tuple[Ran, ...]
-    flown: tuple[Flown, ...]
+    ran: tuple[CaseResult, ...]
+    flown: tuple[ScenarioResult, ...]
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
-    covered: tuple[Covered, ...] | None
+    covered: tuple[PolicyCoverage, ...] | None
     left_out: int
     names: frozenset[str]
 
@@ -54,8 +54,8 @@ def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool, quiet: b
     work = [_Work(shown(str(path)), read_sources([path])) for path in files]
     found: dict[tuple[object, ...], Diagnostic] = {}
     sources: dict[str, Source] = {}
-    ran: list[Ran] = []
-    tally = Tally() if with_coverage else None
+    ran: list[CaseResult] = []
+    tally = CoverageTally() if with_coverage else None
     left_out = 0
     names: set[str] = set()
     scenarios: list[ScenarioFlight] = []
@@ -90,13 +90,13 @@ def run_all(files: Sequence[Path], chosen: str, *, with_coverage: bool, quiet: b
     return Results(tuple(ran), flown, tuple(found.values()), sources, covered, left_out, frozenset(names))
 
 
-def _suite(reading: Reading) -> Suite:
+def _suite(reading: Reading) -> CaseSuite:
     """The cases of a program's first file. One that declares no tests is not looked at any closer: that is for `check`;
     but tests in what cannot be read would not be seen.
     """
     program = reading.program
     if not program.units or not program.units[0].tests:
-        return Suite((), program.diagnostics if has_errors(program.diagnostics) else (), sources=program.sources)
+        return CaseSuite((), program.diagnostics if has_errors(program.diagnostics) else (), sources=program.sources)
     return suite(program, dialect.load())
 
 
@@ -114,7 +114,7 @@ def _scenarios(
     return made.found
 
 
-def _fly(scenarios: Sequence[ScenarioFlight], tally: Tally | None, *, quiet: bool) -> Iterator[Flown]:
+def _fly(scenarios: Sequence[ScenarioFlight], tally: CoverageTally | None, *, quiet: bool) -> Iterator[ScenarioResult]:
     from rtshcua.front.cli.testing.flying import Flying  # the simulated vehicle is behind it
 
     for flown in Flying(with_coverage=tally is not None, quiet=quiet).fly(scenarios):
@@ -123,7 +123,7 @@ def _fly(scenarios: Sequence[ScenarioFlight], tally: Tally | None, *, quiet: boo
         yield flown
 
 
-def _run(case: Case, tally: Tally | None) -> Ran:
+def _run(case: PolicyCase, tally: CoverageTally | None) -> CaseResult:
     began_ns = perf_counter_ns()
     ran = run_case(case)
     ran = ran._replace(took_us=(perf_counter_ns() - began_ns) // 1_000)
@@ -132,13 +132,13 @@ def _run(case: Case, tally: Tally | None) -> Ran:
     return ran
 
 
-def _count_policies(tally: Tally | None, policies: Iterable[Tested], reading: Reading) -> None:
+def _count_policies(tally: CoverageTally | None, policies: Iterable[PolicyUnderTest], reading: Reading) -> None:
     if tally is not None:
         for policy in policies:
             tally.policy(policy, reading.program.units, reading.program.sources)
 
 
-def _untested(work: _Work, tested: set[tuple[str, int]]) -> tuple[list[Tested], list[Diagnostic]]:
+def _untested(work: _Work, tested: set[tuple[str, int]]) -> tuple[list[PolicyUnderTest], list[Diagnostic]]:
     """The policies that a file declares and no test is under, of which nothing is covered; and the errors for which
     there are none.
     """
@@ -147,11 +147,11 @@ def _untested(work: _Work, tested: set[tuple[str, int]]) -> tuple[list[Tested], 
     if all((policy.name.span.file, policy.name.span.start) in tested for policy in declared):
         return [], []
     checked = examine(work.reading)
-    each = [Tested(ground.lowered, ground.prepared) for ground in checked.grounds]
+    each = [PolicyUnderTest(ground.lowered, ground.prepared) for ground in checked.grounds]
     wrong = [found for found in checked.diagnostics if found.severity is Severity.ERROR]
     return [one for one in each if _declared(one)[0] == work.name and _declared(one) not in tested], wrong
 
 
-def _declared(tested: Tested) -> tuple[str, int]:
+def _declared(tested: PolicyUnderTest) -> tuple[str, int]:
     span = tested.lowered.declaration.name.span
     return span.file, span.start

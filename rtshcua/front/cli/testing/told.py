@@ -8,12 +8,10 @@ from itertools import groupby
 from rtshcua.app.wording import many, shorten
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.testing.coverage.coverage import share
-from rtshcua.ground.testing.coverage.tally import Covered
-from rtshcua.ground.testing.coverage.universe import Goal
-from rtshcua.ground.testing.flown import Flown
-from rtshcua.ground.testing.report import named, summary_json, told
-from rtshcua.ground.testing.run import Ran
+from rtshcua.ground.testing.case_result import CaseResult
+from rtshcua.ground.testing.clause_coverage import PolicyCoverage, share
+from rtshcua.ground.testing.coverage_goals import Goal
+from rtshcua.ground.testing.reporting import ScenarioResult, clause_words, policy_name, summary_json
 
 _GREEN, _RED, _BOLD, _END = "\033[32m", "\033[1;31m", "\033[1m", "\033[0m"
 _WIDTH = 100
@@ -27,7 +25,7 @@ class Told:
         terminal = sys.stdout is not None and sys.stdout.isatty()
         self._colours = terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
-    def tests(self, ran: Sequence[Ran], *, verbose: bool) -> Iterator[str]:
+    def tests(self, ran: Sequence[CaseResult], *, verbose: bool) -> Iterator[str]:
         """A line a test, below its file; with `verbose` also one for each row."""
         for file, of_file in groupby(ran, lambda each: each.case.span.file):
             yield self._painted(visible(file), _BOLD)
@@ -37,7 +35,7 @@ class Told:
                 if verbose and cases[0].case.row is not None:
                     yield from (f"      {self._word(each.met)}  {visible(_row(each))}" for each in cases)
 
-    def scenarios(self, flown: Sequence[Flown], *, verbose: bool) -> Iterator[str]:
+    def scenarios(self, flown: Sequence[ScenarioResult], *, verbose: bool) -> Iterator[str]:
         """A line a scenario, below its file; with `verbose` also how its flights ended, and what was excused."""
         for file, of_file in groupby(flown, lambda each: each.scenario.declaration.span.file):
             yield self._painted(visible(file), _BOLD)
@@ -50,7 +48,7 @@ class Told:
                     excused = sorted({text for flight in each.flights for text in flight.excused})
                     yield from (f"      excused: {visible(text)}" for text in excused)
 
-    def coverage(self, covered: Sequence[Covered], *, verbose: bool) -> Iterator[str]:
+    def coverage(self, covered: Sequence[PolicyCoverage], *, verbose: bool) -> Iterator[str]:
         """What is missing, clause by clause; with `verbose` also what is not."""
         for one in covered:
             yield from self._policy(one, verbose=verbose)
@@ -58,7 +56,7 @@ class Told:
             reached, total = sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered)
             yield f"\ncoverage of all: {share(reached, total)}, {reached} of {total}"
 
-    def summary(self, ran: Sequence[Ran], flown: Sequence[Flown], left_out: int) -> str:
+    def summary(self, ran: Sequence[CaseResult], flown: Sequence[ScenarioResult], left_out: int) -> str:
         """How many there were, and how they ended."""
         found = summary_json(ran)
         counts = [many(found["tests"], "test")] if ran or not flown else []
@@ -73,7 +71,7 @@ class Told:
         others = f"; {many(left_out, 'case')} not chosen" if left_out else ""
         return self._painted(f"{counted}: {ended}", _RED if failed else _GREEN) + others
 
-    def _line(self, cases: Sequence[Ran]) -> str:
+    def _line(self, cases: Sequence[CaseResult]) -> str:
         failed = sum(not each.met for each in cases)
         title = visible(cases[0].case.test.name.text)
         rows = "" if cases[0].case.row is None else f" ({many(len(cases), 'row')})"
@@ -84,14 +82,15 @@ class Told:
     def _word(self, met: bool) -> str:
         return self._painted("ok  ", _GREEN) if met else self._painted("FAIL", _RED)
 
-    def _policy(self, one: Covered, *, verbose: bool) -> Iterator[str]:
+    def _policy(self, one: PolicyCoverage, *, verbose: bool) -> Iterator[str]:
         found = one.coverage
-        head = f"coverage of {named(found.policy)} on {found.policy.vehicle.name}: {share(found.covered, found.total)}"
+        part = share(found.covered, found.total)
+        head = f"coverage of {policy_name(found.policy)} on {found.policy.vehicle.name}: {part}"
         counted = f"{found.covered} of {found.total} by {many(found.decisions, 'case')}"
         yield f"\n{self._painted(visible(head), _BOLD)}, {counted}"
         for line, span in zip(found.lines, one.spans, strict=True):
             if line.missing or verbose:
-                yield f"  {visible(self._place(span))}  {visible(shorten(told(line.item), _WIDTH))}"
+                yield f"  {visible(self._place(span))}  {visible(shorten(clause_words(line.item), _WIDTH))}"
                 missing = ["never decided" if goal is Goal.DECIDED else f"never {goal.value}" for goal in line.missing]
                 yield f"      {', '.join(missing)}" if missing else "      covered"
         if found.undecided:
@@ -106,6 +105,6 @@ class Told:
         return f"{colour}{text}{_END}" if self._colours else text
 
 
-def _row(ran: Ran) -> str:
+def _row(ran: CaseResult) -> str:
     """The cells of a row, which stand behind the name of its test."""
     return ran.case.name.removeprefix(ran.case.test.name.text).strip()

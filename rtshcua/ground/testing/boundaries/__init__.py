@@ -1,6 +1,6 @@
-"""Cases on both sides of every limit that a policy has: `generate` writes them as tests.
+"""Cases on both sides of every limit that a policy has: `generation` writes them as tests.
 
-A limit is found by the decision's own machinery (`limits`, `edges`, `moments`), made to matter where another part of
-its condition hides it (`pivot`), and written (`written`, `suite`). What is expected is what was decided when the case
-was run; nothing is expected that was not.
+The decision's own machinery finds a limit (`clause_limits`, `zone_edges`, `limit_search`); where another part of its
+condition hides it, `pivot` finds a situation in which it matters; `blocks` and `draft` write it. What is expected is
+what was decided when the case was run.
 """

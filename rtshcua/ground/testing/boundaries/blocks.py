@@ -1,16 +1,12 @@
-"""From a scene and the limits around it to blocks of cases."""
+"""Blocks of cases for a scene and the limits around it."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.ground.testing.boundaries import written
-from rtshcua.ground.testing.boundaries.limits import Limit
-from rtshcua.ground.testing.boundaries.parts import Part, atoms
-from rtshcua.ground.testing.boundaries.scene import TIME, Made, Scene, Value, Variable
-from rtshcua.ground.testing.boundaries.suite import Block, Row
-from rtshcua.ground.testing.boundaries.values import (
-    always,
+from rtshcua.ground.testing.boundaries import case_values
+from rtshcua.ground.testing.boundaries.case_values import (
+    always_tested,
     around,
     ordered,
     parameter_of,
@@ -18,6 +14,9 @@ from rtshcua.ground.testing.boundaries.values import (
     variables,
     writable,
 )
+from rtshcua.ground.testing.boundaries.clause_limits import ClauseLimit
+from rtshcua.ground.testing.boundaries.draft import Block, CaseRow
+from rtshcua.ground.testing.boundaries.scene import TIME, PolicyPart, Scene, SceneChanges, SceneVariable, Value, atoms
 from rtshcua.model.flat.contract import PLACE, SourceKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -26,14 +25,14 @@ from rtshcua.model.flat.policy import Policy
 _CLOCK_ERROR = 1_000_000
 
 
-class Frame(NamedTuple):
+class CaseFrame(NamedTuple):
     """What the blocks about one skill and one who asks have in common: the scene, what it changes of the nominal, the
     nominal's name, and the phase where that is not the nominal's; `label` tells it from others.
     """
 
     label: str
     scene: Scene
-    made: Made
+    made: SceneChanges
     nominal: str
     phase: str | None = None
 
@@ -44,13 +43,13 @@ class Frame(NamedTuple):
 
 
 def tables(
-    frame: Frame, parts: Sequence[Part], limits: Iterable[Limit], bounds: Sequence[tuple[int, int]]
+    frame: CaseFrame, parts: Sequence[PolicyPart], limits: Iterable[ClauseLimit], bounds: Sequence[tuple[int, int]]
 ) -> Iterator[Block]:
     """A table for each variable, and for each other situation in which it decides something. `bounds` are what each
     slot may be.
     """
     invocation = frame.scene.invocation
-    grouped: dict[tuple[Variable, tuple[tuple[Variable, Value], ...]], list[Limit]] = {
+    grouped: dict[tuple[SceneVariable, tuple[tuple[SceneVariable, Value], ...]], list[ClauseLimit]] = {
         (variable, ()): [] for variable in variables(parts, invocation)
     }
     for limit in limits:
@@ -60,46 +59,46 @@ def tables(
         here = frame.made | dict(made)
         values = [value for limit in found for value in around(limit)]
         if not made:
-            values += always(variable, invocation)
+            values += always_tested(variable, invocation)
             values += [_present(frame, variable)]
         cells = [
             _cell(frame, variable, value) for value in ordered(values) if writable(value, variable, invocation, bounds)
         ]
         cells += [] if made else _ages(frame, variable)
-        rows = [Row((cell,)) for cell in dict.fromkeys(cells) if cell is not None]
+        rows = [CaseRow((cell,)) for cell in dict.fromkeys(cells) if cell is not None]
         name = name_of(frame, variable)
         if rows:
             yield block(frame, name, here, without=variable, comments=_comments(found), columns=(name,), rows=rows)
 
 
-def _ages(frame: Frame, variable: Variable) -> list[str]:
+def _ages(frame: CaseFrame, variable: SceneVariable) -> list[str]:
     """What a signal is now, measured as long ago as it may be, and too long ago."""
     if variable.argument or variable.at is None:
         return []
     signal, value = signal_of(frame.policy, variable.at), _present(frame, variable)
-    cell = None if value is None else written.signal(frame.policy, signal, value)
+    cell = None if value is None else case_values.signal_text(frame.policy, signal, value)
     ages = (signal.stale_us, signal.stale_us + 1)
-    return [] if cell is None else [f"{cell} measured {written.duration(age)} ago" for age in ages]
+    return [] if cell is None else [f"{cell} measured {case_values.duration_text(age)} ago" for age in ages]
 
 
-def _present(frame: Frame, variable: Variable) -> Value:
+def _present(frame: CaseFrame, variable: SceneVariable) -> Value:
     return frame.scene.place(variable) if _is_place(variable, frame) else frame.scene.value(variable)
 
 
-def times(frame: Frame, limits: Iterable[Limit]) -> Iterator[Block]:
+def times(frame: CaseFrame, limits: Iterable[ClauseLimit]) -> Iterator[Block]:
     """A test for each side of each moment at which something turns, and one at which the clock may be wrong."""
     for limit in limits:
         if limit.variable == TIME:
             for value in (limit.holds, limit.fails):
                 assert isinstance(value, int)
                 here = frame.made | dict(limit.made) | {TIME: value}
-                yield block(frame, f"at {written.moment(value)}", here, comments=_comments([limit]))
+                yield block(frame, f"at {case_values.moment_text(value)}", here, comments=_comments([limit]))
             here = frame.made | dict(limit.made) | {TIME: limit.holds}
-            within = f" within {written.duration(_CLOCK_ERROR)}"
+            within = f" within {case_values.duration_text(_CLOCK_ERROR)}"
             yield block(frame, "on a clock that may be wrong", here, comments=_comments([limit]), clock=within)
 
 
-def stretches(frame: Frame) -> Iterator[Block]:
+def stretches(frame: CaseFrame) -> Iterator[Block]:
     """A test on each side of what the contract says of time: its deadline since the release, its validity since the
     issue.
     """
@@ -107,16 +106,19 @@ def stretches(frame: Frame) -> Iterator[Block]:
     contract, remaining = flat.contract, frame.scene.context.remaining_us
     spare = contract.deadline_us - remaining
     for us in (spare, spare + 1) if spare >= 0 else (0,):
-        ago = written.duration(us)
+        ago = case_values.duration_text(us)
         said = f"released {ago} ago"
-        comment = f"deadline {written.duration(contract.deadline_us)}"
+        comment = f"deadline {case_values.duration_text(contract.deadline_us)}"
         yield block(frame, said, frame.made, comments=(comment,), premises=(said,))
     for us in (contract.validity_us, contract.validity_us + 1):
-        said, comment = f"issued {written.duration(us)} ago", f"valid for {written.duration(contract.validity_us)}"
+        said, comment = (
+            f"issued {case_values.duration_text(us)} ago",
+            f"valid for {case_values.duration_text(contract.validity_us)}",
+        )
         yield block(frame, said, frame.made, comments=(comment,), premises=(said,))
 
 
-def phases(frame: Frame) -> Iterator[Block]:
+def phases(frame: CaseFrame) -> Iterator[Block]:
     """A test before the phases in which the skill means something, and one after them; one for each phase that rules
     ask for.
     """
@@ -130,18 +132,18 @@ def phases(frame: Frame) -> Iterator[Block]:
             yield block(frame, f"in the phase {name}", frame.made, phase=f"phase {name} of {name}")
 
 
-def over_time(frame: Frame, parts: Sequence[Part]) -> Iterator[Block]:
+def over_time(frame: CaseFrame, parts: Sequence[PolicyPart]) -> Iterator[Block]:
     """A table for each condition over time that some part reads: each truth, whatever the signals are."""
     read = {
         atom.monitor for part in parts if part.node for atom in atoms(part.node) if isinstance(atom, tree.Monitored)
     }
     for number in sorted(read):
-        column = f"({written.over_time(frame.policy.monitors[number])})"
-        rows = [Row((truth,)) for truth in written.TRUTHS.values()]
+        column = f"({case_values.monitor_text(frame.policy.monitors[number])})"
+        rows = [CaseRow((truth,)) for truth in case_values.TRUTHS.values()]
         yield block(frame, f"over time {number + 1}", frame.made, columns=(column,), rows=rows)
 
 
-def answers(frame: Frame, limits: Iterable[Limit]) -> Iterator[Block]:
+def answers(frame: CaseFrame, limits: Iterable[ClauseLimit]) -> Iterator[Block]:
     """What becomes of a request that a person must confirm: approved, refused, and not answered in time."""
     policy = frame.policy
     for limit in limits:
@@ -156,21 +158,21 @@ def answers(frame: Frame, limits: Iterable[Limit]) -> Iterator[Block]:
                 said.append(f"approved by role {policy.roles[rule.second]}")
             yield block(frame, ", ".join(said), here, comments=comments, premises=tuple(said))
         for us in (rule.within_us, rule.within_us + 1):
-            ago = f"released {written.duration(us)} ago"
+            ago = f"released {case_values.duration_text(us)} ago"
             yield block(frame, f"not answered, {ago}", here, comments=comments, premises=(ago,))
         return
 
 
 def block(
-    frame: Frame,
+    frame: CaseFrame,
     about: str,
-    made: Made,
+    made: SceneChanges,
     *,
-    without: Variable | None = None,
+    without: SceneVariable | None = None,
     comments: tuple[str, ...] = (),
     premises: tuple[str, ...] = (),
     columns: tuple[str, ...] = (),
-    rows: list[Row] | None = None,
+    rows: list[CaseRow] | None = None,
     clock: str = "",
     phase: str | None = None,
 ) -> Block:
@@ -186,7 +188,7 @@ def block(
     if TIME in made:
         moment = made[TIME]
         assert isinstance(moment, int)
-        lines.append(f'at "{written.moment(moment)}"{clock}')
+        lines.append(f'at "{case_values.moment_text(moment)}"{clock}')
     return Block(
         title=f"{frame.label}: {about}",
         nominal=frame.nominal,
@@ -194,24 +196,24 @@ def block(
         comments=comments,
         premises=(*([where] if where else []), *lines, *premises),
         columns=columns,
-        rows=rows or [Row()],
+        rows=rows or [CaseRow()],
     )
 
 
-def request(flat: Invocation, frame: Frame, without: Variable | None = None) -> str:
+def request(flat: Invocation, frame: CaseFrame, without: SceneVariable | None = None) -> str:
     """The request as it stands after `when`."""
     policy, contract = frame.policy, flat.contract
     arguments: list[str] = []
     for parameter in contract.parameters:
-        if without != Variable(True, parameter.cell):
+        if without != SceneVariable(True, parameter.cell):
             cells = flat.arguments[parameter.cell : parameter.cell + 2]
-            value: Value = (cells[0], cells[1]) if _is_place(Variable(True, parameter.cell), frame) else cells[0]
-            arguments.append(f"{parameter.name} = {written.argument(policy, parameter, value)}")
+            value: Value = (cells[0], cells[1]) if _is_place(SceneVariable(True, parameter.cell), frame) else cells[0]
+            arguments.append(f"{parameter.name} = {case_values.argument_text(policy, parameter, value)}")
     source = SourceKind(flat.source).name.lower()
     return f"{contract.name}({', '.join(arguments)}) by role {policy.roles[flat.role]} through {source}"
 
 
-def name_of(frame: Frame, variable: Variable) -> str:
+def name_of(frame: CaseFrame, variable: SceneVariable) -> str:
     """What a variable is called."""
     assert variable.at is not None
     if variable.argument:
@@ -219,25 +221,25 @@ def name_of(frame: Frame, variable: Variable) -> str:
     return signal_of(frame.policy, variable.at).name
 
 
-def _is_place(variable: Variable, frame: Frame) -> bool:
+def _is_place(variable: SceneVariable, frame: CaseFrame) -> bool:
     assert variable.at is not None
     if variable.argument:
         return _wide(frame, variable.at)
     return variable.at == frame.policy.vehicle.position
 
 
-def _wide(frame: Frame, cell: int) -> bool:
+def _wide(frame: CaseFrame, cell: int) -> bool:
     """Whether the parameter at a cell takes two."""
     return parameter_of(frame.scene.invocation, cell).kind == PLACE
 
 
-def _cell(frame: Frame, variable: Variable, value: Value) -> str | None:
+def _cell(frame: CaseFrame, variable: SceneVariable, value: Value) -> str | None:
     assert variable.at is not None
     if variable.argument:
-        return written.argument(frame.policy, parameter_of(frame.scene.invocation, variable.at), value)
-    return written.signal(frame.policy, signal_of(frame.policy, variable.at), value)
+        return case_values.argument_text(frame.policy, parameter_of(frame.scene.invocation, variable.at), value)
+    return case_values.signal_text(frame.policy, signal_of(frame.policy, variable.at), value)
 
 
-def _comments(limits: Iterable[Limit]) -> tuple[str, ...]:
+def _comments(limits: Iterable[ClauseLimit]) -> tuple[str, ...]:
     """The clauses that turn here, each once."""
     return tuple(dict.fromkeys(f"{limit.part.role}: {limit.part.text}" for limit in limits))

@@ -13,8 +13,7 @@ from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import Space, reads_days
 from rtshcua.ground.analysis.witness import Witness
-from rtshcua.ground.testing.boundaries.parts import Part
-from rtshcua.ground.testing.boundaries.scene import Made, Scene, Variable
+from rtshcua.ground.testing.boundaries.scene import PolicyPart, Scene, SceneChanges, SceneVariable
 from rtshcua.model.flat.contract import PLACE
 from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.signal import Signal
@@ -45,7 +44,7 @@ def put(node: tree.Node, atom: tree.Atom, value: tree.Node) -> tree.Node:
             return value if node is atom else node
 
 
-def matters(part: Part, atom: tree.Atom) -> list[Goal]:
+def matters(part: PolicyPart, atom: tree.Atom) -> list[Goal]:
     """What makes an atom decide its condition: true when it is taken as true (false under a `not`), and the reverse."""
     assert part.node is not None
     up, down = put(part.node, atom, ALWAYS), put(part.node, atom, NEVER)
@@ -74,7 +73,7 @@ def _holds(node: tree.Node, atom: tree.Atom) -> bool:
             return node is atom
 
 
-def before(part: Part, parts: Sequence[Part], scene: Scene) -> list[Goal]:
+def before(part: PolicyPart, parts: Sequence[PolicyPart], scene: Scene) -> list[Goal]:
     """What the other conditions must be, so that this one decides: those of its step and of the steps before."""
     goals: list[Goal] = []
     for other in parts:
@@ -89,7 +88,7 @@ def before(part: Part, parts: Sequence[Part], scene: Scene) -> list[Goal]:
     return goals
 
 
-def permitted(parts: Sequence[Part], scene: Scene) -> Iterator[Goal]:
+def permitted(parts: Sequence[PolicyPart], scene: Scene) -> Iterator[Goal]:
     """Some permit is true; one without a condition, which is no part, permits whatever the others say."""
     permits = [part.node for part in parts if part.role == "permit" and part.node is not None]
     if permits and all(rule.rule.when is not None for rule in scene.invocation.candidates.permits):
@@ -99,7 +98,9 @@ def permitted(parts: Sequence[Part], scene: Scene) -> Iterator[Goal]:
         yield some, TRUE
 
 
-def pivots(part: Part, atom: tree.Atom, parts: Sequence[Part], scene: Scene, space: Space) -> Iterator[Made]:
+def pivots(
+    part: PolicyPart, atom: tree.Atom, parts: Sequence[PolicyPart], scene: Scene, space: Space
+) -> Iterator[SceneChanges]:
     """What is changed in a scene so that an atom decides, the nearest first: empty where it does already, nothing where
     no situation was found. What has several limits, as a zone has, shows each where it is so, and some where it is not.
     """
@@ -116,11 +117,11 @@ def pivots(part: Part, atom: tree.Atom, parts: Sequence[Part], scene: Scene, spa
                 break
 
 
-def settled(goals: Sequence[Goal], space: Space, scene: Scene) -> Made | None:
+def settled(goals: Sequence[Goal], space: Space, scene: Scene) -> SceneChanges | None:
     """The changes of a scene that reach goals, of variables as few as one after the other can be kept."""
     invocation = scene.invocation
     preferred = dict(_present(scene))
-    kept: dict[Variable, Value | tuple[Value, Value]] = {}
+    kept: dict[SceneVariable, Value | tuple[Value, Value]] = {}
     space = space._replace(phases=frozenset({invocation.phase}), monitors=scene.state.monitors or space.monitors)
     plain = _plain(space, scene.invocation.policy.policy.signals)
     answer = satisfiable(goals, plain, _BUDGET)
@@ -162,22 +163,22 @@ def _plain(space: Space, signals: Sequence[Signal]) -> Space:
     )
 
 
-def _present(scene: Scene) -> Iterator[tuple[Variable, Value | tuple[Value, Value]]]:
+def _present(scene: Scene) -> Iterator[tuple[SceneVariable, Value | tuple[Value, Value]]]:
     """What each variable is now: arguments first, then the time, then signals."""
     invocation, at = scene.invocation, scene.environment()
     policy, contract = invocation.policy.policy, invocation.invocation.contract
     for parameter in contract.parameters:
         cell = parameter.cell
         one = at.arguments[cell]
-        yield Variable(True, cell), ((one, at.arguments[cell + 1]) if parameter.kind == PLACE else one)
-    yield Variable(False, None), point(scene.now.utc_us)
+        yield SceneVariable(True, cell), ((one, at.arguments[cell + 1]) if parameter.kind == PLACE else one)
+    yield SceneVariable(False, None), point(scene.now.utc_us)
     for signal in policy.signals:
         slot = signal.slot
         one = at.slots[slot]
-        yield Variable(False, slot), ((one, at.slots[slot + 1]) if slot == policy.vehicle.position else one)
+        yield SceneVariable(False, slot), ((one, at.slots[slot + 1]) if slot == policy.vehicle.position else one)
 
 
-def _narrowed(space: Space, kept: dict[Variable, Value | tuple[Value, Value]], scene: Scene) -> Space:
+def _narrowed(space: Space, kept: dict[SceneVariable, Value | tuple[Value, Value]], scene: Scene) -> Space:
     arguments, slots = list(space.arguments), list(space.slots)
     utc = space.utc
     for variable, value in kept.items():
@@ -190,7 +191,7 @@ def _narrowed(space: Space, kept: dict[Variable, Value | tuple[Value, Value]], s
     return space._replace(arguments=tuple(arguments), slots=tuple(slots), utc=utc)
 
 
-def _of(witness: Witness, variable: Variable, scene: Scene) -> int | tuple[int, int] | None:
+def _of(witness: Witness, variable: SceneVariable, scene: Scene) -> int | tuple[int, int] | None:
     """The value that a witness has for a variable; None where it is missing. Where nothing asks for dates or for days
     of the week, and all days have one offset, any day will do, so that it is the scene's.
     """

@@ -1,33 +1,38 @@
-"""One situation to vary: an invocation, a state, the time and where the mission stands."""
+"""One situation to vary (an invocation, a state, the time, where the mission stands), and the parts that decide."""
 
+from collections.abc import Iterator
 from dataclasses import replace as changed
 from typing import NamedTuple, TypeAlias
 
 from msgspec.structs import replace
 
+from rtshcua.decision import tree
 from rtshcua.decision.contracts import first_cell, misfit
-from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepare import PreparedInvocation
-from rtshcua.decision.situation import environment, situation
-from rtshcua.decision.values import point
+from rtshcua.decision.evaluate import Condition, Environment, build
+from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
+from rtshcua.decision.situation import environment, ranging, situation
+from rtshcua.decision.values import EVERYWHERE, Truth, point
 from rtshcua.decision.volume import Planner, flown_at, near_home
+from rtshcua.ground.testing.coverage_goals import AIRSPACE, ENERGY, ENERGY_TEXT, clauses_of
+from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import PLACE, MotionKind
 from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.situation import Context, Now, State
 
 #: a value of a variable: one integer, the two of a place (local mm), or None for a signal that is missing
 Value: TypeAlias = int | tuple[int, int] | None
 
 
-class Variable(NamedTuple):
+class SceneVariable(NamedTuple):
     """An argument cell or a state slot (of a place the first of two), or the time (`at` is None), as in `Change`."""
 
     argument: bool
     at: int | None
 
 
-TIME = Variable(False, None)
-Made: TypeAlias = dict[Variable, Value]
+TIME = SceneVariable(False, None)
+SceneChanges: TypeAlias = dict[SceneVariable, Value]
 
 
 class Scene(NamedTuple):
@@ -44,7 +49,7 @@ class Scene(NamedTuple):
         sets = situation(self.state, invocation.policy, self.now)
         return environment(sets, invocation.policy, invocation.arguments, invocation.phase)
 
-    def value(self, variable: Variable) -> int | None:
+    def value(self, variable: SceneVariable) -> int | None:
         """The present value of a variable that is one integer."""
         if variable.at is None:
             return self.now.utc_us
@@ -52,14 +57,14 @@ class Scene(NamedTuple):
             return self.invocation.invocation.arguments[variable.at]
         return self.state.values[variable.at]
 
-    def place(self, variable: Variable) -> tuple[int, int] | None:
+    def place(self, variable: SceneVariable) -> tuple[int, int] | None:
         """The present place of a variable that is one."""
         assert variable.at is not None
         cells = self.invocation.invocation.arguments if variable.argument else self.state.values
         x, y = cells[variable.at : variable.at + 2]
         return None if x is None or y is None else (x, y)
 
-    def put(self, variable: Variable, value: Value) -> "Scene":
+    def put(self, variable: SceneVariable, value: Value) -> "Scene":
         """The same with another value; what was issued and released so long ago still was."""
         if variable.at is None:
             assert isinstance(value, int)
@@ -78,7 +83,7 @@ class Scene(NamedTuple):
         values[variable.at : variable.at + len(new)] = new
         return self._replace(state=replace(self.state, values=tuple(values)))
 
-    def with_all(self, made: Made) -> "Scene":
+    def with_all(self, made: SceneChanges) -> "Scene":
         """The same with other values."""
         scene = self
         for variable, value in made.items():
@@ -108,3 +113,105 @@ def replanned(invocation: PreparedInvocation, arguments: tuple[int, ...]) -> Pre
         misfit=misfit(arguments, contract),
         planner=planner,
     )
+
+
+#: the clauses that hold for a planned volume, not for the present place alone
+MAINTAIN = "maintain"
+
+
+class PolicyPart(NamedTuple):
+    """A condition: the word for its role, its clause, and its tree; airspace and energy have none."""
+
+    role: str
+    clause: Decisive
+    node: tree.Node | None = None
+    condition: Condition | None = None
+    airspace: PreparedAirspace | None = None
+
+    @property
+    def text(self) -> str:
+        """As it is written."""
+        return ENERGY_TEXT if self.clause is None else " ".join(self.clause.text.split())
+
+
+def parts_of(invocation: PreparedInvocation) -> Iterator[PolicyPart]:
+    """Everything that may decide on an invocation, in the order of design 4.1; rules without a condition have no limit
+    and are left out.
+    """
+    policy, candidates = invocation.policy, invocation.candidates
+    for role, rules in (
+        ("forbid", candidates.forbids),
+        ("permit", candidates.permits),
+        ("confirm", candidates.confirms),
+    ):
+        for rule in rules:
+            yield from _rule_part(role, rule.rule, rule.condition, policy.compiler.when(rule.rule))
+    contract = invocation.invocation.contract
+    for role, clause in clauses_of(contract):
+        node = policy.compiler.node(clause, contract)
+        yield PolicyPart(role, clause, node, build(node, policy.tables))
+    if policy.airspace is not None:
+        yield PolicyPart(AIRSPACE, policy.airspace.airspace, airspace=policy.airspace)
+    yield PolicyPart(ENERGY, None)
+    for degrade in candidates.degrades:
+        yield from _rule_part("degrade", degrade.rule, degrade.condition, policy.compiler.when(degrade.rule))
+
+
+def _rule_part(role: str, rule: Rule, condition: Condition, node: tree.Node | None) -> Iterator[PolicyPart]:
+    if node is not None:
+        yield PolicyPart(role, rule, node, condition)
+
+
+def questions(part: PolicyPart, invocation: PreparedInvocation) -> Iterator[tuple[tree.Atom | None, PolicyPart]]:
+    """What a part is made of, each a part of its own: the atoms of its condition, the zones of an airspace; of the
+    charge there is but one.
+    """
+    if part.node is not None:
+        for atom in atoms(part.node):
+            yield atom, part._replace(node=atom, condition=build(atom, invocation.policy.tables))
+    elif part.airspace is not None:
+        for zone in part.airspace.inside:
+            yield None, part._replace(airspace=part.airspace._replace(inside=(zone,), outside=()))
+        for zone in part.airspace.outside:
+            yield None, part._replace(airspace=part.airspace._replace(inside=(), outside=(zone,)))
+    else:
+        yield None, part
+
+
+def airspace_tree(part: PolicyPart) -> tuple[PolicyPart, tuple[tree.Atom, ...]]:
+    """An airspace as a condition on the vehicle's place, as the analysis has it, and its zones as in `questions`."""
+    assert part.airspace is not None
+    inside = [tree.Inside(zone.number) for zone in part.airspace.inside]
+    outside = [tree.Inside(zone.number) for zone in part.airspace.outside]
+    nodes: list[tree.Node] = [*inside, *(tree.Not(zone) for zone in outside)]
+    whole = nodes[0]
+    for node in nodes[1:]:
+        whole = tree.Both(whole, node)
+    return part._replace(node=whole), (*inside, *outside)
+
+
+def atoms(node: tree.Node) -> Iterator[tree.Atom]:
+    """The atoms of a condition, from left to right."""
+    match node:
+        case tree.Both(left, right) | tree.Either(left, right):
+            yield from atoms(left)
+            yield from atoms(right)
+        case tree.Not(operand):
+            yield from atoms(operand)
+        case _:
+            yield node
+
+
+def part_truth(part: PolicyPart, scene: Scene) -> Truth:
+    """The truth of a part, as the step that asks for it has it."""
+    invocation, at = scene.invocation, scene.environment()
+    policy = invocation.policy
+    known = policy.tables.known
+    if part.condition is not None and part.role != MAINTAIN:
+        return part.condition(at)
+    volume = invocation.planner.volume(at.slots, known)
+    if part.condition is not None:
+        return EVERYWHERE[part.condition(ranging(at, volume, known.height, invocation.lasts_us))]
+    if part.airspace is not None:
+        return EVERYWHERE[part.airspace.keeps(volume.place, at, invocation.lasts_us)]
+    return EVERYWHERE[invocation.energy.suffices(at.slots[known.battery], volume, at.slots[known.drain])]

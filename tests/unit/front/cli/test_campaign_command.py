@@ -16,7 +16,7 @@ from rtshcua.campaign.trying import Trial, Try
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.front.cli.testing import flying
-from rtshcua.ground.testing.flown import Tried, Wrong
+from rtshcua.ground.testing.reporting import FlightFailure, FlightResult
 from rtshcua.model.faults import GpsLoss
 from virtual import case
 
@@ -182,12 +182,12 @@ def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(
     assert "collision" in capsys.readouterr().err
 
 
-def _failing(_: Trial, flight: Try) -> Tried:
+def _failing(_: Trial, flight: Try) -> FlightResult:
     """What a kept failure says can be read: it is the flight that failed."""
     assert [type(each.fault) for each in flight.scenario.incidents] == [GpsLoss]
     assert flight.scenario.start.utc_us == 1_780_300_800_000_000 + 60 * S
-    wrong = (Wrong(-1, "collision", "flew into it"),)
-    return Tried(flight.number, flight.flavour, flight.seed, "crashed", wrong, (), (), ())
+    wrong = (FlightFailure(-1, "collision", "flew into it"),)
+    return FlightResult(flight.number, flight.flavour, flight.seed, "crashed", wrong, (), (), ())
 
 
 def test_another_campaign_in_the_folder_is_refused(

@@ -10,7 +10,7 @@ import pytest
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.front.cli.testing import flying
-from rtshcua.ground.testing.flown import Tried, Wrong
+from rtshcua.ground.testing.reporting import FlightFailure, FlightResult
 
 SOURCE = """import "lib:missions/short.rts"
 
@@ -88,10 +88,15 @@ def test_only_those_that_are_chosen_are_flown(here: Path, capsys: pytest.Capture
 def not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every third seed fails in two ways."""
 
-    def fly(_: Any, flight: Any) -> Tried:
-        wrong = (Wrong(0, "expectation", "it ended as `aborted`"), Wrong(-1, "collision", "it hit <something>"))
+    def fly(_: Any, flight: Any) -> FlightResult:
+        wrong = (
+            FlightFailure(0, "expectation", "it ended as `aborted`"),
+            FlightFailure(-1, "collision", "it hit <something>"),
+        )
         found = wrong if flight.seed % 3 == 0 else ()
-        return Tried(flight.number, flight.flavour, flight.seed, "aborted", found, ("late: wind",), ("3.00 s x",), ())
+        return FlightResult(
+            flight.number, flight.flavour, flight.seed, "aborted", found, ("late: wind",), ("3.00 s x",), ()
+        )
 
     monkeypatch.setattr(flying.Trial, "fly", fly)
     monkeypatch.setattr(flying, "cores", lambda: 1)

@@ -17,7 +17,7 @@ from rtshcua.ground.language.load import Program
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.library import root
 from rtshcua.mavlink import dialect
 

@@ -13,7 +13,7 @@ from rtshcua.ground.pipeline.suite import suite
 from rtshcua.ground.report.cases import Tried
 from rtshcua.ground.report.handbook import Flown, Part, handbook
 from rtshcua.ground.report.model import Handbook
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 from virtual.once import once
 

@@ -15,7 +15,7 @@ from rtshcua.ground.report.handbook import Part, handbook
 from rtshcua.ground.report.model import ChangeTold, Handbook
 from rtshcua.ground.report.page import page
 from rtshcua.ground.report.words.differences import ELSE
-from rtshcua.ground.testing.boundaries.suite import GENERATED
+from rtshcua.ground.testing.boundaries.draft import GENERATED
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.outcome import Reason
 

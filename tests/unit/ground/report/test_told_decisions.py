@@ -13,7 +13,7 @@ from rtshcua.ground.report.cases import Tried
 from rtshcua.ground.report.handbook import Part, handbook
 from rtshcua.ground.report.model import Chapter, Handbook
 from rtshcua.ground.report.page import page
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
 

@@ -15,7 +15,7 @@ from rtshcua.decision.decide import decide
 from rtshcua.ground.language.load import Program, load, remembered
 from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import POSITION

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from reference.deciding import IMPORT, made
 from reference.oracle import Oracle
-from rtshcua.ground.testing.case import Case
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case import PolicyCase
+from rtshcua.ground.testing.case_result import run_case
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Approval, Context, Now, State
 from rtshcua.model.flat.zone import project
@@ -131,7 +131,7 @@ def asked(draw: st.DrawFn) -> Asked:
     return Asked(tuple(parts), number, role, (issued, released, error), phase, granted, skill)
 
 
-def expected(case: Case, asked: Asked, row: Row) -> tuple[Outcome, str, str | None]:
+def expected(case: PolicyCase, asked: Asked, row: Row) -> tuple[Outcome, str, str | None]:
     """What the oracle decides in the situation as it is put together here."""
     policy, invocation = case.policy.lowered.policy, case.invocation.invocation
     assert policy.contracts[invocation.skill].name == asked.skill

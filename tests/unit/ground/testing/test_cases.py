@@ -11,8 +11,8 @@ from rtshcua.ground.language.load import load
 from rtshcua.ground.lint.unused import mentioned_by
 from rtshcua.ground.pipeline.program import compile_program, examine_program
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.cases import REMAINING_US
-from rtshcua.ground.testing.run import Ran, run_case
+from rtshcua.ground.testing.case_lowering import REMAINING_US
+from rtshcua.ground.testing.case_result import CaseResult, run_case
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
@@ -109,7 +109,7 @@ def test_an_import_that_only_a_test_uses_is_used() -> None:
     assert {"bridge_inspection", "quad", "inspect_area", "bridge_a", "battery", "wind.speed"} <= mentioned_by(unit)
 
 
-def unmet(expectation: str, *given: str) -> Ran:
+def unmet(expectation: str, *given: str) -> CaseResult:
     """One test that is not met."""
     suite_of = made(f'test "it" {{ {" ".join(given)} {WHEN} {expectation} }}')
     assert suite_of.diagnostics == ()

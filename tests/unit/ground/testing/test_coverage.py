@@ -5,9 +5,8 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.testing.coverage.coverage import coverage, enough, per_mille, share
-from rtshcua.ground.testing.coverage.reached import reached
-from rtshcua.ground.testing.coverage.universe import Goal, Item, Universe, universe
+from rtshcua.ground.testing.clause_coverage import coverage, enough, per_mille, reached_goals, share
+from rtshcua.ground.testing.coverage_goals import CoverageItem, Goal, Universe, universe_of
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import Policy, RuleKind
@@ -31,10 +30,10 @@ def prepared(policy: Policy = POLICY) -> tuple[PreparedPolicy, tuple[PreparedInv
 
 
 PREPARED, STEPS = prepared()
-UNIVERSE = universe(PREPARED)
+UNIVERSE = universe_of(PREPARED)
 
 
-def item(role: str, text: str, skill: str = "", of: Universe = UNIVERSE) -> Item:
+def item(role: str, text: str, skill: str = "", of: Universe = UNIVERSE) -> CoverageItem:
     """The one item of a role, a skill and a text."""
     (found,) = [each for each in of.items if (each.role, each.skill) == (role, skill) and each.text == text]
     return found
@@ -45,7 +44,7 @@ def seen(step: int, state: State, approvals: tuple[Approval, ...] = ()) -> dict[
     invocation = STEPS[step]
     context = flat.context(invocation.invocation, approvals=approvals)
     found: dict[tuple[str, str, str], set[Goal]] = {}
-    for number, goal in reached(UNIVERSE, invocation, trace(invocation, state, PREPARED, context, flat.NOW)):
+    for number, goal in reached_goals(UNIVERSE, invocation, trace(invocation, state, PREPARED, context, flat.NOW)):
         each = UNIVERSE.items[number]
         found.setdefault((each.role, each.skill, each.text), set()).add(goal)
     return found
@@ -83,7 +82,7 @@ def test_a_clause_that_is_constant_has_nothing_but_its_truth() -> None:
     always = flat.clause("20 m <= 30 m", flat.apply(flat.Op.LE, flat.const(20), flat.const(30)))
     rules = (*flat.RULES, flat.rule(RuleKind.FORBID, flat.TAKEOFF, when=always))
     ready, _ = prepared(replace(POLICY, rules=rules))
-    assert universe(ready).items[7].goals == (Goal.TRUE, Goal.DECIDED)
+    assert universe_of(ready).items[7].goals == (Goal.TRUE, Goal.DECIDED)
 
 
 def test_a_time_of_day_can_be_unknown_because_a_clock_may_be_wrong() -> None:
@@ -102,8 +101,8 @@ def test_an_allowed_step_reaches_what_it_looked_at_and_its_permit_decided() -> N
 def test_of_two_permits_that_both_permit_none_decided() -> None:
     again = flat.rule(RuleKind.PERMIT, flat.TAKEOFF, roles=(flat.OPERATOR,), sources=(SourceKind.AGENT,), start=90)
     ready, invocations = prepared(replace(POLICY, rules=(*flat.RULES, again)))
-    of, step = universe(ready), invocations[TAKEOFF]
-    found = reached(of, step, trace(step, flat.state(), ready, flat.context(step.invocation), flat.NOW))
+    of, step = universe_of(ready), invocations[TAKEOFF]
+    found = reached_goals(of, step, trace(step, flat.state(), ready, flat.context(step.invocation), flat.NOW))
     assert {goal for number, goal in found if of.items[number].role == "permit"} == {Goal.TRUE}
 
 
@@ -152,6 +151,6 @@ def test_a_threshold_is_met_exactly() -> None:
 def test_a_rule_that_never_decided_is_named() -> None:
     invocation = STEPS[TAKEOFF]
     decided = trace(invocation, flat.state(), PREPARED, flat.context(invocation.invocation), flat.NOW)
-    found = coverage(UNIVERSE, [reached(UNIVERSE, invocation, decided)])
+    found = coverage(UNIVERSE, [reached_goals(UNIVERSE, invocation, decided)])
     assert "permit (0,)" not in {each.text for each in found.undecided}
     assert "forbid (6,)" in {each.text for each in found.undecided}

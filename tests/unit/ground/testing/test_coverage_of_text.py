@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.testing.coverage.coverage import Coverage
-from rtshcua.ground.testing.coverage.tally import Tally
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
+from rtshcua.ground.testing.clause_coverage import Coverage, CoverageTally
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[4]
@@ -63,7 +62,7 @@ def coverage(text: str) -> Coverage:
     program = load(["own.rts"], read, str(CHECKOUT), None, PARSE)
     made = suite(program, DIALECT)
     assert [each.message for each in made.diagnostics] == []
-    tally = Tally()
+    tally = CoverageTally()
     for policy in made.policies:
         tally.policy(policy, program.units, program.sources)
     for case in made.cases:

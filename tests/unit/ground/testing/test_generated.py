@@ -8,8 +8,8 @@ import pytest
 from reference.generated_tests import failures, generated, noticed, play
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.format import formatted
-from rtshcua.ground.testing.boundaries.generate import Generated
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.boundaries.generation import GeneratedTests
+from rtshcua.ground.testing.case_result import run_case
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 SHIPPED = CHECKOUT / "policies" / "bridge_inspection.rts"
@@ -51,17 +51,17 @@ policy small version 3 {
 
 
 @pytest.fixture(scope="module")
-def small() -> Generated:
+def small() -> GeneratedTests:
     return generated(SMALL, "small.rts", "small.rts")
 
 
 @pytest.fixture(scope="module")
-def shipped() -> Generated:
+def shipped() -> GeneratedTests:
     text = SHIPPED.read_text(encoding="utf-8")
     return generated(text, "bridge_inspection.rts", "lib:policies/bridge_inspection.rts")
 
 
-def test_what_is_generated_passes_and_keeps_passing_when_it_is_formatted(small: Generated) -> None:
+def test_what_is_generated_passes_and_keeps_passing_when_it_is_formatted(small: GeneratedTests) -> None:
     assert small.text is not None
     assert small.without == ()
     assert failures(small, {"small.rts": SMALL}) == []
@@ -73,13 +73,13 @@ def test_what_is_generated_passes_and_keeps_passing_when_it_is_formatted(small: 
     assert played.diagnostics == ()
 
 
-def test_it_says_that_it_records_what_is_so_now(small: Generated) -> None:
+def test_it_says_that_it_records_what_is_so_now(small: GeneratedTests) -> None:
     assert small.text is not None
     assert "record what the policy `small` (version 3) decides" in " ".join(small.text.split())
     assert "read them before they are kept" in small.text
 
 
-def test_there_are_limits_of_every_kind_of_clause(small: Generated) -> None:
+def test_there_are_limits_of_every_kind_of_clause(small: GeneratedTests) -> None:
     roles = {each.part.role for each in small.limits}
     assert roles == {"permit", "forbid", "confirm", "degrade", "require", "assume", "airspace", "energy"}
     assert any("delegate rise" in each.part.text for each in small.limits)
@@ -105,7 +105,7 @@ def test_there_are_limits_of_every_kind_of_clause(small: Generated) -> None:
         ("airspace inside city outside school", "airspace inside city"),
     ],
 )
-def test_a_limit_of_a_policy_that_moves_by_one_unit_is_noticed(small: Generated, written: str, moved: str) -> None:
+def test_a_limit_of_a_policy_that_moves_by_one_unit_is_noticed(small: GeneratedTests, written: str, moved: str) -> None:
     assert written in SMALL
     assert noticed(small, {"small.rts": SMALL.replace(written, moved)})
 
@@ -142,11 +142,11 @@ def test_the_shipped_policy_has_limits_to_move() -> None:
         for number, place in enumerate(LIMITS)
     ],
 )
-def test_a_limit_of_the_shipped_policy_that_moves_is_noticed(shipped: Generated, place: str) -> None:
+def test_a_limit_of_the_shipped_policy_that_moves_is_noticed(shipped: GeneratedTests, place: str) -> None:
     assert noticed(shipped, {"bridge_inspection.rts": LIMITS[place]}) == (place != UNNOTICED)
 
 
-def test_some_skills_alone(shipped: Generated) -> None:
+def test_some_skills_alone(shipped: GeneratedTests) -> None:
     text = SHIPPED.read_text(encoding="utf-8")
     alone = generated(text, "bridge_inspection.rts", "lib:policies/bridge_inspection.rts", ("hover",))
     assert alone.text is not None

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from reference.generated_tests import failures, generated, noticed
-from rtshcua.ground.testing.boundaries.generate import Generated, Unreached
+from rtshcua.ground.testing.boundaries.generation import GeneratedTests, UnreachedLimit
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 HEAD = """import "lib:policies/site.rts"
@@ -40,11 +40,11 @@ TEXT = HEAD + ARMS
 
 
 @pytest.fixture(scope="module")
-def arms() -> Generated:
+def arms() -> GeneratedTests:
     return generated(TEXT, "arms.rts", "arms.rts", ("goto",))
 
 
-def test_they_pass(arms: Generated) -> None:
+def test_they_pass(arms: GeneratedTests) -> None:
     assert failures(arms, {"arms.rts": TEXT}) == []
 
 
@@ -65,16 +65,16 @@ def test_they_pass(arms: Generated) -> None:
         ("altitude > 13 m", "altitude > 13001 mm"),
     ],
 )
-def test_a_limit_in_any_arm_that_moves_by_one_unit_is_noticed(arms: Generated, written: str, moved: str) -> None:
+def test_a_limit_in_any_arm_that_moves_by_one_unit_is_noticed(arms: GeneratedTests, written: str, moved: str) -> None:
     assert TEXT.count(written) == 1
     assert noticed(arms, {"arms.rts": TEXT.replace(written, moved)})
 
 
-def named(of: Generated) -> set[tuple[str, str]]:
+def named(of: GeneratedTests) -> set[tuple[str, str]]:
     return {(each.role, each.about) for each in of.unreached}
 
 
-def test_what_is_not_reached_is_named_and_nothing_else(arms: Generated) -> None:
+def test_what_is_not_reached_is_named_and_nothing_else(arms: GeneratedTests) -> None:
     assert named(arms) == {
         ("permit", "the ceiling of `grow(bridge_a, 7 m)`, which counts for no place on the ground"),
         ("airspace", "the ceiling of `city`"),  # forbidden before that is looked at, as is the next
@@ -108,7 +108,7 @@ policy arms version 3 {
     assert "NOT REACHED" in comment
     for each in made.unreached:
         assert each.words in comment, each
-    assert Unreached("goto", "forbid", "forbid goto by role pilot when altitude > 13 m", "") in made.unreached
+    assert UnreachedLimit("goto", "forbid", "forbid goto by role pilot when altitude > 13 m", "") in made.unreached
 
 
 def test_hours_on_days_of_the_week_of_a_time_zone_are_reached() -> None:

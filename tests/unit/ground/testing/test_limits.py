@@ -14,10 +14,9 @@ from rtshcua.decision.times import time_of_week
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
-from rtshcua.ground.testing.boundaries.finding import limits
-from rtshcua.ground.testing.boundaries.limits import Limit
-from rtshcua.ground.testing.boundaries.parts import Part, parts, truth
-from rtshcua.ground.testing.boundaries.scene import TIME, Scene, Value, Variable
+from rtshcua.ground.testing.boundaries.clause_limits import ClauseLimit
+from rtshcua.ground.testing.boundaries.limit_search import limits
+from rtshcua.ground.testing.boundaries.scene import TIME, PolicyPart, Scene, SceneVariable, Value, part_truth, parts_of
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.policy import Policy, RuleKind
@@ -37,20 +36,20 @@ def scene(policy: Policy = flat.POLICY, step: int = TAKEOFF, values: dict[int, i
     return Scene(one, flat.state(HOME | (values or {})), flat.context(one.invocation), NOW)
 
 
-def found(here: Scene) -> list[Limit]:
+def found(here: Scene) -> list[ClauseLimit]:
     space = Questions(here.invocation.policy).space(here.invocation.invocation.skill)
-    return list(limits(list(parts(here.invocation)), here, space))
+    return list(limits(list(parts_of(here.invocation)), here, space))
 
 
-def sides(limit: Limit, here: Scene) -> tuple[int, int]:
+def sides(limit: ClauseLimit, here: Scene) -> tuple[int, int]:
     made = here.with_all(dict(limit.made))
     return (
-        truth(limit.part, made.put(limit.variable, limit.holds)),
-        truth(limit.part, made.put(limit.variable, limit.fails)),
+        part_truth(limit.part, made.put(limit.variable, limit.holds)),
+        part_truth(limit.part, made.put(limit.variable, limit.fails)),
     )
 
 
-def turning(here: Scene, role: str, text: str = "") -> set[tuple[Variable, Value, Value]]:
+def turning(here: Scene, role: str, text: str = "") -> set[tuple[SceneVariable, Value, Value]]:
     """The variables and both sides of the limits of one part."""
     return {
         (each.variable, each.holds, each.fails)
@@ -63,19 +62,19 @@ def test_each_limit_of_a_step_is_where_its_contract_and_the_rules_have_it() -> N
     here = scene()
     numbers = turning(here, "require") | turning(here, "assume")
     assert numbers == {
-        (Variable(False, flat.BATTERY), 3_501, 3_500),
-        (Variable(False, flat.WIND), 9_999, 10_000),
+        (SceneVariable(False, flat.BATTERY), 3_501, 3_500),
+        (SceneVariable(False, flat.WIND), 9_999, 10_000),
     }
-    assert turning(here, "permit") == {(Variable(True, 0), 40_000, 40_001)}
-    assert turning(here, "degrade") == {(Variable(False, flat.BATTERY), 2_499, 2_500)}
-    assert turning(here, "energy") == {(Variable(False, flat.BATTERY), 1_200, 1_199)}
+    assert turning(here, "permit") == {(SceneVariable(True, 0), 40_000, 40_001)}
+    assert turning(here, "degrade") == {(SceneVariable(False, flat.BATTERY), 2_499, 2_500)}
+    assert turning(here, "energy") == {(SceneVariable(False, flat.BATTERY), 1_200, 1_199)}
 
 
 def test_a_clause_with_a_signal_and_an_argument_turns_on_both() -> None:
     here = scene(step=INSPECT, values={flat.POSITION_X: 110_000, flat.POSITION_Y: -20_000, flat.HEIGHT: 20_000})
     assert turning(here, "maintain", "height") == {
-        (Variable(False, flat.HEIGHT), 25_000, 25_001),
-        (Variable(True, 1), 15_000, 14_999),
+        (SceneVariable(False, flat.HEIGHT), 25_000, 25_001),
+        (SceneVariable(True, 1), 15_000, 14_999),
     }
 
 
@@ -134,7 +133,7 @@ def test_a_part_that_another_part_hides_is_brought_out() -> None:
     hidden = [each for each in found(here) if each.part.text == "forbid both" and each.variable.at == flat.LINK]
     assert [(each.holds, each.fails) for each in hidden] == [(7_000, 6_999)]
     ((variable, wind),) = hidden[0].made
-    assert variable == Variable(False, flat.WIND)
+    assert variable == SceneVariable(False, flat.WIND)
     assert isinstance(wind, int)
     assert wind > 5_000
 
@@ -158,9 +157,9 @@ def conditions(draw: st.DrawFn, depth: int = 2) -> flat.Code:
     )
 
 
-def flips(part: Part, here: Scene) -> Iterator[frozenset[int]]:
+def flips(part: PolicyPart, here: Scene) -> Iterator[frozenset[int]]:
     """Where a condition turns, by trying all values there are."""
-    values = [truth(part, here.put(Variable(False, flat.WIND), value)) for value in range(LOW, HIGH + 1)]
+    values = [part_truth(part, here.put(SceneVariable(False, flat.WIND), value)) for value in range(LOW, HIGH + 1)]
     for value, (one, other) in enumerate(pairwise(values)):
         if one != other:
             yield frozenset({value, value + 1})
@@ -177,8 +176,8 @@ def test_every_place_where_a_condition_turns_is_found(code: flat.Code, wind: int
     invocations = prepare_mission(replace(flat.MISSION, invocations=(step,)), ready)
     assert not isinstance(invocations, Refusal), invocations
     here = Scene(invocations[0], flat.state(HOME | {flat.WIND: wind}), flat.context(step), NOW)
-    part = next(each for each in parts(here.invocation) if each.clause == clause)
+    part = next(each for each in parts_of(here.invocation) if each.clause == clause)
     ours = list(limits([part], here, Questions(ready).space(flat.TAKEOFF)))
     assert [each for each in ours if sides(each, here) != (TRUE, FALSE)] == []
-    turned = {frozenset((each.holds, each.fails)) for each in ours if each.variable == Variable(False, flat.WIND)}
+    turned = {frozenset((each.holds, each.fails)) for each in ours if each.variable == SceneVariable(False, flat.WIND)}
     assert turned == set(flips(part, here))

@@ -3,9 +3,9 @@
 import pytest
 
 from reference.deciding import IMPORT, NOMINAL, WHEN, found, made, ran
-from rtshcua.ground.testing.clauses import quotes
-from rtshcua.ground.testing.coverage.universe import universe
-from rtshcua.ground.testing.run import run_case
+from rtshcua.ground.testing.case_result import run_case
+from rtshcua.ground.testing.clause_quotes import quotes
+from rtshcua.ground.testing.coverage_goals import universe_of
 from rtshcua.model.flat.limits import MAX_TEXT
 
 SITE = """import "lib:policies/site.rts"
@@ -73,7 +73,7 @@ def test_uses_of_a_template_that_differ_behind_what_is_carried_on_board_are_cove
     uses = [f"use narrow({LONG} {most} %)" for most in (45, 95)]
     source = policy(*uses).replace("policy long", f"{template}policy long")
     (case,) = made('test "it" { when hover(5 s) expect deny }', source).cases
-    items = universe(case.policy.prepared).items
+    items = universe_of(case.policy.prepared).items
     assert sum(item.role == "forbid" for item in items) == 2
 
 

@@ -7,7 +7,7 @@ from reference.deciding import program
 from rtshcua.ground.checker.faults import NAMED, example
 from rtshcua.ground.pipeline.program import check_program, compile_program
 from rtshcua.ground.pipeline.suite import scenarios
-from rtshcua.ground.testing.scenarios import ScenarioFlight, Scenarios
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight, ScenarioSuite
 from rtshcua.mavlink import dialect
 from rtshcua.model.faults import KINDS, GpsJump, LinkSilence, Mode, PilotMode, Way, WindStep, parameters
 from rtshcua.model.flat.code import Op
@@ -33,7 +33,7 @@ IMPORT = 'import "lib:missions/standard.rts"\n'
 S = 1_000_000
 
 
-def made(text: str, before: str = IMPORT) -> Scenarios:
+def made(text: str, before: str = IMPORT) -> ScenarioSuite:
     return scenarios(program(before + text), dialect.load(), 5)
 
 

@@ -1,6 +1,6 @@
 """E1404, E1410, E1607, E1609: scenarios as they are flown, with their mission and its policy as `compile` makes them.
 
-`suite.scenarios` makes them of a program; `virtual` flies them.
+`virtual` flies them.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,8 +17,8 @@ from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.lower.conditions import Place
 from rtshcua.ground.lower.files import Files, Joint, shortened
 from rtshcua.ground.lower.trial import Lacking, Trial, knows_zone
-from rtshcua.ground.testing.case import Tested
-from rtshcua.ground.testing.clauses import clause_meant, quotes
+from rtshcua.ground.testing.case import PolicyUnderTest
+from rtshcua.ground.testing.clause_quotes import clause_meant, quotes
 from rtshcua.model.faults import Approval, Disapproval, Fault, WindStep
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
@@ -69,10 +69,10 @@ T = TypeVar("T")
 MAX_SHOWN = 6
 
 
-class UnderScenario(NamedTuple):
+class ScenarioMission(NamedTuple):
     """A mission that a scenario flies, and its policy, lowered and prepared, with the files of both."""
 
-    policy: Tested
+    policy: PolicyUnderTest
     mission: Mission
     declaration: MissionDecl
 
@@ -83,12 +83,12 @@ class ScenarioFlight:
 
     declaration: ScenarioDecl
     scenario: Scenario
-    policy: Tested
+    policy: PolicyUnderTest
     mission: Mission
 
 
 @dataclass(frozen=True, slots=True)
-class Scenarios:
+class ScenarioSuite:
     """The scenarios of the file that was asked for, in the order of the text; none where the sources have errors.
 
     `diagnostics` are all findings on the program, `sources` the texts that they speak of.
@@ -100,7 +100,7 @@ class Scenarios:
 
 
 def scenarios_of(
-    context: Context, missions: Mapping[str, UnderScenario], names: Mapping[str, str]
+    context: Context, missions: Mapping[str, ScenarioMission], names: Mapping[str, str]
 ) -> Iterator[ScenarioFlight]:
     """The scenarios in `context`, which were checked; without those in which something is found.
 
@@ -117,7 +117,7 @@ def scenarios_of(
 class _Lowering:
     """One scenario's lowering."""
 
-    def __init__(self, context: Context, under: UnderScenario, names: Mapping[str, str]) -> None:
+    def __init__(self, context: Context, under: ScenarioMission, names: Mapping[str, str]) -> None:
         self._context = context
         self._under = under
         self._lowered = under.policy.lowered
@@ -126,13 +126,13 @@ class _Lowering:
     def scenario(self, declaration: ScenarioDecl) -> Scenario | None:
         """The scenario; None after a finding."""
         before = len(self._context.report.found)
-        incidents = _whole(
+        incidents = _all_or_none(
             [
                 _incident(self._when(one.moment), self._fault(one.fault), self._text(one.span))
                 for one in declaration.incidents
             ]
         )
-        expectations = _whole([self._expectation(demand) for demand in declaration.demands])
+        expectations = _all_or_none([self._expectation(demand) for demand in declaration.demands])
         start = self._start(declaration.start)
         if incidents is None or expectations is None or len(self._context.report.found) > before:
             return None
@@ -285,7 +285,7 @@ class _Lowering:
             codes.UNKNOWN_CLAUSE,
             quoted.span,
             several if fitting else none,
-            help=f"quote more of one: {_listed(fitting)}" if fitting else help,
+            help=f"quote more of one: {_shown_clauses(fitting)}" if fitting else help,
             fix=None if near is None or '"' in near else (quoted.span, f'"{near}"', "quote this clause"),
         )
         return None
@@ -314,11 +314,11 @@ def _incident(when: When | None, fault: Fault | None, text: str) -> Incident | N
     return None if when is None or fault is None else Incident(when, fault, text)
 
 
-def _whole(parts: Sequence[T | None]) -> tuple[T, ...] | None:
+def _all_or_none(parts: Sequence[T | None]) -> tuple[T, ...] | None:
     """The parts, if all of them are there."""
     found = tuple(part for part in parts if part is not None)
     return found if len(found) == len(parts) else None
 
 
-def _listed(texts: Sequence[str]) -> str:
+def _shown_clauses(texts: Sequence[str]) -> str:
     return ", ".join(f"`{text}`" for text in texts[:MAX_SHOWN]) + (", ..." if len(texts) > MAX_SHOWN else "")

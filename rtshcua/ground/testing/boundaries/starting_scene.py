@@ -1,8 +1,7 @@
-"""A situation to begin from: who asks for a skill, with which arguments, in which state, so that it is allowed.
+"""A scene to start from: who asks for a skill, with which arguments, in which state, so that it is allowed.
 
-As much as can be is as a given state has it. What is looked for are values for which every rule and every clause of the
-contract is content, as the analysis of `ground.analysis` finds them; where the vehicle should be for its planned path
-to be content too is tried (`starts`).
+As much as possible stays as a given state has it. The analysis of `ground.analysis` finds values for which every rule
+and every clause of the contract is content; from where the planned path is content too is tried (`start_places`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,9 +16,8 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.questions import Questions
 from rtshcua.ground.analysis.solve import Goal
 from rtshcua.ground.analysis.witness import plainest
-from rtshcua.ground.testing.boundaries.parts import parts
 from rtshcua.ground.testing.boundaries.pivot import permitted, settled
-from rtshcua.ground.testing.boundaries.scene import Made, Scene, Value, Variable
+from rtshcua.ground.testing.boundaries.scene import Scene, SceneChanges, SceneVariable, Value, parts_of
 from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, MotionKind, SourceKind
 from rtshcua.model.flat.mission import Invocation, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
@@ -33,7 +31,7 @@ _ALOFT = 20_000
 _LOW = 10_000
 
 
-class Asker(NamedTuple):
+class Requester(NamedTuple):
     """A skill, and the role and the source that ask for it, by their numbers; `rule` is the permit that names them."""
 
     skill: int
@@ -42,23 +40,23 @@ class Asker(NamedTuple):
     rule: Rule
 
 
-class Wish(NamedTuple):
+class SceneCandidate(NamedTuple):
     """What to ask for, and what to change of the state; it remains to be tried whether it is allowed."""
 
-    asker: Asker
+    asker: Requester
     scene: Scene
-    made: Made
+    made: SceneChanges
 
 
-def askers(policy: Policy) -> Iterator[Asker]:
+def requesters(policy: Policy) -> Iterator[Requester]:
     """For each permit and skill someone whom it names, and for each other rule someone permitted on whom it bears where
     it bears on none of these; nobody twice for one skill.
     """
     permits = [rule for rule in policy.rules if rule.kind == RuleKind.PERMIT]
-    seen: dict[tuple[int, int, int], Asker] = {}
+    seen: dict[tuple[int, int, int], Requester] = {}
     for rule in permits:
         for skill in rule.skills or range(len(policy.contracts)):
-            found = next(_askers(policy, rule, skill), None)
+            found = next(_requesters(policy, rule, skill), None)
             if found is not None:
                 seen.setdefault(found[:3], found)
     for rule in policy.rules:
@@ -71,7 +69,7 @@ def askers(policy: Policy) -> Iterator[Asker]:
                 each
                 for permit in permits
                 if skill in (permit.skills or (skill,))
-                for each in _askers(policy, permit, skill)
+                for each in _requesters(policy, permit, skill)
             )
             found = next((each for each in able if _bears(rule, each)), None)
             if found is not None:
@@ -79,13 +77,13 @@ def askers(policy: Policy) -> Iterator[Asker]:
     yield from seen.values()
 
 
-def _askers(policy: Policy, rule: Rule, skill: int) -> Iterator[Asker]:
+def _requesters(policy: Policy, rule: Rule, skill: int) -> Iterator[Requester]:
     """Everybody who may ask for a skill by a permit, the likeliest first."""
     timing_class = policy.contracts[skill].timing_class
     for role in rule.roles or _roles(policy):
         for source in rule.sources or tuple(SourceKind):
             if timing_class in CLASSES[source]:
-                yield Asker(skill, role, source, rule)
+                yield Requester(skill, role, source, rule)
 
 
 def _roles(policy: Policy) -> tuple[int, ...]:
@@ -98,25 +96,30 @@ def _roles(policy: Policy) -> tuple[int, ...]:
     return tuple(sorted(named, key=lambda role: role != usual)) or (usual,)
 
 
-def _bears(rule: Rule, asker: Asker) -> bool:
+def _bears(rule: Rule, asker: Requester) -> bool:
     """Whether a rule is about someone's requests."""
     return asker.role in (rule.roles or (asker.role,)) and asker.source in (rule.sources or (asker.source,))
 
 
-def wish(
-    asker: Asker, prepared: PreparedPolicy, asked: Questions, state: State, now: Now, entries: Sequence[tuple[int, int]]
-) -> Wish | None:
+def scene_candidate(
+    asker: Requester,
+    prepared: PreparedPolicy,
+    asked: Questions,
+    state: State,
+    now: Now,
+    entries: Sequence[tuple[int, int]],
+) -> SceneCandidate | None:
     """Values for which nothing refuses; `entries` are places that a vehicle may be sent to, the likeliest first. None
     where the analysis finds none.
     """
-    best: Wish | None = None
+    best: SceneCandidate | None = None
     for place in (*entries, (0, 0)):
         scene = _sketch(asker, prepared, state, now, place, asked)
         if scene is None:
             continue
         made = _content(scene, asked)
         if made is not None and (best is None or len(made) < len(best.made)):
-            best = Wish(asker, scene, made)
+            best = SceneCandidate(asker, scene, made)
         if best is not None and not any(variable.argument for variable in best.made):
             break
         if not any(parameter.kind == PLACE for parameter in prepared.policy.contracts[asker.skill].parameters):
@@ -124,9 +127,9 @@ def wish(
     return best
 
 
-def _content(scene: Scene, asked: Questions) -> Made | None:
+def _content(scene: Scene, asked: Questions) -> SceneChanges | None:
     """What is changed so that each condition is content; if need be, but for those that a person is to confirm."""
-    every = list(parts(scene.invocation))
+    every = list(parts_of(scene.invocation))
     space = asked.space(scene.invocation.invocation.skill)
     for without in ((), ("confirm",)):
         goals: list[Goal] = [
@@ -149,7 +152,7 @@ def _in_airspace(invocation: PreparedInvocation) -> Iterator[Goal]:
 
 
 def _sketch(
-    asker: Asker, prepared: PreparedPolicy, state: State, now: Now, place: tuple[int, int], asked: Questions
+    asker: Requester, prepared: PreparedPolicy, state: State, now: Now, place: tuple[int, int], asked: Questions
 ) -> Scene | None:
     """A scene with some arguments; the survey of an area is one place of it."""
     policy = prepared.policy
@@ -201,7 +204,7 @@ def _sketch(
     return Scene(invocation, state, context, now)
 
 
-def starts(scene: Scene) -> Iterator[tuple[int, int, int]]:
+def start_places(scene: Scene) -> Iterator[tuple[int, int, int]]:
     """Places and heights (local mm) from where the planned path may well be content: where the scene is, where the
     path begins, and home; as high as the scene, as the plan, low over the ground, and on it.
     """
@@ -214,7 +217,7 @@ def starts(scene: Scene) -> Iterator[tuple[int, int, int]]:
             yield place[0], place[1], high
 
 
-def others(scene: Scene, entries: Sequence[tuple[int, int]]) -> Iterator[Made]:
+def other_arguments(scene: Scene, entries: Sequence[tuple[int, int]]) -> Iterator[SceneChanges]:
     """The same arguments, and then one that the planned path depends on otherwise: as low as can be, another area, a
     place nearer to home.
     """
@@ -228,4 +231,4 @@ def others(scene: Scene, entries: Sequence[tuple[int, int]]) -> Iterator[Made]:
             values += (zone for zone in range(policy.declared) if zone != flat.arguments[parameter.cell])
         elif parameter.kind == PLACE:
             values += (*entries, (0, 0), (_LOW, 0))
-        yield from ({Variable(True, parameter.cell): value} for value in values)
+        yield from ({SceneVariable(True, parameter.cell): value} for value in values)

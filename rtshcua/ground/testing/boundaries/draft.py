@@ -1,9 +1,19 @@
-"""The text of generated tests: a nominal, and blocks of cases, each a `test` of the language."""
+"""The text of generated tests: a nominal, and blocks of cases, each a `test` of the language.
 
-from collections.abc import Sequence
+The language itself reads each draft: what it refuses is left out, and the decision itself decides each case.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from textwrap import fill
 from typing import NamedTuple
+
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.testing.boundaries.scene import Scene
+from rtshcua.ground.testing.case import CaseSuite, PolicyCase
+from rtshcua.ground.testing.case_result import run_case
+from rtshcua.model.outcome import Outcome
 
 #: how wide a comment becomes at most, and stands for a title
 _WIDTH = 116
@@ -18,7 +28,7 @@ HEAD = """\
 """
 
 
-class Row(NamedTuple):
+class CaseRow(NamedTuple):
     """One case: the cells of its columns as they are written; none for a block without columns."""
 
     cells: tuple[str, ...] = ()
@@ -36,7 +46,7 @@ class Block:
     comments: tuple[str, ...] = ()
     premises: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
-    rows: list[Row] = field(default_factory=list)
+    rows: list[CaseRow] = field(default_factory=list)
 
     def written(self, answers: Sequence[str] | None = None) -> str:
         """The text of the block; it begins with an empty line."""
@@ -105,3 +115,78 @@ def _written(block: Block, answers: Sequence[str]) -> str:
         lines += [f"    {cell:<{width}}  expect {answer}" for cell, answer in zip(cells, answers, strict=True)]
         lines.append("  }")
     return "\n".join([*lines, "}", ""])
+
+
+#: reads a source, and gives its cases
+ReadSource = Callable[[str], CaseSuite]
+#: how often what the language refuses is left out, and the rest read again
+_ATTEMPTS = 8
+
+
+class DraftRefused(Exception):
+    """The language refuses a draft, not one of its cases; `findings` say why."""
+
+    def __init__(self, findings: tuple[Diagnostic, ...]) -> None:
+        super().__init__()
+        self.findings = findings
+
+
+class ReadBlock(NamedTuple):
+    """A block with the cases that it is read as, one a row."""
+
+    block: Block
+    cases: tuple[PolicyCase, ...]
+
+
+def read_draft(draft: Draft, play: ReadSource) -> list[ReadBlock]:
+    """The blocks of a draft that the language takes; the others, and rows, are left out. Raises `DraftRefused`."""
+    errors: tuple[Diagnostic, ...] = ()
+    for _ in range(_ATTEMPTS):
+        suite = play(draft.text())
+        errors = tuple(each for each in suite.diagnostics if each.severity is Severity.ERROR)
+        if not errors:
+            left = iter(suite.cases)
+            return [ReadBlock(each, tuple(next(left) for _ in each.rows)) for each in draft.blocks]
+        if not _leave_out(draft, errors):
+            break
+    raise DraftRefused(errors)
+
+
+def scene_of(case: PolicyCase) -> Scene:
+    """What a case decides on."""
+    return Scene(case.invocation, case.state, case.context, case.now)
+
+
+def allowed(case: PolicyCase) -> bool:
+    """Whether a case is decided as `allow`."""
+    return run_case(case).trace.decision.outcome is Outcome.ALLOW
+
+
+def expectation(case: PolicyCase) -> str:
+    """What a case is decided as, as a test expects it."""
+    decision = run_case(case).trace.decision
+    words = decision.outcome.name.lower()
+    if decision.outcome is Outcome.FALLBACK and decision.target is not None:
+        words += f" {case.policy.lowered.policy.contracts[decision.target.skill].name}"
+    return f"{words} because {decision.reason.value}"
+
+
+def _leave_out(draft: Draft, errors: Sequence[Diagnostic]) -> bool:
+    """Take away the rows that errors are about, or else their blocks; whether there were any."""
+    wrong: dict[Block, set[int]] = {}
+    starts = [each.span.start for each in errors if each.span is not None]
+    at = 0
+    for piece, block in draft.pieces():
+        for start in starts:
+            if block is not None and at <= start < at + len(piece):
+                wrong.setdefault(block, set()).add(start - at)
+        at += len(piece)
+    kept: list[Block] = []
+    for block in draft.blocks:
+        rows = {block.row_at(offset) for offset in wrong.get(block, ())}
+        left = [row for number, row in enumerate(block.rows) if number not in rows]
+        if None not in rows and left:
+            block.rows = left
+            kept.append(block)
+    draft.blocks = kept
+    return bool(wrong)

@@ -29,7 +29,7 @@ _SIDES: Final = 8
 _ASIDE: Final = 300
 
 
-class Edge(NamedTuple):
+class ZoneEdge(NamedTuple):
     """A place where a condition holds, and one beside it where it does not; local mm, exactly as they are written."""
 
     holds: Place
@@ -50,7 +50,7 @@ class Lattice(NamedTuple):
         return project(self.projection, *number)
 
 
-def edge(policy: Policy, holds: Holds, start: Place, zones: tuple[Zone, ...]) -> Edge | None:
+def zone_edge(policy: Policy, holds: Holds, start: Place, zones: tuple[Zone, ...]) -> ZoneEdge | None:
     """An edge between where the search starts and where a condition is otherwise; `zones` say where to look."""
     lattice = Lattice(policy.projection)
     first = lattice.near(start)
@@ -66,7 +66,7 @@ def edge(policy: Policy, holds: Holds, start: Place, zones: tuple[Zone, ...]) ->
     return None
 
 
-def ring_edges(policy: Policy, holds: Holds, ring: Sequence[Place]) -> Iterator[Edge]:
+def ring_edges(policy: Policy, holds: Holds, ring: Sequence[Place]) -> Iterator[ZoneEdge]:
     """Edges across some sides of one ring of a zone's outline; none where a condition is the same on both sides."""
     lattice = Lattice(policy.projection)
     for one, other in _beside_sides(ring):
@@ -131,7 +131,7 @@ def _between(lattice: Lattice, holds: Holds, one: Place, other: Place, wanted: T
     return (on_the_way(low), on_the_way(high)) if steps else None
 
 
-def _closest(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: Truth) -> Edge | None:
+def _closest(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: Truth) -> ZoneEdge | None:
     """Of many pairs along the edge the places that are nearest to the other side."""
     best: dict[Truth, tuple[bool, Place]] = {}
     for one, other in _along(lattice, holds, pair, known):
@@ -142,7 +142,7 @@ def _closest(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: T
                 best[truth] = (_beside(holds, place, truth), place)
         if len(best) == 2 and all(tight for tight, _ in best.values()):
             break
-    return Edge(best[TRUE][1], best[FALSE][1]) if len(best) == 2 else None
+    return ZoneEdge(best[TRUE][1], best[FALSE][1]) if len(best) == 2 else None
 
 
 def _along(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: Truth) -> Iterator[tuple[Place, Place]]:

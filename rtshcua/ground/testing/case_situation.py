@@ -1,7 +1,10 @@
-"""The situation of a case: what its nominal gives, what its test gives instead, and then its row."""
+"""The situation of a case: what its nominal gives, what its test gives instead, and then its row.
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+A condition over time is found again among those that the policy observes by what it says.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 from rtshcua.decision.temporal import lasting
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
@@ -10,19 +13,96 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.analysis.reported import means_unknown
 from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.parts import walk
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.testing.case import Tested
-from rtshcua.ground.testing.monitored import monitored
-from rtshcua.model.flat.policy import RuleKind
+from rtshcua.ground.lower.conditions import Conditions
+from rtshcua.ground.lower.policy import LoweredPolicy
+from rtshcua.ground.testing.case import PolicyUnderTest
+from rtshcua.model.flat.policy import MonitorKind, RuleKind
 from rtshcua.model.flat.signal import POSITION, Signal
 from rtshcua.model.flat.situation import Approval, Now, State
-from rtshcua.model.ir.expression import Coordinates, Reference
+from rtshcua.model.ir.expression import Condition, Coordinates, Edge, ForLast, Near, Reference, WithinLast
+from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.tests import Answer, Cell, Named, OverTime, Subject
+
+
+class _Timed(NamedTuple):
+    """What is kept of a condition over time: how it looks back, how far, and at what."""
+
+    kind: MonitorKind
+    window_us: int
+    operand: Condition
+
+
+class MonitorIndex:
+    """The monitors of a policy by their condition: what it says counts, not where it is written."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[tuple[MonitorKind, int, Any], tuple[int, ...]] = {}
+        self.texts: list[str] = []
+
+    def numbers(self, condition: Condition) -> Sequence[int]:
+        """The monitors of a condition: none where nothing observes it, two where it is kept for either safe side."""
+        timed = next(_timed_of(condition), None)
+        return () if timed is None else self._numbers.get(_key(timed), ())
+
+    def add(self, timed: _Timed, found: Conditions, text: str) -> None:
+        """Note what a condition of the policy became."""
+        numbers = found.monitors_of(timed.operand, timed.kind, timed.window_us)
+        if numbers and _key(timed) not in self._numbers:
+            self._numbers[_key(timed)] = numbers
+            self.texts.append(text)
+
+
+def monitors_of(context: Context, under: LoweredPolicy) -> MonitorIndex:
+    """All that the rules of a policy, and the contracts under it, observe over time."""
+    found = MonitorIndex()
+    for condition in _conditions(context, under) if under.policy.monitors else ():
+        for part in walk(condition):
+            for timed in _timed_of(part):
+                found.add(timed, under.conditions, context.report.text(part.span))
+    return found
+
+
+def _conditions(context: Context, under: LoweredPolicy) -> Iterator[Condition]:
+    for rule in under.rules:
+        if rule.when is not None:
+            yield rule.when
+    for name in under.skills:
+        skill = context.symbols.skills[name]
+        for clause in (*skill.require, *skill.assume, *skill.maintain):
+            yield clause.condition
+
+
+def _timed_of(node: Any) -> Iterator[_Timed]:
+    match node:
+        case ForLast():
+            yield _Timed(MonitorKind.FOR_LAST, node.window.value, node.operand)
+        case WithinLast():
+            yield _Timed(MonitorKind.WITHIN_LAST, node.window.value, node.operand)
+        case Edge():
+            yield _Timed(MonitorKind.RISING if node.rising else MonitorKind.FALLING, 0, node.operand)
+        case Near():
+            for before in (node.left, node.right):
+                yield _Timed(MonitorKind.WITHIN_LAST, node.window.value, before)
+
+
+def _key(timed: _Timed) -> tuple[MonitorKind, int, Any]:
+    return timed.kind, timed.window_us, _without_spans(timed.operand)
+
+
+def _without_spans(node: Any) -> Any:
+    """A node without its places."""
+    if isinstance(node, Node):
+        fields = (name for name in type(node).__struct_fields__ if name != "span")
+        return type(node).__name__, *(_without_spans(getattr(node, name)) for name in fields)
+    return tuple(map(_without_spans, node)) if type(node) is tuple else node
+
 
 TRUTHS = {"true": TRUE, "false": FALSE}
 
 
-class Said(NamedTuple):
+class SubjectValue(NamedTuple):
     """A subject, its cell, and where both are said."""
 
     subject: Subject
@@ -33,13 +113,13 @@ class Said(NamedTuple):
 class Situations:
     """Makes the states of the cases under one policy; what it does not read is reported, once each."""
 
-    def __init__(self, context: Context, policy: Tested) -> None:
+    def __init__(self, context: Context, policy: PolicyUnderTest) -> None:
         self._context = context
         self._policy = policy
         self._signals = {signal.name: signal for signal in policy.lowered.policy.signals}
-        self._monitors = monitored(context, policy.lowered)
+        self._monitors = monitors_of(context, policy.lowered)
 
-    def state(self, said: Iterable[Said], now: Now) -> State:
+    def state(self, said: Iterable[SubjectValue], now: Now) -> State:
         """The state in which all that is said holds, the last word on each, and nothing else is known.
 
         Conditions over time are as if the state had been so for longer than any of them looks back, but for those that
@@ -51,7 +131,7 @@ class Situations:
         truths: list[tuple[Sequence[int], int]] = []
         for subject, cell, span in said:
             if isinstance(subject, OverTime):
-                truths.append((self._numbers(subject), _truth(cell)))
+                truths.append((self._numbers(subject), _truth_of(cell)))
                 continue
             signal = self._signals.get(subject.name.text)
             if signal is None:
@@ -88,7 +168,7 @@ class Situations:
             found += [Approval(number, role, int(answer.granted), moment, person) for number in rules]
         return tuple(found)
 
-    def missing(self, reads: Iterable[int], said: Iterable[Said]) -> list[str]:
+    def missing(self, reads: Iterable[int], said: Iterable[SubjectValue]) -> list[str]:
         """The signals in these slots of which nothing is said."""
         given = {each.subject.name.text for each in said if isinstance(each.subject, Named)}
         slots = set(reads)
@@ -144,5 +224,5 @@ class Situations:
         )
 
 
-def _truth(cell: Cell) -> int:
+def _truth_of(cell: Cell) -> int:
     return TRUTHS.get(cell.value.name, UNKNOWN) if isinstance(cell.value, Reference) else UNKNOWN

@@ -9,7 +9,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.lower.files import shortened
-from rtshcua.ground.testing.case import Tested
+from rtshcua.ground.testing.case import PolicyUnderTest
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.tests import Expectation
@@ -39,7 +39,7 @@ def quotes(quoted: str, text: str) -> bool:
 
 
 def quoted_clauses(
-    context: Context, expected: Expectation, invocation: PreparedInvocation, policy: Tested
+    context: Context, expected: Expectation, invocation: PreparedInvocation, policy: PolicyUnderTest
 ) -> tuple[Decisive, ...]:
     """The clause that an expectation quotes, in all its flat forms; none where it quotes none, or after a finding: that
     it quotes what no decision on this request can name, or what could be several.
@@ -126,7 +126,7 @@ def _shown(texts: Sequence[str]) -> str:
     return ", ".join(f"`{text}`" for text in texts[:MAX_SHOWN]) + (", ..." if len(texts) > MAX_SHOWN else "")
 
 
-def _decisive(invocation: PreparedInvocation, policy: Tested) -> Iterator[_Candidate]:
+def _decisive(invocation: PreparedInvocation, policy: PolicyUnderTest) -> Iterator[_Candidate]:
     """All clauses that a decision on a request can name."""
     contract = invocation.invocation.contract
     for role, clauses in (("require", contract.require), ("assume", contract.assume), ("maintain", contract.maintain)):

@@ -57,7 +57,7 @@ class Where(NamedTuple):
     end: int
 
 
-class Item(NamedTuple):
+class CoverageItem(NamedTuple):
     """One clause. `skill` is the name of the skill that it belongs to, "" for what is the policy's own.
 
     `goals` are what counts, in the order of `Goal`; `impossible` what was shown to be out of reach.
@@ -77,7 +77,7 @@ class Universe(NamedTuple):
     """
 
     prepared: PreparedPolicy
-    items: tuple[Item, ...]
+    items: tuple[CoverageItem, ...]
     rules: dict[Rule, int]
     clauses: dict[tuple[int, str, Clause], int]
     energy: dict[int, int]
@@ -90,10 +90,10 @@ class Universe(NamedTuple):
         return sum(len(item.goals) for item in self.items)
 
 
-def universe(prepared: PreparedPolicy) -> Universe:
+def universe_of(prepared: PreparedPolicy) -> Universe:
     """What there is to cover of a policy."""
     policy, made = prepared.policy, _Made(prepared)
-    items: list[Item] = []
+    items: list[CoverageItem] = []
     rules: dict[Rule, int] = {}
     for group in _written(policy.rules):
         rules |= dict.fromkeys(group, len(items))
@@ -112,7 +112,7 @@ def universe(prepared: PreparedPolicy) -> Universe:
         energy[skill] = len(items)
         items.append(made.energy(contract))
     decisions = len(items)
-    items.append(Item(DECISIONS, "", "the outcomes of its decisions", None, tuple(OUTCOMES.values()), ()))
+    items.append(CoverageItem(DECISIONS, "", "the outcomes of its decisions", None, tuple(OUTCOMES.values()), ()))
     return Universe(prepared, tuple(items), rules, clauses, energy, airspace, decisions)
 
 
@@ -166,7 +166,7 @@ class _Made:
         self._prepared = prepared
         self._questions = Questions(prepared)
 
-    def rule(self, group: Sequence[Rule]) -> Item:
+    def rule(self, group: Sequence[Rule]) -> CoverageItem:
         """One rule, in all its flat forms."""
         first = group[0]
         every = range(len(self._prepared.policy.contracts))
@@ -178,9 +178,9 @@ class _Made:
         }
         decides = {Goal.TRUE} if first.kind == RuleKind.PERMIT else {Goal.TRUE, Goal.UNKNOWN}
         where = Where(first.source, first.start, first.end)
-        return _item(RuleKind(first.kind).name.lower(), "", first.text, where, possible, decides)
+        return _coverage_item(RuleKind(first.kind).name.lower(), "", first.text, where, possible, decides)
 
-    def clause(self, skill: int, role: str, clause: Clause) -> Item:
+    def clause(self, skill: int, role: str, clause: Clause) -> CoverageItem:
         """A condition of a skill. Over a planned volume, a comparison of sums may be false where no place of it is, so
         that a `maintain` clause is never shown not to be false.
         """
@@ -189,9 +189,9 @@ class _Made:
         assumed = FALSE if role == "maintain" else 0
         possible = {goal for truth, goal in TRUTHS.items() if truth & assumed or self._possible(skill, node, truth)}
         where = Where(clause.source, clause.start, clause.end)
-        return _item(role, contract.name, clause.text, where, possible, {Goal.FALSE, Goal.UNKNOWN})
+        return _coverage_item(role, contract.name, clause.text, where, possible, {Goal.FALSE, Goal.UNKNOWN})
 
-    def energy(self, contract: Contract) -> Item:
+    def energy(self, contract: Contract) -> CoverageItem:
         """The charge that a skill needs: none is too little where it needs none."""
         vehicle = self._prepared.policy.vehicle
         energy = Energy(contract, vehicle)
@@ -200,7 +200,7 @@ class _Made:
             possible.discard(Goal.TRUE)
         if not energy.stays and energy.needed(0) <= 0:
             possible.discard(Goal.FALSE)
-        return _item(ENERGY, contract.name, ENERGY_TEXT, None, possible, {Goal.FALSE, Goal.UNKNOWN})
+        return _coverage_item(ENERGY, contract.name, ENERGY_TEXT, None, possible, {Goal.FALSE, Goal.UNKNOWN})
 
     def _when(self, rule: Rule) -> tree.Node | None:
         return self._prepared.compiler.when(rule)
@@ -215,17 +215,19 @@ class _Made:
         return not isinstance(self._questions.ask((skill, node, truth), lambda: [(node, truth)], space), No)
 
 
-def _airspace(airspace: Airspace) -> Item:
+def _airspace(airspace: Airspace) -> CoverageItem:
     possible = {Goal.TRUE, Goal.FALSE, Goal.UNKNOWN}
     where = Where(airspace.source, airspace.start, airspace.end)
-    return _item(AIRSPACE, "", airspace.text, where, possible, {Goal.FALSE, Goal.UNKNOWN})
+    return _coverage_item(AIRSPACE, "", airspace.text, where, possible, {Goal.FALSE, Goal.UNKNOWN})
 
 
-def _item(role: str, skill: str, text: str, where: Where | None, possible: set[Goal], decides: set[Goal]) -> Item:
+def _coverage_item(
+    role: str, skill: str, text: str, where: Where | None, possible: set[Goal], decides: set[Goal]
+) -> CoverageItem:
     """An item; it can decide where it can have one of the truths that decide."""
     if possible & decides:
         possible = possible | {Goal.DECIDED}
     every = (Goal.TRUE, Goal.FALSE, Goal.UNKNOWN, Goal.DECIDED)
     goals = tuple(goal for goal in every if goal in possible)
     impossible = tuple(goal for goal in every if goal not in possible)
-    return Item(role, skill, " ".join(text.split()), where, goals, impossible)
+    return CoverageItem(role, skill, " ".join(text.split()), where, goals, impossible)

@@ -1,0 +1,267 @@
+"""What tests found, as JSON and as the suites of JUnit. E1610: what flights of scenarios found, as findings too."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, Final, NamedTuple
+
+from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.render import render_one
+from rtshcua.diagnostics.report.junit import Outcome, Suite
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.testing.case_result import CaseResult
+from rtshcua.ground.testing.clause_coverage import PolicyCoverage, ReachedGoals, per_mille
+from rtshcua.ground.testing.coverage_goals import CoverageItem
+from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.policy import Policy
+
+
+def tests_json(ran: Iterable[CaseResult], sources: Mapping[str, Source]) -> list[dict[str, Any]]:
+    """One object a case, in the order of the text; every key is always there."""
+    return [_case_json(each, sources) for each in ran]
+
+
+def summary_json(ran: Sequence[CaseResult]) -> dict[str, int]:
+    """How many tests and cases there were, and how they ended."""
+    passed = sum(each.met for each in ran)
+    tests = len({(each.case.test.span.file, each.case.test.span.start) for each in ran})
+    return {"tests": tests, "cases": len(ran), "passed": passed, "failed": len(ran) - passed}
+
+
+def coverage_json(covered: Sequence[PolicyCoverage], sources: Mapping[str, Source]) -> dict[str, Any]:
+    """The coverage of all policies together and of each, by clause."""
+    reached, total = sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered)
+    return _share_json(reached, total) | {"policies": [_policy_json(one, sources) for one in covered]}
+
+
+def case_suites(
+    ran: Iterable[CaseResult], sources: Mapping[str, Source], covered: Sequence[PolicyCoverage] | None
+) -> tuple[Suite, ...]:
+    """A suite for each file, a test of it for each case; what all of them cover is in the properties of the first."""
+    files = [(file, tuple(group)) for file, group in groupby(ran, lambda each: each.case.span.file)]
+    properties = () if covered is None else tuple(_properties(covered))
+    return tuple(
+        Suite(file, tuple(_outcome(each, sources) for each in group), () if number else properties)
+        for number, (file, group) in enumerate(files)
+    )
+
+
+def policy_name(policy: Policy) -> str:
+    """A policy as missions name it."""
+    return f"{policy.name}@{policy.version}"
+
+
+def clause_words(item: CoverageItem) -> str:
+    """A clause with the skill and the list that it belongs to; a rule, and an airspace, says by itself what it is."""
+    return f"{item.skill} {item.role}: {item.text}" if item.skill else item.text
+
+
+def place_json(span: Span | None, sources: Mapping[str, Source]) -> dict[str, Any] | None:
+    """A place in a source."""
+    if span is None:
+        return None
+    at = sources[span.file].position(span.start)
+    return {"file": span.file, "start": span.start, "end": span.end, "line": at.line, "column": at.column}
+
+
+def _case_json(ran: CaseResult, sources: Mapping[str, Source]) -> dict[str, Any]:
+    case, decision, expected = ran.case, ran.trace.decision, ran.expected
+    return {
+        "name": case.name,
+        "test": case.test.name.text,
+        "row": case.row,
+        "at": place_json(case.span, sources),
+        "policy": policy_name(case.policy.lowered.policy),
+        "skill": case.invocation.invocation.contract.name,
+        "met": ran.met,
+        "expected": {
+            "outcome": expected.outcome,
+            "target": None if expected.target is None else expected.target.text,
+            "reason": None if expected.reason is None else expected.reason.text,
+            "clause": None if expected.clause is None else expected.clause.text,
+        },
+        "decided": {
+            "outcome": decision.outcome.name.lower(),
+            "target": _target(ran),
+            "reason": decision.reason.value,
+            "clause": clause_of(decision),
+            "written": None if decision.clause is None else place_json(case.policy.span(decision.clause), sources),
+        },
+    }
+
+
+def clause_of(decision: Decision) -> str | None:
+    """The clause that decided, as it is written, on one line."""
+    return None if decision.clause is None else " ".join(decision.clause.text.split())
+
+
+def _target(ran: CaseResult) -> str | None:
+    target = ran.trace.decision.target
+    return None if target is None else ran.case.policy.lowered.policy.contracts[target.skill].name
+
+
+def _outcome(ran: CaseResult, sources: Mapping[str, Source]) -> Outcome:
+    span, finding = ran.case.span, ran.finding
+    line = sources[span.file].position(span.start).line
+    if finding is None:
+        return Outcome(ran.case.name, span.file, line, time_us=ran.took_us)
+    text = render_one(finding, sources).rstrip("\n")
+    return Outcome(ran.case.name, span.file, line, failure=text, kind=finding.code.id, time_us=ran.took_us)
+
+
+def _properties(covered: Sequence[PolicyCoverage]) -> Iterable[tuple[str, str]]:
+    for one in covered:
+        found = one.coverage
+        yield f"coverage {policy_name(found.policy)}", f"{found.covered}/{found.total}"
+        for item in found.undecided:
+            yield f"never decided {policy_name(found.policy)}", clause_words(item)
+
+
+def _share_json(reached: int, total: int) -> dict[str, Any]:
+    return {"covered": reached, "total": total, "per_mille": per_mille(reached, total)}
+
+
+def _policy_json(one: PolicyCoverage, sources: Mapping[str, Source]) -> dict[str, Any]:
+    found = one.coverage
+    clauses = [
+        {
+            "role": line.item.role,
+            "skill": line.item.skill or None,
+            "text": line.item.text,
+            "at": place_json(span, sources),
+            "reached": {goal.value: count for goal, count in zip(line.item.goals, line.counts, strict=True)},
+            "missing": [goal.value for goal in line.missing],
+            "impossible": [goal.value for goal in line.item.impossible],
+        }
+        for line, span in zip(found.lines, one.spans, strict=True)
+    ]
+    head = {"policy": found.policy.name, "version": found.policy.version, "vehicle": found.policy.vehicle.name}
+    return head | {"decisions": found.decisions} | _share_json(found.covered, found.total) | {"clauses": clauses}
+
+
+#: of a failure that is no expectation's: its number among them
+JUDGED: Final = -1
+
+
+class FlightFailure(NamedTuple):
+    """What is wrong with a flight: the number of an expectation, or `JUDGED` with the judge's slug; and in words."""
+
+    expectation: int
+    slug: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class FlightResult:
+    """What came of a flight. `reached`: what it covers of its policy, each time that a step was decided on; `took_us`:
+    how long it took to fly and judge, by the machine's clock; `notes`: why a run of it did not begin, in words.
+    """
+
+    number: int
+    flavour: str
+    seed: int
+    ending: str
+    wrong: tuple[FlightFailure, ...]
+    excused: tuple[str, ...]
+    happened: tuple[str, ...]
+    reached: tuple[ReachedGoals, ...]
+    took_us: int = 0
+    notes: tuple[str, ...] = ()
+
+
+class ScenarioResult(NamedTuple):
+    """A scenario with all of its flights, and a finding (E1610) for each thing that went wrong in some of them."""
+
+    scenario: ScenarioFlight
+    flights: tuple[FlightResult, ...]
+    findings: tuple[Diagnostic, ...]
+
+    @property
+    def failed(self) -> int:
+        """In how many flights something went wrong."""
+        return sum(bool(each.wrong) for each in self.flights)
+
+    @property
+    def endings(self) -> dict[str, int]:
+        """How many flights ended in which way."""
+        return dict(sorted(Counter(each.ending for each in self.flights).items()))
+
+
+def findings(scenario: ScenarioFlight, flights: Sequence[FlightResult]) -> Iterator[Diagnostic]:
+    """One for each expectation that some flight did not meet, and one for each failure that the judge found."""
+    found: dict[tuple[int, str], list[tuple[FlightResult, str]]] = {}
+    for flight in flights:
+        for expectation, slug, text in flight.wrong:
+            found.setdefault((expectation, slug), []).append((flight, text))
+    for (expectation, slug), failed in sorted(found.items(), key=lambda each: each[0]):
+        (first, text), many = failed[0], len(failed)
+        where = f"on {first.flavour} with seed {first.seed}"
+        others = f", and in {many - 1} more of {len(flights)} flights" if many > 1 else ""
+        what = text if expectation == JUDGED else f"{text}, which is not as expected"
+        head = f"`{slug}`: " if expectation == JUDGED else ""
+        yield Diagnostic(
+            codes.FLIGHT_FAILED,
+            f"{where}{others}: {head}{what}",
+            _expectation_span(scenario, expectation),
+            _flight_help(first),
+        )
+
+
+def _expectation_span(scenario: ScenarioFlight, expectation: int) -> Span:
+    if expectation == JUDGED:
+        return scenario.declaration.name.span
+    written = scenario.scenario.expectations[expectation]
+    return Span(written.source, written.start, written.end)
+
+
+def _flight_help(flight: FlightResult) -> str:
+    happened = ", ".join(flight.happened)
+    before = f"before it ended as `{flight.ending}`"
+    told = f"{before}: {happened}" if happened else f"nothing went wrong {before}"
+    return "; ".join((told, *flight.notes))
+
+
+def scenarios_json(flown: Sequence[ScenarioResult], sources: Mapping[str, Source]) -> list[dict[str, Any]]:
+    """One object a scenario, in the order of the text, with one for each flight; every key is always there."""
+    return [
+        {
+            "name": each.scenario.scenario.name,
+            "at": place_json(each.scenario.declaration.name.span, sources),
+            "mission": each.scenario.mission.name,
+            "met": not each.failed,
+            "endings": each.endings,
+            "flights": [
+                {
+                    "flavour": flight.flavour,
+                    "seed": flight.seed,
+                    "ending": flight.ending,
+                    "wrong": [{"slug": wrong.slug, "text": wrong.text} for wrong in flight.wrong],
+                    "excused": list(flight.excused),
+                    "happened": list(flight.happened),
+                }
+                for flight in each.flights
+            ],
+        }
+        for each in flown
+    ]
+
+
+def scenario_suites(flown: Sequence[ScenarioResult], sources: Mapping[str, Source]) -> tuple[Suite, ...]:
+    """A suite for each file, a test of it for each scenario."""
+    files = groupby(flown, lambda each: each.scenario.declaration.span.file)
+    return tuple(Suite(file, tuple(_scenario_outcome(each, sources) for each in group), ()) for file, group in files)
+
+
+def _scenario_outcome(flown: ScenarioResult, sources: Mapping[str, Source]) -> Outcome:
+    span = flown.scenario.declaration.name.span
+    line = sources[span.file].position(span.start).line
+    took_us = sum(flight.took_us for flight in flown.flights)
+    if not flown.findings:
+        return Outcome(flown.scenario.scenario.name, span.file, line, time_us=took_us)
+    text = "\n".join(render_one(each, sources).rstrip("\n") for each in flown.findings)
+    return Outcome(
+        flown.scenario.scenario.name, span.file, line, failure=text, kind=flown.findings[0].code.id, time_us=took_us
+    )

@@ -11,16 +11,16 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 845,
-    "code lines": 84_039,
-    "shared class names": 139,
-    "of them across packages": 117,
-    "shared file names": 101,
+    "modules": 832,
+    "code lines": 84_010,
+    "shared class names": 135,
+    "of them across packages": 115,
+    "shared file names": 98,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 57,
-    "functions of more than 60 lines": 22,
-    "functions of a complexity over 15": 168,
-    "functions of a complexity over 25": 15,
+    "modules below 80 lines with one importer": 53,
+    "functions of more than 60 lines": 21,
+    "functions of a complexity over 15": 167,
+    "functions of a complexity over 25": 14,
 }
 
 

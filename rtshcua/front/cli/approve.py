@@ -28,7 +28,7 @@ from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.unlock import person_key, terminal, unlock_person
 from rtshcua.ground.analysis.confirming import may_match
-from rtshcua.ground.lower.surveyed import Planned, planned_otherwise
+from rtshcua.ground.lower.signed_paths import PlannedPath, path_planned_otherwise
 from rtshcua.model.step_number import index_of, number_of
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
 from rtshcua.wire.untrusted import Untrusted
@@ -108,7 +108,7 @@ def approve(
         told = words.step(flying.policy, about)
         mission = shorten(flying.mission.name, NAME_SHOWN)  # the proposer's word: it pushes nothing out of sight
         say(f"step {step} of `{mission}` on `{said.vehicle}`: `{told}`")
-        planned = planned_otherwise(flying.policy, about)
+        planned = path_planned_otherwise(flying.policy, about)
         if planned is not None:
             told += ", a path that is not the planner's"
             say(f"who signed the mission chose another path than the planner does: {_other(planned)}")
@@ -128,7 +128,7 @@ def approve(
     return deliver(document, what, to=to, output=output, as_json=as_json)
 
 
-def _other(planned: Planned) -> str:
+def _other(planned: PlannedPath) -> str:
     if not planned.points:
         return "it finds none there"
     apart = f"the two are up to {words.length(planned.apart)} apart"

@@ -1,34 +1,45 @@
-"""Conditions to postfix code. What is lowered here was found well typed.
+"""Conditions to postfix code (`rtshcua.model.flat.code`). What is lowered here was found well typed.
 
 Which side is the safe one for a derived zone depends on what the condition is for, and on the `not` before it: a zone
 that must be flown in is never too large, one that must not be is never too small. `for the last`, `within the last` and
 `within ... of` are true the more, the more their condition is, so they keep the side; an edge reads no grown zone.
+
+Numbers are linear forms with exact rational factors, or the largest or smallest of several. A comparison of forms is
+multiplied by what makes every factor whole, so nothing is ever rounded, and all stays within 64 bits. `max(a, b) <= c`
+is `a <= c and b <= c`, `max(a, b) >= c` is `a >= c or b >= c`, and `min` the other way round, so that one part which is
+known may decide alone. `==` is `<=` and `>=` there, `!=` is `<` or `>`.
+
+Comparisons of enumerations and of the mission's phase ask whether a value is in a set, those of the local time whether
+it is in a part of the day. A window of the day includes both its ends, which are whole us: before 19:00 is up to the
+last us of it, after 19:00 from the next. One of some days of the week begins on these, and may end on the next.
 """
 
-from collections.abc import Mapping
-from typing import NamedTuple
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import gcd, lcm
+from typing import Any, NamedTuple, TypeAlias
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.dimensions import COHERENT
+from rtshcua.ground.checker.phases import is_about_phase
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.types import ZONE
 from rtshcua.ground.checker.values import typed
-from rtshcua.ground.lower import clock
-from rtshcua.ground.lower.emit import Code
-from rtshcua.ground.lower.files import Files
-from rtshcua.ground.lower.memberships import Memberships
-from rtshcua.ground.lower.monitors import Monitors
-from rtshcua.ground.lower.numbers import Numbers
-from rtshcua.ground.lower.sets import Sets
-from rtshcua.ground.lower.slots import Slots
-from rtshcua.ground.lower.zones import ZoneTable
+from rtshcua.ground.lower.tables import MonitorTable, SignalSlots, SourceTable, ValueSets, enum_labels
+from rtshcua.ground.lower.zones import ZoneTable, weekly_windows
 from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Clause, Op
+from rtshcua.model.flat.limits import DAY, MAX_MAGNITUDE, MAX_VALUE, WEEK
 from rtshcua.model.flat.policy import MonitorKind
 from rtshcua.model.ir.expression import (
+    Arithmetic,
     Comparison,
     Condition,
     Edge,
     ForLast,
+    Function,
     Grow,
     Inside,
     Junction,
@@ -36,15 +47,152 @@ from rtshcua.model.ir.expression import (
     Near,
     Not,
     OneOf,
+    Quantity,
     Reference,
     TimeOfDay,
+    Value,
     Within,
     WithinLast,
 )
 from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.signals import SignalDecl
+from rtshcua.model.quantity import Dimension
+
+_COMPARE: Mapping[str, Op] = {"<": Op.LT, "<=": Op.LE, ">": Op.GT, ">=": Op.GE, "==": Op.EQ, "!=": Op.NE}
+_MIRRORED: Mapping[str, str] = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
+_HOLDS: Mapping[str, Callable[[Any, Any], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
 
 
-class Place(NamedTuple):
+# ---------------------------------------------------------------- instructions
+
+_PUSHES = frozenset(
+    {
+        Op.CONST,
+        Op.SIGNAL,
+        Op.ARGUMENT,
+        Op.SIGNAL_IN,
+        Op.ARGUMENT_IN,
+        Op.KNOWN,
+        Op.POSITION_IN,
+        Op.POSITION_IN_ARGUMENT,
+        Op.ARGUMENT_POINT_IN,
+        Op.TIME_IN,
+        Op.WEEK_IN,
+        Op.PHASE_IN,
+        Op.MONITOR,
+    }
+)
+_KEEPS = frozenset({Op.NOT, Op.SCALE})
+
+
+class CodeWriter:
+    """Instructions in the order in which they run, and how deep their stack gets."""
+
+    def __init__(self) -> None:
+        self.integers: list[int] = []
+        self.deepest = 0
+        self._depth = 0
+
+    def add(self, op: Op, a: int = 0, b: int = 0) -> None:
+        """Append one instruction."""
+        self.integers += (int(op), a, b)
+        if op in _PUSHES:
+            self._depth += 1
+            self.deepest = max(self.deepest, self._depth)
+        elif op not in _KEEPS:
+            self._depth -= 1
+
+    @property
+    def length(self) -> int:
+        """The number of instructions."""
+        return len(self.integers) // 3
+
+
+# ---------------------------------------------------------------- forms of numbers
+
+
+class TooManyForms(Exception):
+    """A number is a choice among more sums than fit on board in one condition."""
+
+
+class FormVariable(NamedTuple):
+    """A state slot, or an argument cell."""
+
+    argument: bool
+    at: int
+
+
+@dataclass(frozen=True, slots=True)
+class LinearForm:
+    """The sum of `terms` and `constant`. A variable whose factor is 0 stays: without it the number is not known."""
+
+    terms: Mapping[FormVariable, Fraction]
+    constant: Fraction
+
+    leaves = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Extremum:
+    """The largest (`most`) or the smallest of several numbers; `leaves` counts the linear forms in it."""
+
+    most: bool
+    among: tuple["Form", ...]
+    leaves: int
+
+
+Form: TypeAlias = LinearForm | Extremum
+
+
+def constant(value: Fraction) -> LinearForm:
+    """A number that is known."""
+    return LinearForm({}, value)
+
+
+def extremum(most: bool, among: Sequence[Form]) -> Form:
+    """The largest or the smallest of some forms; of numbers that are all known, that number."""
+    known = [form.constant for form in among if isinstance(form, LinearForm) and not form.terms]
+    if len(known) == len(among):
+        return constant(max(known) if most else min(known))
+    leaves = sum(form.leaves for form in among)
+    if leaves > MAX_INSTRUCTIONS:
+        raise TooManyForms
+    return among[0] if len(among) == 1 else Extremum(most, tuple(among), leaves)
+
+
+def scaled(form: Form, factor: Fraction) -> Form:
+    """`form` times a number; the largest of some becomes the smallest where that is negative."""
+    if isinstance(form, Extremum):
+        return Extremum(form.most == (factor >= 0), tuple(scaled(each, factor) for each in form.among), form.leaves)
+    return LinearForm({variable: term * factor for variable, term in form.terms.items()}, form.constant * factor)
+
+
+def plus(left: Form, right: Form) -> Form:
+    """`left + right`: a sum with the largest of some is the largest of the sums with each."""
+    if isinstance(left, Extremum) or isinstance(right, Extremum):
+        if left.leaves * right.leaves > MAX_INSTRUCTIONS:
+            raise TooManyForms
+        if isinstance(left, Extremum):
+            return extremum(left.most, [plus(each, right) for each in left.among])
+        assert isinstance(right, Extremum)
+        return extremum(right.most, [plus(left, each) for each in right.among])
+    terms = dict(left.terms)
+    for variable, factor in right.terms.items():
+        terms[variable] = terms.get(variable, Fraction(0)) + factor
+    return LinearForm(terms, left.constant + right.constant)
+
+
+# ---------------------------------------------------------------- conditions
+
+
+class ConditionPlace(NamedTuple):
     """Where a condition stands: its scope, the first argument cell of each parameter, and which side is safe.
 
     `strict` holds where the condition must be TRUE for the vehicle to go on; it is false for what stops it (`forbid`,
@@ -56,48 +204,44 @@ class Place(NamedTuple):
     strict: bool
 
 
-def _smaller(node: Condition) -> str:
-    """How a condition that is too large is said in less."""
-    ranges = "comparisons of one value are shorter as a range, `a in low .. high`, or as a set, `a in {x, y}`"
-    if isinstance(node, Junction) and node.operator == "or":
-        return f"in a policy, write a rule for each part of the `or`; or say less: {ranges}"
-    return f"say less: {ranges}"
-
-
-class Conditions:
+class ConditionLowering:
     """Lowers the conditions of one policy into shared slots, zones, sets and monitors."""
 
-    def __init__(self, context: Context, slots: Slots, zones: ZoneTable, files: Files) -> None:
+    def __init__(self, context: Context, slots: SignalSlots, zones: ZoneTable, files: SourceTable) -> None:
         self._context = context
-        self._slots = slots
-        self._zones = zones
-        self._files = files
-        self.sets = Sets()
-        self.monitors = Monitors()
+        self.slots = slots
+        self.zones = zones
+        self.files = files
+        self.sets = ValueSets()
+        self.monitors = MonitorTable()
         self._monitored: dict[tuple[Condition, MonitorKind, int, bool], int] = {}
 
-    def clause(self, node: Condition, place: Place, at: Node | None = None) -> Clause:
+    def clause(self, node: Condition, place: ConditionPlace, at: Node | None = None) -> Clause:
         """A condition with its text and place; `at` is what to quote, the condition itself if None."""
-        code = Code()
+        code = CodeWriter()
         self._condition(code, node, place, place.strict)
         quoted = node if at is None else at
         if code.length > MAX_INSTRUCTIONS or code.deepest > MAX_STACK:
+            ranges = "comparisons of one value are shorter as a range, `a in low .. high`, or as a set, `a in {x, y}`"
+            is_choice = isinstance(node, Junction) and node.operator == "or"
             self._context.report.add(
                 codes.CONDITION_SIZE,
                 node.span,
                 f"the condition takes {code.length} instructions on a stack of {code.deepest}, and on board fit "
                 f"{MAX_INSTRUCTIONS} on one of {MAX_STACK}",
-                help=_smaller(node),
+                help=f"in a policy, write a rule for each part of the `or`; or say less: {ranges}"
+                if is_choice
+                else f"say less: {ranges}",
             )
-        text, source, start, end = self._files.place(quoted.span)
+        text, source, start, end = self.files.place(quoted.span)
         return Clause(text, source, start, end, tuple(code.integers))
 
     def monitors_of(self, operand: Condition, kind: MonitorKind, window_us: int) -> tuple[int, ...]:
-        """The monitors that an operand which was lowered is kept by: one for each safe side that was asked for."""
+        """The monitors that keep an operand which was lowered: one for each safe side that is needed."""
         keys = ((operand, kind, window_us, safe) for safe in (True, False))
         return tuple(sorted({self._monitored[key] for key in keys if key in self._monitored}))
 
-    def _condition(self, code: Code, node: Condition, place: Place, safe: bool) -> None:
+    def _condition(self, code: CodeWriter, node: Condition, place: ConditionPlace, safe: bool) -> None:
         match node:
             case Not():
                 self._condition(code, node.operand, place, not safe)
@@ -114,58 +258,34 @@ class Conditions:
             case Edge():
                 kind = MonitorKind.RISING if node.rising else MonitorKind.FALLING
                 self._monitor(code, kind, node.operand, 0, place, safe)
-            case Near():
-                self._near(code, node, place, safe)
+            case Near():  # one of two is true now, and the other was at some moment of the window
+                for now, before in ((node.left, node.right), (node.right, node.left)):
+                    self._condition(code, now, place, safe)
+                    self._monitor(code, MonitorKind.WITHIN_LAST, before, node.window.value, place, safe)
+                    code.add(Op.AND)
+                code.add(Op.OR)
             case Inside():
                 self._inside(code, node, place, safe)
             case Known():
-                self._known(code, node)
-            case Comparison() | Within() | OneOf():
-                self._compared(code, node, place)
-
-    def _compared(self, code: Code, node: Comparison | Within | OneOf, place: Place) -> None:
-        """What compares numbers, members of an enumeration, phases, or times of day."""
-        members = Memberships(self._context, self._slots, self.sets, place.scope, place.cells)
-        numbers = Numbers(self._context.report, self._slots, place.scope, place.cells)
-        match node:
+                self._known(code, node.subject.name)
             case Comparison():
-                if not clock.compare(code, node) and not members.compare(code, node):
-                    numbers.compare(code, node)
-            case Within(range=limits):
-                if isinstance(limits.low, TimeOfDay) and isinstance(limits.high, TimeOfDay):
-                    clock.window(code, self.sets, limits.low.value, limits.high.value, node.days)
-                elif not members.between(code, node):
-                    numbers.between(code, node)
+                self._comparison(code, node, place)
+            case Within():
+                self._range(code, node, place)
             case OneOf():
-                members.one_of(code, node)
-
-    def _known(self, code: Code, node: Known) -> None:
-        """Each slot of the signal has a value; a position has two."""
-        slot = self._slots.of(node.subject.name)
-        code.add(Op.KNOWN, slot)
-        if self._slots.width(node.subject.name) > 1:
-            code.add(Op.KNOWN, slot + 1)
-            code.add(Op.AND)
-
-    def _near(self, code: Code, node: Near, place: Place, safe: bool) -> None:
-        """One of two is true now, and the other was at some moment of the window."""
-        for now, before in ((node.left, node.right), (node.right, node.left)):
-            self._condition(code, now, place, safe)
-            self._monitor(code, MonitorKind.WITHIN_LAST, before, node.window.value, place, safe)
-            code.add(Op.AND)
-        code.add(Op.OR)
+                self._one_of(code, node, place)
 
     def _monitor(
-        self, code: Code, kind: MonitorKind, operand: Condition, window_us: int, place: Place, safe: bool
+        self, code: CodeWriter, kind: MonitorKind, operand: Condition, window_us: int, place: ConditionPlace, safe: bool
     ) -> None:
         key = (operand, kind, window_us, safe)
         number = self._monitored.get(key)
         if number is None:
-            when = self.clause(operand, Place(place.scope, {}, safe))
+            when = self.clause(operand, ConditionPlace(place.scope, {}, safe))
             number = self._monitored[key] = self.monitors.of(kind, window_us, when)
         code.add(Op.MONITOR, number)
 
-    def _inside(self, code: Code, node: Inside, place: Place, safe: bool) -> None:
+    def _inside(self, code: CodeWriter, node: Inside, place: ConditionPlace, safe: bool) -> None:
         assert isinstance(node.subject, Reference)
         region, margin = node.region, 0
         if isinstance(region, Grow):
@@ -176,22 +296,245 @@ class Conditions:
         smaller = safe != node.negated
         subject = place.scope.find(node.subject.name)
         if isinstance(subject, Argument) and subject.type == ZONE:
-            which = self._zones.disjoint if node.negated else self._zones.within
+            which = self.zones.disjoint if node.negated else self.zones.within
             members = self.sets.of(which(region.name, margin, smaller=smaller, span=node.region.span))
             code.add(Op.ARGUMENT_IN, place.cells[node.subject.name], members)
-            for exists in self._zones.times(region.name, self.sets):
+            for exists in self.zones.times(region.name, self.sets):
                 code.add(*exists)
                 if node.negated:
                     code.add(Op.NOT)
                 code.add(Op.OR if node.negated else Op.AND)
             return
         if isinstance(place.scope.find(region.name), Argument):
-            code.add(Op.POSITION_IN_ARGUMENT, place.cells[region.name], self._zones.table(margin, smaller=smaller))
+            code.add(Op.POSITION_IN_ARGUMENT, place.cells[region.name], self.zones.table(margin, smaller=smaller))
         else:
-            zone = self._zones.zone(region.name, margin, smaller=smaller, span=node.region.span)
+            zone = self.zones.zone(region.name, margin, smaller=smaller, span=node.region.span)
             if isinstance(subject, Argument):
                 code.add(Op.ARGUMENT_POINT_IN, place.cells[node.subject.name], zone)
             else:
                 code.add(Op.POSITION_IN, zone)
         if node.negated:
             code.add(Op.NOT)
+
+    def _known(self, code: CodeWriter, signal: str) -> None:
+        """Each slot of the signal has a value; a position has two."""
+        slot = self.slots.of(signal)
+        code.add(Op.KNOWN, slot)
+        if self.slots.width(signal) > 1:
+            code.add(Op.KNOWN, slot + 1)
+            code.add(Op.AND)
+
+    def _one_of(self, code: CodeWriter, node: OneOf, place: ConditionPlace) -> None:
+        """`subject in {a, b}`."""
+        if is_about_phase(node):
+            self._phase(code, [name.text for name in node.names])
+            return
+        members = self._members(node.subject, place)
+        assert members is not None
+        self._member(code, node.subject, {members[1][name.text] for name in node.names}, place)
+
+    def _comparison(self, code: CodeWriter, node: Comparison, place: ConditionPlace) -> None:
+        """`left operator right`, of times of day, phases, members of an enumeration, or numbers."""
+        if isinstance(node.right, TimeOfDay):
+            _compare_time(code, node.operator, node.right.value)
+            return
+        if isinstance(node.left, TimeOfDay):
+            _compare_time(code, _MIRRORED[node.operator], node.left.value)
+            return
+        if is_about_phase(node):
+            assert isinstance(node.right, Reference)
+            self._phase(code, [node.right.name])
+            if node.operator == "!=":
+                code.add(Op.NOT)
+            return
+        for subject, constant, comparison in (
+            (node.left, node.right, node.operator),
+            (node.right, node.left, _MIRRORED[node.operator]),
+        ):
+            members = self._members(subject, place)
+            if members is not None:
+                assert isinstance(constant, Reference)
+                values, names = members
+                holds, bound = _HOLDS[comparison], names[constant.name]
+                self._member(code, subject, {value for value in values if holds(value, bound)}, place)
+                return
+        self._numbers(code, node, node.left, _COMPARE[node.operator], node.right, place)
+
+    def _range(self, code: CodeWriter, node: Within, place: ConditionPlace) -> None:
+        """`subject in low .. high`, both ends included."""
+        low, high = node.range.low, node.range.high
+        if isinstance(low, TimeOfDay) and isinstance(high, TimeOfDay):
+            self._time_window(code, low.value, high.value, node.days)
+            return
+        members = self._members(node.subject, place)
+        if members is not None:
+            values, names = members
+            assert isinstance(low, Reference)
+            assert isinstance(high, Reference)
+            within = {each for each in values if names[low.name] <= each <= names[high.name]}
+            self._member(code, node.subject, within, place)
+            return
+        self._numbers(code, node, node.subject, Op.GE, low, place)
+        self._numbers(code, node, node.subject, Op.LE, high, place)
+        code.add(Op.AND)
+
+    def _time_window(self, code: CodeWriter, start: int, end: int, days: tuple[int, ...]) -> None:
+        """A window of the day, on some days of the week, or (none) on all."""
+        if days:
+            windows = weekly_windows(start, end, days)
+            if windows != (0, WEEK):
+                code.add(Op.WEEK_IN, self.sets.of(windows), 0)
+                return
+            start, end = 0, DAY
+        code.add(Op.TIME_IN, start % DAY, end)
+
+    def _phase(self, code: CodeWriter, names: Iterable[str]) -> None:
+        code.add(Op.PHASE_IN, 0, self.sets.of_phases(names))
+
+    def _members(self, node: Value, place: ConditionPlace) -> tuple[frozenset[int], Mapping[str, int]] | None:
+        """All values of a name's enumeration, and the declared ones by name; None for what is no enumeration's."""
+        found = place.scope.find(node.name) if isinstance(node, Reference) else None
+        type = None if found is None else place.scope.type_of(found)
+        if type is None or type.enumeration is None:
+            return None
+        names = type.enumeration.members
+        if isinstance(found, SignalDecl):
+            labels = enum_labels(self._context, self._context.symbols.enums[found.type.text])
+            return frozenset(value for value, _ in labels), names
+        return frozenset(names.values()), names
+
+    def _member(self, code: CodeWriter, subject: Value, values: Iterable[int], place: ConditionPlace) -> None:
+        assert isinstance(subject, Reference)
+        members = self.sets.of(values)
+        if isinstance(place.scope.find(subject.name), Argument):
+            code.add(Op.ARGUMENT_IN, place.cells[subject.name], members)
+        else:
+            code.add(Op.SIGNAL_IN, self.slots.of(subject.name), members)
+
+    # ---------------------------------------------------------------- numbers
+
+    def _numbers(self, code: CodeWriter, node: Node, left: Value, op: Op, right: Value, place: ConditionPlace) -> None:
+        report = self._context.report
+        try:
+            low, high = self._form(left, place), self._form(right, place)
+            if isinstance(low, LinearForm) and isinstance(high, LinearForm):
+                self._emit(code, node, low, op, high)
+            else:
+                self._parts(code, node, plus(low, scaled(high, Fraction(-1))), op)
+        except TooManyForms:
+            report.add(
+                codes.CONDITION_SIZE,
+                node.span,
+                f"`{report.text(node.span)}` compares more than {MAX_INSTRUCTIONS} sums with each other",
+                help="a sum of `min` and `max` means each choice with each other: compare them apart",
+            )
+            code.add(Op.CONST)
+
+    def _form(self, node: Value, place: ConditionPlace) -> Form:
+        """The form of a number, in units that need no factor when they are multiplied (m, m/s, s, the whole). A signal
+        that is read for the first time gets a slot. Raises `TooManyForms`.
+        """
+        match node:
+            case Quantity():
+                return constant(Fraction(node.value, COHERENT[node.dimension]))
+            case Reference():
+                found = place.scope.find(node.name)
+                assert found is not None
+                type = place.scope.type_of(found)
+                dimension = Dimension.COUNT if type is None or type.dimension is None else type.dimension
+                argument = isinstance(found, Argument)
+                at = place.cells[node.name] if argument else self.slots.of(node.name)
+                return LinearForm({FormVariable(argument, at): Fraction(1, COHERENT[dimension])}, Fraction(0))
+            case Function(name="abs"):
+                form = self._form(node.operands[0], place)
+                return extremum(True, (form, scaled(form, Fraction(-1))))
+            case Function():
+                return extremum(node.name == "max", [self._form(operand, place) for operand in node.operands])
+            case Arithmetic():
+                return _arithmetic(node.operator, self._form(node.left, place), self._form(node.right, place))
+            case _:
+                raise AssertionError(node.kind)
+
+    def _parts(self, code: CodeWriter, node: Node, form: Form, op: Op) -> None:
+        """`form op 0`."""
+        if isinstance(form, LinearForm):
+            left, right = LinearForm(form.terms, Fraction(0)), LinearForm({}, -form.constant)
+            self._emit(code, node, left, op, right)
+        elif op in (Op.EQ, Op.NE):
+            both = op == Op.EQ
+            self._parts(code, node, form, Op.LE if both else Op.LT)
+            self._parts(code, node, form, Op.GE if both else Op.GT)
+            code.add(Op.AND if both else Op.OR)
+        else:
+            connect = Op.AND if form.most == (op in (Op.LT, Op.LE)) else Op.OR
+            for number, each in enumerate(form.among):
+                self._parts(code, node, each, op)
+                if number:
+                    code.add(connect)
+
+    def _emit(self, code: CodeWriter, node: Node, left: LinearForm, op: Op, right: LinearForm) -> None:
+        """`left op right`, multiplied by the positive number that makes all factors whole and as small as can be."""
+        numbers = [*left.terms.values(), left.constant, *right.terms.values(), right.constant]
+        whole = lcm(*(number.denominator for number in numbers))
+        common = gcd(*(int(number * whole) for number in numbers)) or 1
+        factor = Fraction(whole, common)
+        factors, constants = 0, 0
+        for side in (left, right):
+            terms = {variable: int(each * factor) for variable, each in side.terms.items()}
+            constant = int(side.constant * factor)
+            _push(code, terms, constant)
+            factors += sum(map(abs, terms.values()))
+            constants = max(constants, abs(constant))
+        code.add(op)
+        if constants > MAX_VALUE or factors * MAX_VALUE + 2 * constants > MAX_MAGNITUDE:
+            most = MAX_MAGNITUDE // MAX_VALUE
+            report = self._context.report
+            report.add(
+                codes.NUMBER_SIZE,
+                node.span,
+                f"`{report.text(node.span)}` may need a number that is larger than what is computed with on board",
+                help=f"made whole together, its factors add up to {factors:,}, and at most {most} fit: use rounder ones"
+                if factors > most
+                else "compare smaller numbers",
+            )
+
+
+def _compare_time(code: CodeWriter, comparison: str, time: int) -> None:
+    """The local time compared with a time of day."""
+    start, end = {">=": (time, DAY), ">": (time + 1, DAY), "<=": (0, time), "<": (0, time - 1)}[comparison]
+    if end >= 0:
+        code.add(Op.TIME_IN, start, end)
+    else:  # before 00:00: not at any time of the day
+        code.add(Op.TIME_IN, 0, DAY)
+        code.add(Op.NOT)
+
+
+def _arithmetic(operation: str, left: Form, right: Form) -> Form:
+    match operation:
+        case "+":
+            return plus(left, right)
+        case "-":
+            return plus(left, scaled(right, Fraction(-1)))
+        case "*":
+            factor, other = (left, right) if isinstance(left, LinearForm) and not left.terms else (right, left)
+            assert isinstance(factor, LinearForm)
+            return scaled(other, factor.constant)
+        case _:
+            assert isinstance(right, LinearForm)
+            return scaled(left, 1 / right.constant)
+
+
+def _push(code: CodeWriter, terms: Mapping[FormVariable, int], constant: int) -> None:
+    """The sum of some terms and a constant."""
+    first = True
+    for variable, factor in terms.items():
+        code.add(Op.ARGUMENT if variable.argument else Op.SIGNAL, variable.at)
+        if factor != 1:
+            code.add(Op.SCALE, factor)
+        if not first:
+            code.add(Op.ADD)
+        first = False
+    if constant or first:
+        code.add(Op.CONST, constant)
+        if not first:
+            code.add(Op.ADD)

@@ -6,10 +6,8 @@ from rtshcua.decision.tree import slots_read
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.types import Kind
-from rtshcua.ground.lower.conditions import Conditions, Place
-from rtshcua.ground.lower.files import Files
-from rtshcua.ground.lower.lacking import applies
-from rtshcua.ground.lower.zones import ZoneTable
+from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
+from rtshcua.ground.lower.policy_checks import applies
 from rtshcua.model.durability import WORDS
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import (
@@ -55,24 +53,16 @@ def cells_of(skill: SkillDecl) -> dict[str, int]:
     return cells
 
 
-class Contracts:
+class ContractLowering:
     """Lowers the skills of one policy; `numbers` are their indexes, `left_out` the clauses left out."""
 
     def __init__(
-        self,
-        context: Context,
-        numbers: Mapping[str, int],
-        conditions: Conditions,
-        zones: ZoneTable,
-        files: Files,
-        vehicle: Vehicle,
+        self, context: Context, numbers: Mapping[str, int], conditions: ConditionLowering, vehicle: Vehicle
     ) -> None:
         self._context = context
-        self._numbers = numbers
-        self._conditions = conditions
-        self._zones = zones
-        self._files = files
-        self._vehicle = vehicle
+        self.numbers = numbers
+        self.conditions = conditions
+        self.vehicle = vehicle
         self.left_out: list[LeftOut] = []
 
     def contract(self, skill: SkillDecl) -> Contract:
@@ -83,7 +73,7 @@ class Contracts:
         assert skill.validity is not None
         assert skill.energy is not None
         cells = cells_of(skill)
-        place = Place(self._context.scope_of(skill), cells, strict=True)
+        place = ConditionPlace(self._context.scope_of(skill), cells, strict=True)
         require, assume, maintain = (
             self._clauses(part, clauses, place, skill)
             for part, clauses in (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
@@ -112,7 +102,7 @@ class Contracts:
             fallback=self.chain(skill.fallback),
             energy=skill.energy.value,
             record=recorded(name.text for name in skill.record),
-            reads=slots_read((*require, *assume, *maintain), self._vehicle, tuple(self._conditions.monitors.all)),
+            reads=slots_read((*require, *assume, *maintain), self.vehicle, tuple(self.conditions.monitors.all)),
         )
 
     def chain(self, links: Sequence[LinkDecl]) -> tuple[Link, ...]:
@@ -121,9 +111,9 @@ class Contracts:
 
     def link(self, link: LinkDecl) -> Link:
         """One link, its arguments complete."""
-        text, source, start, end = self._files.place(link.span)
+        text, source, start, end = self.conditions.files.place(link.span)
         return Link(
-            skill=self._numbers[link.skill.text],
+            skill=self.numbers[link.skill.text],
             arguments=self.cells(self._context.bound(link)),
             limit_us=0 if link.limit is None else link.limit.value,
             text=text,
@@ -137,21 +127,23 @@ class Contracts:
         cells: list[int] = []
         for argument in bound:
             if isinstance(argument, ZoneDecl):
-                cells.append(self._zones.index[argument.name.text])
+                cells.append(self.conditions.zones.index[argument.name.text])
             elif isinstance(argument, Coordinates):
-                cells += self._zones.place(argument) or (0, 0)
+                cells += self.conditions.zones.place(argument) or (0, 0)
             else:
                 cells.append(argument)
         return tuple(cells)
 
-    def _clauses(self, part: str, clauses: Sequence[ClauseDecl], place: Place, skill: SkillDecl) -> tuple[Clause, ...]:
+    def _clauses(
+        self, part: str, clauses: Sequence[ClauseDecl], place: ConditionPlace, skill: SkillDecl
+    ) -> tuple[Clause, ...]:
         """The clauses that apply to the vehicle; the others are noted."""
-        without = frozenset(self._vehicle.without)
+        without = frozenset(self.vehicle.without)
         for clause in clauses:
             if not applies(clause, without):
-                of_skill = self._numbers[skill.name.text]
-                self.left_out.append(LeftOut(of_skill, part, *self._files.place(clause.span)))
-        return tuple(self._conditions.clause(clause.condition, place) for clause in clauses if applies(clause, without))
+                of_skill = self.numbers[skill.name.text]
+                self.left_out.append(LeftOut(of_skill, part, *self.conditions.files.place(clause.span)))
+        return tuple(self.conditions.clause(clause.condition, place) for clause in clauses if applies(clause, without))
 
     def _parameter(self, argument: Argument, cell: int) -> Parameter:
         declared, type = argument.declaration, argument.type
@@ -164,7 +156,7 @@ class Contracts:
         elif type.kind is Kind.ENUMERATION:
             kind, dimension, low, high = CHOICE, "choice", 0, len(labels) - 1
         elif type.kind is Kind.ZONE:
-            kind, dimension, low, high = ZONE, "zone", 0, len(self._zones.regions) - 1
+            kind, dimension, low, high = ZONE, "zone", 0, len(self.conditions.zones.regions) - 1
         else:
             kind, dimension, low, high = PLACE, "position", -MAX_COORDINATE, MAX_COORDINATE
         return Parameter(declared.name.text, kind, dimension, cell, low, high, labels)

@@ -4,31 +4,42 @@ The policy holds every skill that its rules and chains name (where a permit is f
 every signal that these read, and every zone that its files declare, for a mission may name any as an argument.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker import time_zones
-from rtshcua.ground.checker.checks.vehicles import deceleration
+from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.scope import signal_type
+from rtshcua.ground.checker.scope import Scope, signal_type
 from rtshcua.ground.checker.types import Type
+from rtshcua.ground.checker.uses import brought_about
 from rtshcua.ground.checker.well_known import MEASURED, PER_CELL, VELOCITY, WELL_KNOWN, read_by_all
 from rtshcua.ground.geometry.projection import projection_at
-from rtshcua.ground.lower import lacking
-from rtshcua.ground.lower.belonging import belongs
-from rtshcua.ground.lower.conditions import Conditions
-from rtshcua.ground.lower.contracts import Contracts
-from rtshcua.ground.lower.files import Files
-from rtshcua.ground.lower.limits import fits
-from rtshcua.ground.lower.rules import Rules
-from rtshcua.ground.lower.slots import Slots
-from rtshcua.ground.lower.speeds import speeds_of
+from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
+from rtshcua.ground.lower.contracts import ContractLowering, cells_of
+from rtshcua.ground.lower.policy_checks import check_fitted, fits_on_board, is_self_contained, rule_applies
+from rtshcua.ground.lower.tables import SignalSlots, SourceTable, shortened
+from rtshcua.ground.lower.vehicle import lower_vehicle
 from rtshcua.ground.lower.zones import ZoneTable
-from rtshcua.model.flat.policy import SILENCE_US, AfterSilence, Airspace, Policy, Rule, Vehicle, WithoutEvidence
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.policy import (
+    SILENCE_US,
+    AfterSilence,
+    Airspace,
+    LeftOut,
+    Policy,
+    Rule,
+    RuleKind,
+    WithoutEvidence,
+)
 from rtshcua.model.flat.signal import CELL
-from rtshcua.model.ir.places import GeoJson, VehicleDecl
-from rtshcua.model.ir.policies import PolicyDecl
+from rtshcua.model.ir.expression import Condition, Junction
+from rtshcua.model.ir.node import Node
+from rtshcua.model.ir.places import GeoJson, VehicleDecl, ZoneDecl
+from rtshcua.model.ir.policies import Delegation, PolicyDecl
 from rtshcua.model.ir.policies import Rule as RuleDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
@@ -38,20 +49,23 @@ OPERATOR = "operator"
 
 @dataclass(frozen=True, slots=True)
 class LoweredPolicy:
-    """A flat policy with what its missions are lowered and checked by: indexes by name, zones, files."""
+    """A flat policy with what its missions are lowered and checked by: indexes by name, tables, and files."""
 
     policy: Policy
     declaration: PolicyDecl
     vehicle: VehicleDecl
     skills: Mapping[str, int]
     roles: Mapping[str, int]
-    zones: ZoneTable
-    contracts: Contracts
-    files: Files
-    conditions: Conditions
-    slots: Slots
+    contracts: ContractLowering
+    conditions: ConditionLowering
+    files: SourceTable
     written: Mapping[Rule, RuleDecl]  # each flat rule's declaration
-    rules: tuple[RuleDecl, ...] = ()  # the same by the number of the flat rule
+    rules: tuple[RuleDecl, ...]  # the same by the number of the flat rule
+
+    @property
+    def zones(self) -> ZoneTable:
+        """Its zones, with the regions that they are made of."""
+        return self.conditions.zones
 
 
 def lower_policy(
@@ -64,88 +78,91 @@ def lower_policy(
     before = len(context.report.found)
     skills = _skills(context, policy, files)
     read = read_by_all(vehicle)
-    if not _well_known(context, policy, read, files) or not belongs(context, policy, skills, vehicle, files):
+    if not _well_known(context, policy, read, files) or not is_self_contained(context, policy, skills, vehicle, files):
         return None
-    declared = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
-    lacking.check_policy(context, policy, vehicle, skills, declared)
-    table = Files(context.report, names)
-    slots = Slots(context, 1 if vehicle.cells is None else vehicle.cells.value)
-    well_known = [slots.of(name) for name in read]
-    sizes = [context.symbols.sizes[each.name.text] for each in skills if each.name.text in context.symbols.sizes]
-    for part in (policy, vehicle, *declared, *(context.symbols.signals[name] for name in read), *skills, *sizes):
-        table.index(part.span.file)  # all that the policy rests on is named, quoted or not
-    for zone in declared:
-        data = context.data.name(zone.shape) if isinstance(zone.shape, GeoJson) else None
-        if data is not None:
-            table.index(data)
+    zones = [zone for zone in context.symbols.zones.values() if zone.span.file in files]
+    check_fitted(context, policy, vehicle, skills, zones)
+    sources = SourceTable(context.report, names)
+    _index_sources(context, sources, [policy, vehicle, *zones, *map(context.symbols.signals.__getitem__, read)], skills)
+    slots = SignalSlots(context, 1 if vehicle.cells is None else vehicle.cells.value)
+    flat_vehicle = lower_vehicle(vehicle, *map(slots.of, read))
     projection = projection_at(vehicle.home.latitude, vehicle.home.longitude)
-    zones = ZoneTable(projection, declared, context.report, vehicle, context.data)
-    conditions = Conditions(context, slots, zones, table)
-    flat_vehicle = _vehicle(vehicle, *well_known)
-    numbers = {skill.name.text: number for number, skill in enumerate(skills)}
-    contracts = Contracts(context, numbers, conditions, zones, table, flat_vehicle)
-    roles = _roles(policy)
-    lowered = [contracts.contract(skill) for skill in skills]
-    lowered_rules = Rules(context, numbers, roles, conditions, contracts, table, flat_vehicle.without).lowered(policy)
+    conditions = ConditionLowering(
+        context, slots, ZoneTable(projection, zones, context.report, vehicle, context.data), sources
+    )
+    contracts = ContractLowering(
+        context, {skill.name.text: number for number, skill in enumerate(skills)}, conditions, flat_vehicle
+    )
+    roles = {role: number for number, role in enumerate(_roles(policy))}
+    flat_contracts = tuple(contracts.contract(skill) for skill in skills)
+    rules = RuleLowering(context, roles, contracts).lowered(policy)
     contingency = contracts.chain(policy.contingency)
-    airspace = _airspace(policy, zones, table)
+    airspace = _airspace(policy, conditions.zones, sources)
+    _read_measured(context, vehicle, conditions, files)
+    if len(context.report.found) > before:
+        return None
     silence = policy.without_link
-    if vehicle.cells is None and any(each.name == CELL for each in slots.signals):
+    flat = Policy(
+        name=policy.name.text,
+        version=policy.version,
+        vehicle=flat_vehicle,
+        projection=projection,
+        roles=tuple(roles),
+        signals=tuple(slots.signals),
+        slots=slots.count,
+        zones=conditions.zones.flat(),
+        declared=len(zones),
+        tables=tuple(conditions.zones.tables),
+        sets=conditions.sets.all,
+        contracts=flat_contracts,
+        rules=tuple(rule for rule, _ in rules),
+        airspace=airspace,
+        contingency=contingency,
+        sources=sources.names,
+        source_digests=sources.digests,
+        monitors=tuple(conditions.monitors.all),
+        phases=conditions.sets.phases,
+        without_evidence=int(WithoutEvidence[policy.without_evidence.upper()]),
+        silence_us=SILENCE_US if silence is None else silence.limit.value,
+        left_out=tuple(contracts.left_out),
+        after_silence=int(AfterSilence.CONTINGENCY if silence is None else AfterSilence[silence.then.upper()]),
+    )
+    if not fits_on_board(context, policy, flat):
+        return None
+    written = tuple(rule for _, rule in rules)
+    return LoweredPolicy(
+        flat, policy, vehicle, contracts.numbers, roles, contracts, conditions, sources, dict(rules), written
+    )
+
+
+def _index_sources(context: Context, sources: SourceTable, parts: Iterable[Node], skills: Sequence[SkillDecl]) -> None:
+    """Name all the files that the policy rests on, quoted or not."""
+    sizes = [context.symbols.sizes[each.name.text] for each in skills if each.name.text in context.symbols.sizes]
+    parts = (*parts, *skills, *sizes)
+    for part in parts:
+        sources.index(part.span.file)
+    for zone in parts:
+        if isinstance(zone, ZoneDecl) and isinstance(zone.shape, GeoJson):
+            data = context.data.name(zone.shape)
+            if data is not None:
+                sources.index(data)
+
+
+def _read_measured(
+    context: Context, vehicle: VehicleDecl, conditions: ConditionLowering, files: frozenset[str]
+) -> None:
+    """Give slots to the signals that are watched where they are declared; last, so that the others keep theirs."""
+    if vehicle.cells is None and any(each.name == CELL for each in conditions.slots.signals):
         context.report.add(
             codes.WELL_KNOWN_SIGNAL,
             vehicle.name.span,
             f"`{vehicle.name.text}` does not say how many cells its battery has, and a condition reads `{CELL}`",
             help="write `cells 4` into the vehicle, or `without battery.cell` where nothing measures the voltage",
         )
-    fitted = MEASURED.keys() - {name.text for name in vehicle.without}
-    for name in sorted(fitted):  # last, so that the others keep their slots
+    for name in sorted(MEASURED.keys() - {name.text for name in vehicle.without}):
         if _is_declared(context, name, files):
-            table.index(context.symbols.signals[name].span.file)
-            slots.of(name)
-    if len(context.report.found) > before:
-        return None
-    flat = Policy(
-        name=policy.name.text,
-        version=policy.version,
-        vehicle=flat_vehicle,
-        projection=zones.projection,
-        roles=roles,
-        signals=tuple(slots.signals),
-        slots=slots.count,
-        zones=zones.flat(),
-        declared=len(zones.regions),
-        tables=tuple(zones.tables),
-        sets=tuple(conditions.sets.all),
-        contracts=tuple(lowered),
-        rules=tuple(rule for rule, _ in lowered_rules),
-        airspace=airspace,
-        contingency=contingency,
-        sources=table.names,
-        source_digests=table.digests,
-        monitors=tuple(conditions.monitors.all),
-        phases=tuple(conditions.sets.phases),
-        without_evidence=int(WithoutEvidence[policy.without_evidence.upper()]),
-        silence_us=SILENCE_US if silence is None else silence.limit.value,
-        left_out=tuple(contracts.left_out),
-        after_silence=int(AfterSilence.CONTINGENCY if silence is None else AfterSilence[silence.then.upper()]),
-    )
-    if not fits(context, policy, flat):
-        return None
-    by_name = {role: number for number, role in enumerate(roles)}
-    return LoweredPolicy(
-        flat,
-        policy,
-        vehicle,
-        numbers,
-        by_name,
-        zones,
-        contracts,
-        table,
-        conditions,
-        slots,
-        dict(lowered_rules),
-        tuple(rule for _, rule in lowered_rules),
-    )
+            conditions.files.index(context.symbols.signals[name].span.file)
+            conditions.slots.of(name)
 
 
 def _skills(context: Context, policy: PolicyDecl, files: frozenset[str]) -> list[SkillDecl]:
@@ -203,7 +220,7 @@ def _is_declared(context: Context, name: str, files: frozenset[str]) -> bool:
     return signal is not None and signal.span.file in files
 
 
-def _airspace(policy: PolicyDecl, zones: ZoneTable, files: Files) -> Airspace | None:
+def _airspace(policy: PolicyDecl, zones: ZoneTable, files: SourceTable) -> Airspace | None:
     airspace = policy.airspace
     if airspace is None:
         return None
@@ -218,32 +235,102 @@ def _airspace(policy: PolicyDecl, zones: ZoneTable, files: Files) -> Airspace | 
     )
 
 
-def _vehicle(
-    vehicle: VehicleDecl, position: int, height: int, battery: int, north: int = -1, east: int = -1, down: int = -1
-) -> Vehicle:
-    braking, zone = vehicle.braking, vehicle.time_zone
-    return Vehicle(
-        name=vehicle.name.text,
-        identity=vehicle.identity,
-        home_within=vehicle.within.value,
-        speed=vehicle.speed.value,
-        climb=vehicle.climb.value,
-        position_error=vehicle.position_error.value,
-        endurance_us=vehicle.endurance.value,
-        reserve=vehicle.reserve.value,
-        utc_offset_us=0 if vehicle.utc_offset is None else vehicle.utc_offset.value,
-        position=position,
-        height=height,
-        battery=battery,
-        return_altitude=0 if vehicle.return_altitude is None else vehicle.return_altitude.value,
-        braking=0 if braking is None else deceleration(braking),
-        reaction_us=0 if braking is None else braking.reaction.value,
-        north=north,
-        east=east,
-        down=down,
-        without=tuple(sorted({name.text for name in vehicle.without})),
-        speeds=speeds_of(vehicle),
-        time_zone="" if zone is None else zone.text,
-        time_zone_data="" if zone is None else time_zones.VERSION,
-        offsets=() if zone is None else time_zones.offsets(zone.text),
-    )
+class RuleLowering:
+    """Lowers the rules of one policy; `roles` are the indexes of its roles."""
+
+    def __init__(self, context: Context, roles: Mapping[str, int], contracts: ContractLowering) -> None:
+        self._context = context
+        self._roles = roles
+        self._contracts = contracts
+        self._conditions = contracts.conditions
+        self._files = contracts.conditions.files
+        self._without = frozenset(contracts.vehicle.without)
+
+    def lowered(self, policy: PolicyDecl) -> tuple[tuple[Rule, RuleDecl], ...]:
+        """All rules in source order, with their declarations; one whose skills keep its arguments in different cells
+        becomes several, and one that does not apply to the vehicle none.
+        """
+        found: list[tuple[Rule, RuleDecl]] = []
+        for rule in policy.rules:
+            if not rule_applies(rule, self._without):
+                self._contracts.left_out.append(LeftOut(-1, rule.kind, *self._files.place(rule.span)))
+                continue
+            with self._context.report.within(brought_about(rule)):
+                found += [(flat, rule) for flat in self._rule(rule)]
+        return tuple(found)
+
+    def _rule(self, rule: RuleDecl) -> Iterable[Rule]:
+        if not rule.skills:
+            yield self._flat(rule, ())
+            return
+        groups: dict[tuple[tuple[str, int], ...], list[SkillDecl]] = {}
+        read = set() if rule.when is None else {reference.name for reference in references(rule.when)}
+        for name in rule.skills:
+            skill = self._context.symbols.skills[name.text]
+            layout = tuple(sorted((each, cell) for each, cell in cells_of(skill).items() if each in read))
+            groups.setdefault(layout, []).append(skill)
+        for skills in groups.values():
+            yield self._flat(rule, skills)
+
+    def _flat(self, rule: RuleDecl, skills: Iterable[SkillDecl]) -> Rule:
+        skills = tuple(skills)
+        kind = RuleKind[rule.kind.upper()]
+        arguments = self._context.arguments(skills[0]) if skills else {}
+        cells = cells_of(skills[0]) if skills else {}
+        place = ConditionPlace(
+            Scope(self._context.symbols, self._context.report, arguments), cells, strict=kind is RuleKind.PERMIT
+        )
+        _, source, start, end = self._files.place(rule.span)
+        return Rule(
+            kind=int(kind),
+            skills=tuple(sorted({self._contracts.numbers[skill.name.text] for skill in skills})),
+            roles=tuple(sorted({self._roles[role.text] for role in rule.roles})),
+            sources=_sources(rule, kind),
+            when=None if rule.when is None else self._when(rule.when, rule, place),
+            approver=-1 if rule.approver is None else self._roles[rule.approver.text],
+            within_us=0 if rule.within is None else rule.within.value,
+            target=None if rule.target is None else self._contracts.link(rule.target),
+            text=shortened(": ".join(self._quoted(node) for node in (*rule.origin, rule))),
+            source=source,
+            start=start,
+            end=end,
+            second=-1 if rule.another is None else self._roles[rule.another.text],
+        )
+
+    def _when(self, when: Condition, rule: RuleDecl, place: ConditionPlace) -> Clause:
+        """The condition of a rule; that of a delegated one is quoted with all that was added to it."""
+        clause = self._conditions.clause(when, place)
+        if not any(isinstance(node, Delegation) for node in rule.origin) or not isinstance(when, Junction):
+            return clause
+        texts = (
+            f"({text})" if _is_choice(part) else text for part in _delegated(when) for text in [self._quoted(part)]
+        )
+        return replace(clause, text=shortened(" and ".join(texts)))
+
+    def _quoted(self, node: Node) -> str:
+        return self._context.report.text(node.span)
+
+
+def _is_choice(condition: Condition) -> bool:
+    return isinstance(condition, Junction) and condition.operator == "or"
+
+
+def _delegated(when: Condition) -> Iterator[Condition]:
+    """What a permit and its delegations say, in the order in which they were put together."""
+    if isinstance(when, Junction) and when.span == when.operands[-1].span:  # made, not written
+        yield from _delegated(when.operands[0])
+        yield when.operands[-1]
+    else:
+        yield when
+
+
+def _sources(rule: RuleDecl, kind: RuleKind) -> tuple[int, ...]:
+    """The sources that a rule is about: a permit to a role is to an operator, unless it says who may speak for them.
+
+    What stops a skill stops it whoever speaks, unless the rule names its sources.
+    """
+    if rule.through:
+        return tuple(sorted({int(SourceKind[name.text.upper()]) for name in rule.through}))
+    if kind is RuleKind.PERMIT and rule.roles:
+        return (int(SourceKind.OPERATOR),)
+    return ()

@@ -6,7 +6,7 @@ of home. Where that is known to within an error only, the zone that a condition 
 narrower by the error, or wider.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import msgspec
@@ -19,16 +19,72 @@ from rtshcua.ground.checker.report import Report
 from rtshcua.ground.geometry.offset import NoSuchOffset, inner, outer
 from rtshcua.ground.geometry.polygons import Point, square
 from rtshcua.ground.geometry.shapes import Disc, Region, Shape, are_disjoint, bounds, contains, lies_within
-from rtshcua.ground.lower.clock import week
 from rtshcua.ground.lower.ground_plan import GroundPlans
-from rtshcua.ground.lower.heights import Heights
-from rtshcua.ground.lower.sets import Sets
+from rtshcua.ground.lower.tables import ValueSets
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.limits import DAY, WEEK
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Projection, Zone
-from rtshcua.model.ir.expression import Coordinates
+from rtshcua.model.ir.expression import Coordinates, Quantity
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.quantity import Datum, Dimension, display
+
+
+class ZoneHeights:
+    """Converts altitudes above sea by the elevation of a vehicle's home."""
+
+    def __init__(self, vehicle: VehicleDecl | None, report: Report) -> None:
+        self._vehicle = vehicle
+        self._report = report
+
+    def band(self, zone: ZoneDecl) -> tuple[int, int, int, int]:
+        """Floor and ceiling, and how far either may really be from there."""
+        floor, floor_within = (LOWEST, 0) if zone.floor is None else self._above_home(zone.floor, zone)
+        ceiling, ceiling_within = (HIGHEST, 0) if zone.ceiling is None else self._above_home(zone.ceiling, zone)
+        if zone.floor is not None and zone.ceiling is not None and zone.floor.datum is not zone.ceiling.datum:
+            self._crossed(zone, zone.ceiling, ceiling - floor)
+        if floor < ceiling and floor + floor_within >= ceiling - ceiling_within:
+            self._unsure(zone, ceiling - floor)
+        return floor, ceiling, floor_within, ceiling_within
+
+    def _above_home(self, height: Quantity, zone: ZoneDecl) -> tuple[int, int]:
+        if height.datum is not Datum.SEA:
+            return height.value, 0
+        vehicle = self._vehicle
+        if vehicle is None or vehicle.elevation is None:
+            self._report.add(
+                codes.NO_ELEVATION,
+                height.span,
+                f"`{zone.name.text}` reaches to an altitude above sea, and how high home is above sea is not known",
+                help="say so in the vehicle, as in `elevation 408 m above sea within 5 m`",
+                labels=[] if vehicle is None else [(vehicle.name.span, "the vehicle")],
+            )
+            return height.value, 0
+        within = 0 if vehicle.elevation_within is None else vehicle.elevation_within.value
+        return min(max(height.value - vehicle.elevation.value, LOWEST), HIGHEST), within
+
+    def _crossed(self, zone: ZoneDecl, ceiling: Quantity, height: int) -> None:
+        """A floor and a ceiling of different datum compare only here."""
+        assert zone.floor is not None
+        if height <= 0:
+            self._report.add(
+                codes.FLOOR_ABOVE_CEILING,
+                ceiling.span,
+                f"the ceiling of `{zone.name.text}` is not above its floor",
+                labels=[(zone.floor.span, f"the floor is {display(-height, Dimension.LENGTH)} higher, or as high")],
+            )
+
+    def _unsure(self, zone: ZoneDecl, height: int) -> None:
+        assert self._vehicle is not None
+        assert self._vehicle.elevation_within is not None
+        self._report.add(
+            codes.EMPTY_ZONE,
+            zone.name.span,
+            f"of `{zone.name.text}`, which is {display(height, Dimension.LENGTH)} high, there is no height at which "
+            "a vehicle would surely be inside",
+            help="make the band higher than twice the error of the elevation, or measure the elevation better",
+            labels=[(self._vehicle.elevation_within.span, "how far the real elevation may differ")],
+        )
+
 
 #: a zone that nothing is inside of, for it has no height, and one that everything is inside of
 NOWHERE = Zone("nowhere", CIRCLE, LOWEST, LOWEST, (0, 0, 1))
@@ -54,7 +110,7 @@ class ZoneTable:
         self.index: Mapping[str, int] = {zone.name.text: number for number, zone in enumerate(declared)}
         by_name = {zone.name.text: zone for zone in declared}
         self._plans = GroundPlans(projection, by_name, data or DataFiles(), report)
-        self._heights = Heights(vehicle, report)
+        self._heights = ZoneHeights(vehicle, report)
         self._broken: set[int] = set()
         self.regions = [self._region(number, zone) for number, zone in enumerate(declared)]
         self.derived: list[Zone] = []
@@ -122,7 +178,7 @@ class ZoneTable:
             self._unshapely(unshapely, number, margin, span)
             return None
 
-    def times(self, name: str, sets: Sets) -> Iterator[tuple[Op, int, int]]:
+    def times(self, name: str, sets: ValueSets) -> Iterator[tuple[Op, int, int]]:
         """Instructions that are true while a declared zone exists; none for one that always does."""
         region = self.regions[self.index[name]]
         if region.daily:
@@ -216,7 +272,7 @@ def _hours(zone: ZoneDecl) -> tuple[tuple[int, ...], tuple[int, ...]]:
         return (), ()
     if not hours.days:
         return (hours.start.value % DAY, hours.end.value), ()
-    windows = week(hours.start.value, hours.end.value, hours.days)
+    windows = weekly_windows(hours.start.value, hours.end.value, hours.days)
     return (), () if windows == (0, WEEK) else windows
 
 
@@ -232,3 +288,17 @@ def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
     if max(map(abs, bounds(shape))) > MAX_COORDINATE:
         raise NoSuchOffset("far")
     return replace(region, shape=shape)
+
+
+def weekly_windows(start: int, end: int, days: Iterable[int]) -> tuple[int, ...]:
+    """Windows of the week, as `Zone.weekly` has them: from `start` to `end`, both included, or over midnight."""
+    after = end + 1 if start <= end else end + 1 + DAY
+    spans = [(day * DAY + start, day * DAY + after) for day in days]
+    within = [(low, min(high, WEEK)) for low, high in spans] + [(0, high - WEEK) for _, high in spans if high > WEEK]
+    merged: list[int] = []
+    for low, high in sorted(within):
+        if merged and low <= merged[-1]:
+            merged[-1] = max(merged[-1], high)
+        else:
+            merged += (low, high)
+    return tuple(merged)

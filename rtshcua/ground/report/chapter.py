@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from rtshcua.ground.lower.lacking import applies, rule_applies
+from rtshcua.ground.lower.policy_checks import applies, rule_applies
 from rtshcua.ground.report.changes import Changes, changes
 from rtshcua.ground.report.model import (
     CaseTold,

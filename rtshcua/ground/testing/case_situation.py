@@ -15,7 +15,7 @@ from rtshcua.ground.analysis.reported import means_unknown
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.parts import walk
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.lower.conditions import Conditions
+from rtshcua.ground.lower.conditions import ConditionLowering
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.testing.case import PolicyUnderTest
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
@@ -46,7 +46,7 @@ class MonitorIndex:
         timed = next(_timed_of(condition), None)
         return () if timed is None else self._numbers.get(_key(timed), ())
 
-    def add(self, timed: _Timed, found: Conditions, text: str) -> None:
+    def add(self, timed: _Timed, found: ConditionLowering, text: str) -> None:
         """Note what a condition of the policy became."""
         numbers = found.monitors_of(timed.operand, timed.kind, timed.window_us)
         if numbers and _key(timed) not in self._numbers:

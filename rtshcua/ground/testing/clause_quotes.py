@@ -8,7 +8,7 @@ from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.lower.files import shortened
+from rtshcua.ground.lower.tables import shortened
 from rtshcua.ground.testing.case import PolicyUnderTest
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.policy import RuleKind

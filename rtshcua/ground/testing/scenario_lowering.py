@@ -14,9 +14,9 @@ from rtshcua.ground.checker.checks.scenarios import OBSTACLE
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.faults import fault_of
 from rtshcua.ground.checker.symbols import correction, suggestion
-from rtshcua.ground.lower.conditions import Place
-from rtshcua.ground.lower.files import Files, Joint, shortened
-from rtshcua.ground.lower.trial import Lacking, Trial, knows_zone
+from rtshcua.ground.lower.conditions import ConditionPlace
+from rtshcua.ground.lower.fixed_tables import FixedTables, MissingFromPolicy, knows_zone
+from rtshcua.ground.lower.tables import JointSourceTable, SourceTable, shortened
 from rtshcua.ground.testing.case import PolicyUnderTest
 from rtshcua.ground.testing.clause_quotes import clause_meant, quotes
 from rtshcua.model.faults import Approval, Disapproval, Fault, WindStep
@@ -121,7 +121,9 @@ class _Lowering:
         self._context = context
         self._under = under
         self._lowered = under.policy.lowered
-        self._trial = Trial(context, self._lowered, Joint(self._lowered.files, Files(context.report, names)))
+        self._trial = FixedTables(
+            context, self._lowered, JointSourceTable(self._lowered.files, SourceTable(context.report, names))
+        )
 
     def scenario(self, declaration: ScenarioDecl) -> Scenario | None:
         """The scenario; None after a finding."""
@@ -182,9 +184,9 @@ class _Lowering:
 
     def _condition(self, moment: OnCondition) -> Clause | None:
         """The condition with the slots and zones of the policy: with either safe side of a grown zone that it has."""
-        lacking: list[Lacking] = []
+        lacking: list[MissingFromPolicy] = []
         for strict in (True, False):
-            place = Place(self._context.scope(), {}, strict)
+            place = ConditionPlace(self._context.scope(), {}, strict)
             lowered = self._trial.clause(moment.condition, place, moment.condition.span)
             if not isinstance(lowered, list):
                 return lowered

@@ -121,7 +121,7 @@ class VehicleDecl(Node):
     `time_zone` the IANA name of its time zone.
     `elevation` (`elevation 408 m above sea within 5 m`) is what altitudes above sea are converted by. `without` are the
     signals of sensors that are not fitted on it. `speeds`, `acceleration`, `wind` and `flight` are what durations and
-    charges are proved by; what is not written of them has a default (`rtshcua.ground.lower.speeds`).
+    charges are proved by; what is not written of them has a default (`rtshcua.ground.lower.vehicle`).
     """
 
     name: Name

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 
 from rtshcua.decision.flying import MINUTE
 from rtshcua.ground.checker import time_zones
-from rtshcua.ground.lower.speeds import speeds_of
+from rtshcua.ground.lower.vehicle import speeds_of
 from rtshcua.ground.report.words.values import coordinates, on_days, quantity, time_of_day, whole_day
 from rtshcua.ground.report.words.vocabulary import listed, name, named
 from rtshcua.model.flat.limits import FULL

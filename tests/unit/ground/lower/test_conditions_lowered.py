@@ -6,7 +6,7 @@ import pytest
 
 from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lower.emit import Code
+from rtshcua.ground.lower.conditions import CodeWriter
 from rtshcua.ground.pipeline.program import Compiled, compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.code import Op
@@ -247,7 +247,7 @@ def test_factors_that_are_too_fine_are_counted() -> None:
 
 
 def test_how_deep_the_stack_gets_counts_every_atom() -> None:
-    code = Code()
+    code = CodeWriter()
     for op in (Op.WEEK_IN, Op.TIME_IN, Op.PHASE_IN, Op.MONITOR, Op.KNOWN):
         code.add(op)
     assert code.deepest == 5

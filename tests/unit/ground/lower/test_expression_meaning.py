@@ -30,10 +30,9 @@ from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.symbols import Symbols, collect
 from rtshcua.ground.language.parse import parse
-from rtshcua.ground.lower.conditions import Conditions, Place
+from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
 from rtshcua.ground.lower.contracts import cells_of
-from rtshcua.ground.lower.files import Files
-from rtshcua.ground.lower.slots import Slots
+from rtshcua.ground.lower.tables import SignalSlots, SourceTable
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.contract import CHOICE, QUANTITY
 from rtshcua.model.flat.limits import MAX_MONITORS, MAX_VALUE
@@ -117,11 +116,11 @@ def lowered(node: Condition) -> Lowered | None:
     if report.found:  # it asks for a value that a signal never has
         assert {found.code.id for found in report.found} == {"E0325"}, (node, report.found)
         return None
-    slots = Slots(context)
+    slots = SignalSlots(context)
     well_known = [slots.of(name) for name in ("position", "height", "battery")]
     zones: Any = Circles()
-    conditions = Conditions(context, slots, zones, Files(report, {}))
-    clause = conditions.clause(node, Place(scope, cells_of(symbols.skills["probe"]), strict=True))
+    conditions = ConditionLowering(context, slots, zones, SourceTable(report, {}))
+    clause = conditions.clause(node, ConditionPlace(scope, cells_of(symbols.skills["probe"]), strict=True))
     monitors = conditions.monitors.all
     if report.found or len(monitors) > MAX_MONITORS:
         assert {found.code.id for found in report.found} <= {"E1002", "E1003"}

@@ -16,7 +16,7 @@ from rtshcua.diagnostics.render import render
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.geometry.projection import projection_at
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lower.sets import Sets
+from rtshcua.ground.lower.tables import ValueSets
 from rtshcua.ground.lower.zones import ZoneTable
 from rtshcua.ground.pipeline.program import Compiled, compile_program
 from rtshcua.mavlink import dialect
@@ -201,8 +201,8 @@ def test_what_lies_within_a_timed_zone_does_while_it_exists() -> None:
         for smaller in (True, False):
             assert table.within("yard", 0, smaller=smaller, span=span) == (0, 1)
             assert table.disjoint("yard", 0, smaller=smaller, span=span) == (2,)
-        assert [op for op, _, _ in table.times("yard", Sets())] == ops
-        assert list(table.times("yard", Sets())) == list(table.times("yard", Sets()))
+        assert [op for op, _, _ in table.times("yard", ValueSets())] == ops
+        assert list(table.times("yard", ValueSets())) == list(table.times("yard", ValueSets()))
 
 
 def test_a_rule_about_a_timed_zone_asks_whether_it_exists() -> None:

@@ -16,7 +16,7 @@ from rtshcua.decision.times import LocalTime, daily, weekly
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.checker import time_zones
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lower.clock import week
+from rtshcua.ground.lower.zones import weekly_windows
 from rtshcua.ground.pipeline.program import check_program, compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.limits import DAY, WEEK
@@ -66,7 +66,7 @@ def test_a_window_holds_whenever_a_clock_on_the_wall_shows_a_time_in_it(
 ) -> None:
     local = LocalTime(0, time_zones.offsets(name))
     first, last = start * MINUTE, end * MINUTE
-    window = weekly(week(first, last, sorted(days)), local) if days else daily(first, last, local)
+    window = weekly(weekly_windows(first, last, sorted(days)), local) if days else daily(first, last, local)
     found = nights(name)
     day = found[number % len(found)] - timedelta(days=1)
     for minute in range(3 * 1440):
@@ -122,7 +122,7 @@ def test_the_machines_own_zones_are_not_read(monkeypatch: pytest.MonkeyPatch) ->
     ],
 )
 def test_windows_of_a_week(start: int, end: int, days: range, windows: tuple[int, ...]) -> None:
-    assert week(start, end, days) == windows
+    assert weekly_windows(start, end, days) == windows
 
 
 # ------------------------------------------------------------------------------------------------------- programs

@@ -1,4 +1,4 @@
-"""Whether a survey path that somebody signed is the one that the planner works out.
+"""The survey path of a step that covers an area: what the planner works out, and whether a signed path is that.
 
 On board a path is held to lie in its zone, and no more: who signs a mission may choose it freely there. What is asked
 for is skill, zone and arguments, and from these the planner always makes the same path. It has no say in where the path
@@ -17,7 +17,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 
 
-class Planned(NamedTuple):
+class PlannedPath(NamedTuple):
     """What the planner works out in the place of a signed path.
 
     `points` are how many corners it has (0: it finds no path), `length` is in mm; `apart` is how far a corner of either
@@ -29,7 +29,7 @@ class Planned(NamedTuple):
     apart: int
 
 
-def planned_otherwise(policy: Policy, one: Invocation) -> Planned | None:
+def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | None:
     """What the planner works out for a step of a well-formed mission, where that is not the path that was signed."""
     if one.plan.kind != MotionKind.COVER:
         return None
@@ -39,7 +39,7 @@ def planned_otherwise(policy: Policy, one: Invocation) -> Planned | None:
         found = _survey(policy, one, pattern)
         if found is not None and signed in (found, found[::-1]):
             return None
-    return Planned(0, 0, 0) if found is None else Planned(len(found), path_length(found), _apart(signed, found))
+    return PlannedPath(0, 0, 0) if found is None else PlannedPath(len(found), path_length(found), _apart(signed, found))
 
 
 def _patterns(policy: Policy, one: Invocation) -> Iterator[str]:

@@ -12,11 +12,9 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.lower.conditions import Conditions, Place
-from rtshcua.ground.lower.files import Files
+from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
 from rtshcua.ground.lower.policy import LoweredPolicy
-from rtshcua.ground.lower.slots import Slots
-from rtshcua.ground.lower.zones import ZoneTable
+from rtshcua.ground.lower.tables import SourceTable
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
 from rtshcua.model.ir.expression import Condition
@@ -25,7 +23,7 @@ from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.quantity import Dimension, display
 
 
-class Lacking(NamedTuple):
+class MissingFromPolicy(NamedTuple):
     """What a condition needs that the policy has not, where it is written, and what the policy has of that kind."""
 
     span: Span
@@ -33,16 +31,18 @@ class Lacking(NamedTuple):
     has: str
 
 
-class Trial:
+class FixedTables:
     """Lowers conditions under one policy; places are those of `files`."""
 
-    def __init__(self, context: Context, under: LoweredPolicy, files: Files) -> None:
+    def __init__(self, context: Context, under: LoweredPolicy, files: SourceTable) -> None:
         self._context = context
         self._under = under
         self._files = files
-        self._copy: _Copy | None = None
+        self._copy: ConditionLowering | None = None
 
-    def clause(self, condition: Condition, place: Place, span: Span) -> Clause | list[Lacking] | None:
+    def clause(
+        self, condition: Condition, place: ConditionPlace, span: Span
+    ) -> Clause | list[MissingFromPolicy] | None:
         """The condition lowered, or what the policy has not of what it needs; None after a finding."""
         unread, sound = self._unread(condition)
         if unread or not sound:
@@ -50,26 +50,26 @@ class Trial:
         if self._copy is None:
             self._copy = _copy(self._context, self._under, self._files)
         before = len(self._context.report.found)
-        lowered = self._copy.conditions.clause(condition, place)
+        lowered = self._copy.clause(condition, place)
         lacking = next(_lacking(self._copy, self._under.policy), None)
         if lacking is not None:
             self._copy = None  # what it gained is not the policy's
         if len(self._context.report.found) > before:
             return None
-        return lowered if lacking is None else [Lacking(span, *lacking)]
+        return lowered if lacking is None else [MissingFromPolicy(span, *lacking)]
 
-    def _unread(self, condition: Condition) -> tuple[list[Lacking], bool]:
+    def _unread(self, condition: Condition) -> tuple[list[MissingFromPolicy], bool]:
         """The signals of a condition that the policy does not read; and whether it has all its zones, which is reported
         where it has not.
         """
         context, under = self._context, self._under
         signals = {signal.name for signal in under.policy.signals}
-        unread, sound = list[Lacking](), True
+        unread, sound = list[MissingFromPolicy](), True
         for reference in references(condition):
             zone = reference.name.removesuffix(ENTRY)
             if reference.name in context.symbols.signals and reference.name not in signals:
                 what = f"reads the signal `{reference.name}`, which the policy does not"
-                unread.append(Lacking(reference.span, what, _signals(under.policy)))
+                unread.append(MissingFromPolicy(reference.span, what, _signals(under.policy)))
             elif zone in context.symbols.zones:
                 sound &= knows_zone(context, under, Name(span=reference.span, text=zone))
         return unread, sound
@@ -89,33 +89,26 @@ def knows_zone(context: Context, under: LoweredPolicy, zone: Name) -> bool:
     return False
 
 
-class _Copy(NamedTuple):
-    """What the policy was lowered into, copied: what conditions add to it is seen, and thrown away."""
-
-    conditions: Conditions
-    slots: Slots
-    zones: ZoneTable
-
-
-def _copy(context: Context, under: LoweredPolicy, files: Files) -> _Copy:
+def _copy(context: Context, under: LoweredPolicy, files: SourceTable) -> ConditionLowering:
+    """The tables of the policy, copied: what conditions add to the copy is seen, and thrown away."""
     # `deepcopy` asks by identity what to leave as it is
     memo: dict[int, Any] = {id(each): each for each in (context, context.report, context.symbols)}
     memo[id(under.files)] = files
-    return _Copy(deepcopy(under.conditions, memo), deepcopy(under.slots, memo), deepcopy(under.zones, memo))
+    return deepcopy(under.conditions, memo)
 
 
-def _lacking(copy: _Copy, policy: Policy) -> Iterator[tuple[str, str]]:
+def _lacking(copy: ConditionLowering, policy: Policy) -> Iterator[tuple[str, str]]:
     """What a lowering has added to the tables of a policy, and what these have of its kind."""
     if copy.slots.count > policy.slots:
         yield "reads a signal that the policy does not", _signals(policy)
     if len(copy.zones.flat()) > len(policy.zones) or len(copy.zones.tables) > len(policy.tables):
         grown = listed(dict.fromkeys(zone.name for zone in policy.zones[len(copy.zones.index) :]))
         yield "needs a grown zone that the policy does not have", f"it has {grown or 'none'}"
-    if len(copy.conditions.sets.phases) > len(policy.phases):
+    if len(copy.sets.phases) > len(policy.phases):
         yield "names a phase that no condition of the policy does", f"they name {listed(policy.phases) or 'none'}"
-    if len(copy.conditions.sets.all) > len(policy.sets):
+    if len(copy.sets.all) > len(policy.sets):
         yield "needs a set of values that no condition of the policy has", "a single value is compared with `==`"
-    if len(copy.conditions.monitors.all) > len(policy.monitors):
+    if len(copy.monitors.all) > len(policy.monitors):
         watched = listed(dict.fromkeys(_window(monitor) for monitor in policy.monitors))
         yield "needs a temporal condition that the policy does not observe", f"it observes {watched or 'none'}"
 

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from rtshcua.decision import prepare
 from rtshcua.diagnostics import codes
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lower.surveyed import Planned, planned_otherwise
+from rtshcua.ground.lower.signed_paths import PlannedPath, path_planned_otherwise
 from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Invocation
@@ -93,14 +93,14 @@ def along(one: Invocation, *path: int) -> Invocation:
 @rows("call", CALLS)
 def test_the_compilers_own_path_is_the_planners_from_either_end(call: str) -> None:
     policy, one = compiled(call)
-    assert planned_otherwise(policy, one) is None
+    assert path_planned_otherwise(policy, one) is None
     points = list(zip(one.plan.path[::2], one.plan.path[1::2], strict=True))
     turned = [coordinate for point in reversed(points) for coordinate in point]
-    assert planned_otherwise(policy, along(one, *turned)) is None
-    lingering = planned_otherwise(policy, along(one, *one.plan.path, *one.plan.path[-2:]))
+    assert path_planned_otherwise(policy, along(one, *turned)) is None
+    lingering = path_planned_otherwise(policy, along(one, *one.plan.path, *one.plan.path[-2:]))
     assert lingering is not None, "a point more"
     assert (lingering.points, lingering.apart) == (len(points), 0)
-    moved = planned_otherwise(policy, along(one, one.plan.path[0] + 1, *one.plan.path[1:]))
+    moved = path_planned_otherwise(policy, along(one, one.plan.path[0] + 1, *one.plan.path[1:]))
     assert moved is not None
     assert moved.apart <= 1
 
@@ -108,7 +108,7 @@ def test_the_compilers_own_path_is_the_planners_from_either_end(call: str) -> No
 def test_another_pattern_than_the_argument_is_told() -> None:
     policy, grid = compiled(CALLS[3])
     _, perimeter = compiled(CALLS[4])
-    found = planned_otherwise(policy, along(grid, *perimeter.plan.path))
+    found = path_planned_otherwise(policy, along(grid, *perimeter.plan.path))
     assert found is not None
     assert found.points == len(grid.plan.path) // 2
     assert found.apart > 1_000
@@ -117,7 +117,7 @@ def test_another_pattern_than_the_argument_is_told() -> None:
 
 def test_one_point_is_a_path_too() -> None:
     policy, grid = compiled(CALLS[3])
-    found = planned_otherwise(policy, along(grid, *grid.plan.path[:2]))
+    found = path_planned_otherwise(policy, along(grid, *grid.plan.path[:2]))
     assert found is not None
     assert found.apart > 10_000
 
@@ -127,18 +127,18 @@ def test_where_nothing_can_be_planned_any_path_is_another(pattern: int) -> None:
     """What is out of range is for the vehicle to refuse; what has no path has none that was chosen by us."""
     policy, one = compiled(CALLS[3])
     area, altitude, _, speed = one.arguments
-    none = Planned(0, 0, 0)
-    assert planned_otherwise(policy, replace(one, arguments=(area, altitude, pattern, speed))) == none
-    assert planned_otherwise(policy, replace(one, arguments=(99, altitude, 0, speed))) == none
+    none = PlannedPath(0, 0, 0)
+    assert path_planned_otherwise(policy, replace(one, arguments=(area, altitude, pattern, speed))) == none
+    assert path_planned_otherwise(policy, replace(one, arguments=(99, altitude, 0, speed))) == none
     small = replace(policy, vehicle=replace(policy.vehicle, position_error=1_000_000))
-    assert planned_otherwise(small, one) == none
+    assert path_planned_otherwise(small, one) == none
     zones = tuple(replace(zone, shape=0, data=(0, 0, 10**10 + 1)) for zone in policy.zones)
-    assert planned_otherwise(replace(policy, zones=zones), one) == none, "no compiler makes such a circle"
+    assert path_planned_otherwise(replace(policy, zones=zones), one) == none, "no compiler makes such a circle"
 
 
 def test_a_step_that_covers_nothing_has_no_path_to_choose() -> None:
     policy, one = compiled(CALLS[3])
-    assert planned_otherwise(policy, replace(one, plan=replace(one.plan, kind=4, path=(0, 0)))) is None
+    assert path_planned_otherwise(policy, replace(one, plan=replace(one.plan, kind=4, path=(0, 0)))) is None
 
 
 def test_a_survey_that_is_compared_with_too_many_edges_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

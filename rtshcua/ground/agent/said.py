@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Final, NamedTuple
 
 from rtshcua.ground.agent.patterns import unit_of
-from rtshcua.ground.language.build.literals import MEANT
+from rtshcua.ground.language.build.number_findings import MEANT
 from rtshcua.model.quantity import UNITS, Dimension
 
 _FOOT = Fraction(3048, 10)  # mm, exact since 1959

@@ -14,8 +14,7 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.editor.moved import moved, moved_finding, same
 from rtshcua.ground.editor.positions import Edit, difference
 from rtshcua.ground.language.automaton import Automaton
-from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
-from rtshcua.ground.language.build.missions import Builder
+from rtshcua.ground.language.build.reader import MAX_FINDINGS, Enough, Reader
 from rtshcua.ground.language.parse import Parsed, beginning, parse, parsed, refused, run
 from rtshcua.ground.language.recovery import shifts
 from rtshcua.ground.language.table import table
@@ -59,13 +58,13 @@ def cut(source: Source) -> Cut:
     """A text that is parsed for the first time."""
     if refused(source) is not None:
         return Cut(source, (), parse(source))
-    builder = _Cutting(source)
+    reader = _Cutting(source)
     try:
-        run(Automaton(table(), source, builder), builder, beginning(source))
+        run(Automaton(reader), beginning(source))
     except Enough:
         return Cut(source, (), parse(source))
-    builder.close(len(source.text), len(source.text), firm=False)
-    return _joined(source, tuple(builder.pieces))
+    reader.close(len(source.text), len(source.text), firm=False)
+    return _joined(source, tuple(reader.pieces))
 
 
 def cut_again(old: Cut, text: str, earlier: Sequence[Cut] = ()) -> Cut:
@@ -86,12 +85,12 @@ def cut_again(old: Cut, text: str, earlier: Sequence[Cut] = ()) -> Cut:
     for each in (*earlier, old):
         later |= _later(each, difference(each.source.text, text))
     start = old.pieces[first].start if first else beginning(source)
-    builder = _Cutting(source, later, old.pieces[first - 1].end if first else start)
-    automaton = Automaton(table(), source, builder)
+    reader = _Cutting(source, later, old.pieces[first - 1].end if first else start)
+    automaton = Automaton(reader)
     if first:
         _begin_behind(automaton)
     try:
-        run(automaton, builder, start)
+        run(automaton, start)
     except Enough:
         return cut(source)
     except _Met as met:
@@ -99,13 +98,13 @@ def cut_again(old: Cut, text: str, earlier: Sequence[Cut] = ()) -> Cut:
         replaced = old.pieces[first:at] if known is old else None
         rest = known.pieces[at:] if not by else tuple(_moved(piece, by) for piece in known.pieces[at:])
     else:
-        builder.close(len(text), len(text), firm=False)
+        reader.close(len(text), len(text), firm=False)
         replaced, rest = old.pieces[first:], ()
-    pieces = (*old.pieces[:first], *builder.pieces, *rest)
+    pieces = (*old.pieces[:first], *reader.pieces, *rest)
     if sum(len(piece.found) for piece in pieces) >= MAX_FINDINGS:
         return cut(source)
     return _joined(source, pieces)._replace(
-        since=edit if replaced is not None and _say_the_same(replaced, builder.pieces) else None
+        since=edit if replaced is not None and _say_the_same(replaced, reader.pieces) else None
     )
 
 
@@ -142,7 +141,7 @@ class _Met(Exception):
         self.known = known
 
 
-class _Cutting(Builder):
+class _Cutting(Reader):
     """Notes after each declaration what has come since the one before."""
 
     def __init__(self, source: Source, later: Mapping[int, _Known] | None = None, end: int | None = None) -> None:
@@ -155,7 +154,7 @@ class _Cutting(Builder):
     def declare(self, node: T, name: Name | None = None) -> None:
         """Keeps a declaration, and closes its piece; raises _Met where what follows is known."""
         super().declare(node, name)
-        text, (_, start, end) = self._source.text, node.span
+        text, (_, start, end) = self.source.text, node.span
         self.close(start, end, firm=_is_firm(text, start, self._end))
         self._end = end
         known = self._later.get(_behind(text, end))

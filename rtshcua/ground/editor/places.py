@@ -7,8 +7,7 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.editor.pieces import Cut
 from rtshcua.ground.editor.syntax import Token, tokens
 from rtshcua.ground.language.automaton import Automaton
-from rtshcua.ground.language.build.base import Enough
-from rtshcua.ground.language.build.missions import Builder
+from rtshcua.ground.language.build.reader import Enough, Reader
 from rtshcua.ground.language.expected import accepted, phrase
 from rtshcua.ground.language.parse import beginning
 from rtshcua.ground.language.recovery import misread, resume, shifts
@@ -90,8 +89,7 @@ def asked(cut: Cut, offset: int) -> Asked:
     text = cut.source.text[:offset] + _STOP
     start = max((piece.start for piece in cut.pieces if piece.firm and piece.start < offset), default=None)
     source = Source(cut.source.file, text)
-    builder = Builder(source)
-    automaton = Automaton(table(), source, builder)
+    automaton = Automaton(Reader(source))
     at: int | None = beginning(source) if start is None else start
     try:
         while at is not None:

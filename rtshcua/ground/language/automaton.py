@@ -1,19 +1,96 @@
 """Runs the LALR table over a text: reads a token, shifts it or reduces, and stops at the first that does not fit.
 
 Lark's own driver makes an object of each token and a tree of each rule. This one keeps offsets, hands the parts of a
-rule straight to the builder, and leaves its stacks as they are when it stops, so that `recovery` can go on from there.
+rule straight to its action, and leaves its stacks as they are when it stops, so that `recovery` can go on from there.
 
 Fast twin of Lark's driver. Goal: text to IR in at most the time of a bare Lark parse (bench/parse.py); 0.34 of it,
 where Lark's tree would have to be walked besides (docs/adr/0006 and 0037). tests/unit/ground/language/test_any_text.py
 holds that both take the same texts.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from types import MethodType
 from typing import Any, NamedTuple
 
-from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.reduce import Reductions
-from rtshcua.ground.language.table import END, Table
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.language.build.actions import ACTIONS
+from rtshcua.ground.language.build.reader import Action, Reader
+from rtshcua.ground.language.table import END, Rule, Table, table
+
+#: from the stack of values, where the rule's own begin in it, and the offsets at which its text starts and ends
+Make = Callable[[list[Any], int, int, int], object]
+
+
+class Reduction(NamedTuple):
+    """Pop `length` values, push what `make` makes of them, and go on with `origin`."""
+
+    origin: str
+    length: int
+    make: Make
+
+
+def reduction(rule: Rule, reader: Reader) -> Reduction:
+    """The reduction of `rule`, by its action or, if it has none, by what it keeps."""
+    if rule.action:
+        make = _call(rule.kept, reader, ACTIONS[rule.action])
+    elif rule.repeats:
+        make = _repeat(*(at for at in rule.kept if at is not None))
+    else:
+        (at,) = rule.kept
+        make = _keep(at or 0)
+    return Reduction(rule.origin, rule.length, make)
+
+
+class Reductions(dict[int, Reduction]):
+    """The reductions by the rule's number, each made when it is first needed: a short text has need of few."""
+
+    def __init__(self, rules: Sequence[Rule], reader: Reader) -> None:
+        super().__init__()
+        self._rules, self._reader = rules, reader
+
+    def __missing__(self, number: int) -> Reduction:
+        made = self[number] = reduction(self._rules[number], self._reader)
+        return made
+
+
+def _keep(at: int) -> Make:
+    def make(values: list[Any], base: int, start: int, end: int) -> object:
+        return values[base + at]
+
+    return make
+
+
+def _repeat(first: int, *more: int) -> Make:
+    """A list that begins with `first`, or is that list itself, so that a long list is not copied at every step."""
+
+    def make(values: list[Any], base: int, start: int, end: int) -> object:
+        made = [values[base + first]] if first >= 0 else values[base + ~first]
+        made.extend([values[base + at] for at in more])
+        return made
+
+    return make
+
+
+def _call(kept: tuple[int | None, ...], reader: Reader, action: Action) -> Make:
+    new, file, act = tuple.__new__, reader.source.file, MethodType(action, reader)
+
+    def make(values: list[Any], base: int, start: int, end: int) -> object:
+        arguments = [None if at is None else values[base + at] for at in kept]
+        return act(new(Span, (file, start, end)), *arguments)
+
+    def make_spreading(values: list[Any], base: int, start: int, end: int) -> object:
+        arguments: list[Any] = []
+        for at in kept:
+            if at is None:
+                arguments.append(None)
+            elif at >= 0:
+                arguments.append(values[base + at])
+            else:
+                arguments += values[base + ~at]
+        return act(new(Span, (file, start, end)), *arguments)
+
+    return make_spreading if any(at is not None and at < 0 for at in kept) else make
 
 
 class Failure(NamedTuple):
@@ -28,21 +105,22 @@ class Failure(NamedTuple):
 class Automaton:
     """The stacks of the parser: `values` and `starts` (offsets) have one entry for each state above the first.
 
-    `actions` is an object with a method for each rule's action; it is called with the rule's span and the kept values.
+    The action of a rule is called with the reader, the rule's span and the kept values.
     """
 
-    table: Table
-    source: Source
-    actions: object
+    reader: Reader
+    table: Table = field(default_factory=table)
     states: list[int] = field(default_factory=lambda: [0])
     values: list[Any] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)
     end: int = 0  # of the last token that was taken, when the parser has stopped
+    source: Source = field(init=False)
     rules: Reductions = field(init=False)
 
     def __post_init__(self) -> None:
         """Binds each rule to its action, once for the text, however often the parser stops in it."""
-        self.rules = Reductions(self.table.rules, self.source.file, self.actions)
+        self.source = self.reader.source
+        self.rules = Reductions(self.table.rules, self.reader)
 
     def run(self, offset: int) -> Failure | None:
         """Parses from `offset` on; None when the text was read to its end."""

@@ -11,13 +11,11 @@ from rtshcua.diagnostics.excerpt import hiding, visible
 from rtshcua.diagnostics.kinds import LOOKED_AT, Kind, foreign
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.automaton import Automaton
-from rtshcua.ground.language.build.base import MAX_FINDINGS, Enough
-from rtshcua.ground.language.build.missions import Builder
+from rtshcua.ground.language.build.reader import MAX_FINDINGS, Enough, Reader
 from rtshcua.ground.language.explain import explain
 from rtshcua.ground.language.faults import MAX_SIZE, not_a_source, too_large, too_long
 from rtshcua.ground.language.recovery import file_level, misread, pending, resume
 from rtshcua.ground.language.size import MAX_TOKENS
-from rtshcua.ground.language.table import table
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
@@ -55,18 +53,18 @@ class Parsed:
 
 def parse(source: Source) -> Parsed:
     """Parses `source`; a text that is too large, or no text, is one finding and no declarations."""
-    builder = Builder(source)
+    reader = Reader(source)
     found = refused(source)
     if found is not None:
-        builder.note(found)
+        reader.note(found)
     else:
         try:
-            run(Automaton(table(), source, builder), builder, beginning(source))
+            run(Automaton(reader), beginning(source))
         except Enough:
             help = f"correct the first {MAX_FINDINGS}, then look again"
-            last = builder.diagnostics[-1].span
-            builder.diagnostics.append(Diagnostic(TOO_MANY_FINDINGS, "there are more findings than these", last, help))
-    return parsed(source, builder.declarations, builder.diagnostics, frozenset(builder.broken), whole=builder.whole)
+            last = reader.diagnostics[-1].span
+            reader.diagnostics.append(Diagnostic(TOO_MANY_FINDINGS, "there are more findings than these", last, help))
+    return parsed(source, reader.declarations, reader.diagnostics, frozenset(reader.broken), whole=reader.whole)
 
 
 def parsed(
@@ -118,22 +116,23 @@ def beginning(source: Source) -> int:
     return 1 if source.text.startswith("\ufeff") else 0
 
 
-def run(automaton: Automaton, builder: Builder, start: int) -> None:
+def run(automaton: Automaton, start: int) -> None:
     """Parses from `start` to the end of the text, and goes on after every failure."""
+    reader = automaton.reader
     offset: int | None = start
     while offset is not None:
         failure = automaton.run(offset)
         if failure is None:
             return
         failure = misread(automaton, failure)
-        builder.note(explain(automaton, failure))
+        reader.note(explain(automaton, failure))
         begun = pending(automaton)
-        builder.whole = builder.whole and (begun is None or begun[0] != "import")
+        reader.whole = reader.whole and (begun is None or begun[0] != "import")
         offset = resume(automaton, failure.start)
         if offset is None or len(automaton.states) == file_level(automaton):
             if begun is not None and isinstance(begun[1], Name):
-                builder.broken.add(begun[1].text)
-            builder.settle()
+                reader.broken.add(begun[1].text)
+            reader.settle()
 
 
 def _unit(source: Source, declarations: list[Node]) -> Unit:

@@ -1,5 +1,5 @@
-"""Makes the IR: one method for each rule of the grammar, called with the rule's span and its parts.
+"""Makes the IR: an action for each rule of the grammar, called with the reader, the rule's span and its parts.
 
-`base` what all share, `literals` numbers and texts, `conditions`, `signals`, `zones`, `vehicles`, `skills`,
-`policies`, `tests`, and `missions`, where the `Builder` is whole.
+`reader` is what all actions share; `literals`, `conditions`, `site`, `skills`, `policies` and `tests` have the actions,
+which `actions` gathers. A rule whose parts are the fields of one node is a row in the table `FORMS` of its module.
 """

@@ -1,114 +1,189 @@
-"""Authority policies."""
+"""Imports, roles, policies, templates and missions: who may have what done, and what is to be done."""
 
 from typing import Any
 
-from rtshcua.diagnostics.codes import NOT_WRITTEN
+from rtshcua.diagnostics.codes import NOT_WRITTEN, SYNTAX
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.language.build.base import Part
-from rtshcua.ground.language.build.skills import Skills
-from rtshcua.model.ir.expression import Condition, Quantity
-from rtshcua.model.ir.node import Name
+from rtshcua.ground.language.build.reader import Action, Part, Reader, node, part, several
+from rtshcua.model.ir.expression import Quantity
+from rtshcua.model.ir.missions import Item, MissionDecl, Overrides, Phase, Repeat, Step
+from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.policies import Airspace, Delegation, PolicyDecl, RoleDecl, Rule, Silence, TemplateDecl, Use
-from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter
+from rtshcua.model.ir.program import Import
+from rtshcua.model.ir.skills import ArgumentValue, Parameter
 
 Names = tuple[Name, ...]
 
+FORMS: dict[str, Action] = {
+    "permit": node(Rule, "skills", "roles", "through", "when", kind="permit", through=()),
+    "forbid": node(Rule, "skills", "roles", "through", "when", "where_fitted", kind="forbid", through=()),
+    "confirm": node(
+        Rule, "skills", "when", "approver", "another", "within", "where_fitted", kind="confirm", roles=(), through=()
+    ),
+    "degrade": node(Rule, "skills", "when", "target", "where_fitted", kind="degrade", roles=(), through=()),
+    "contingency": part("contingency"),
+    "without_evidence": part("without evidence"),
+    "without_link": part("without link", node(Silence, "limit", "then")),
+    "use": node(Use, "template", "arguments", arguments=()),
+    "delegate": node(Delegation, "skills", "grantor", "grantee", "through", "when", through=()),
+    "arguments": several,
+    "most_steps": part("steps"),
+    "intent": part("intent"),
+    "proposed": part("proposed", several),
+}
 
-class Policies(Skills):
-    """Who may have which skill done, where and when."""
 
-    def anyone(self, span: Span) -> Names:
-        """`any` skill, or `by any` role: no name in particular."""
-        return ()
+def file(reader: Reader, span: Span, *declarations: None) -> None:
+    """The whole text; its declarations were kept as they ended."""
 
-    def permit(self, span: Span, skills: Names, roles: Names, through: Names | None, when: Condition | None) -> Rule:
-        """`permit takeoff by role operator through agent when altitude <= 40 m`."""
-        return Rule(
-            span=span, kind="permit", skills=skills, roles=roles, through=through or (), when=when,
-            approver=None, another=None, within=None, target=None,
-        )  # fmt: skip
 
-    def forbid(
-        self, span: Span, skills: Names, roles: Names, through: Names | None, when: Condition | None,
-        fitted: bool | None,
-    ) -> Rule:  # fmt: skip
-        """`forbid track_target by any`."""
-        return Rule(
-            span=span, kind="forbid", skills=skills, roles=roles, through=through or (), when=when,
-            approver=None, another=None, within=None, target=None, where_fitted=fitted is True,
-        )  # fmt: skip
+def import_file(reader: Reader, span: Span, path: str) -> None:
+    """`import "lib:skills/goto.rts"`."""
+    reader.declare(Import(span=span, path=path))
 
-    def confirm(
-        self, span: Span, skills: Names, when: Condition | None, approver: Name, another: Name | None,
-        within: Quantity | None, fitted: bool | None,
-    ) -> Rule:  # fmt: skip
-        """`confirm inspect_area when altitude < 10 m by role supervisor and another of role safety within 30 s`."""
-        return Rule(
-            span=span, kind="confirm", skills=skills, roles=(), through=(), when=when,
-            approver=approver, another=another, within=within, target=None, where_fitted=fitted is True,
-        )  # fmt: skip
 
-    def degrade(self, span: Span, skills: Names, when: Condition | None, target: LinkDecl, fitted: bool | None) -> Rule:
-        """`degrade any when wind.speed > 6 m/s to return_home where fitted`."""
-        return Rule(
-            span=span, kind="degrade", skills=skills, roles=(), through=(), when=when,
-            approver=None, another=None, within=None, target=target, where_fitted=fitted is True,
-        )  # fmt: skip
+def anyone(reader: Reader, span: Span) -> Names:
+    """`any` skill, or `by any` role: no name in particular."""
+    return ()
 
-    def airspace(self, span: Span, inside: Names | None, outside: Names | None) -> Part:
-        """`airspace inside city outside school`."""
-        if inside is None and outside is None:
-            help = "write `inside`, `outside` or both, as in `airspace inside city outside school`"
-            self.report(NOT_WRITTEN, "the airspace has no zone", span, help)
-        return Part("airspace", span, Airspace(span=span, inside=inside or (), outside=outside or ()))
 
-    def contingency(self, span: Span, links: tuple[LinkDecl, ...]) -> Part:
-        """`contingency hover for 10 s, return_home, emergency_land`."""
-        return Part("contingency", span, links)
+def airspace(reader: Reader, span: Span, inside: Names | None, outside: Names | None) -> Part:
+    """`airspace inside city outside school`."""
+    if inside is None and outside is None:
+        help = "write `inside`, `outside` or both, as in `airspace inside city outside school`"
+        reader.report(NOT_WRITTEN, "the airspace has no zone", span, help)
+    return Part("airspace", span, Airspace(span=span, inside=inside or (), outside=outside or ()))
 
-    def without_evidence(self, span: Span, otherwise: Any) -> Part:
-        """`without evidence refuse`."""
-        return Part("without evidence", span, otherwise)
 
-    def without_link(self, span: Span, limit: Quantity, then: Any) -> Part:
-        """`without link for 30 s contingency`."""
-        return Part("without link", span, Silence(span=span, limit=limit, then=then))
+def role(reader: Reader, span: Span, names: Names) -> None:
+    """`role supervisor, trainee`."""
+    reader.declare(RoleDecl(span=span, names=names))
 
-    def use(self, span: Span, template: Name, arguments: tuple[ArgumentValue, ...] | None) -> Use:
-        """`use low_flight(bridge_a, top = 30 m)`."""
-        return Use(span=span, template=template, arguments=arguments or ())
 
-    def delegate(
-        self, span: Span, skills: Names, grantor: Name, grantee: Name, through: Names | None, when: Condition | None
-    ) -> Delegation:
-        """`delegate goto by role operator to role trainee through agent when altitude <= 10 m`."""
-        return Delegation(span=span, skills=skills, grantor=grantor, grantee=grantee, through=through or (), when=when)
+def template(reader: Reader, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *rules: Rule) -> None:
+    """`template low_flight(area: zone, top: altitude) { permit ... }`."""
+    reader.undotted(name, "template")
+    reader.declare(TemplateDecl(span=span, name=name, parameters=parameters or (), rules=rules), name)
 
-    def role(self, span: Span, names: Names) -> None:
-        """`role supervisor, trainee`."""
-        self.declare(RoleDecl(span=span, names=names))
 
-    def template(self, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *rules: Rule) -> None:
-        """`template low_flight(area: zone, top: altitude) { permit ... }`."""
-        self.undotted(name, "template")
-        self.declare(TemplateDecl(span=span, name=name, parameters=parameters or (), rules=rules), name)
+def policy(reader: Reader, span: Span, name: Name, version: int, *given: Rule | Use | Delegation | Part) -> None:
+    """`policy bridge_inspection version 7 { ... }`."""
+    reader.undotted(name, "policy")
+    found = reader.parts("policy", name, [part for part in given if isinstance(part, Part)])
+    reader.declare(
+        PolicyDecl(
+            span=span,
+            name=name,
+            version=version,
+            rules=tuple(rule for rule in given if isinstance(rule, Rule)),
+            airspace=found.get("airspace"),
+            contingency=found.get("contingency", ()),
+            uses=tuple(use for use in given if isinstance(use, Use)),
+            delegations=tuple(each for each in given if isinstance(each, Delegation)),
+            without_evidence=found.get("without evidence", "land"),
+            without_link=found.get("without link"),
+        ),
+        name,
+    )
 
-    def policy(self, span: Span, name: Name, version: int, *given: Rule | Use | Delegation | Part) -> None:
-        """`policy bridge_inspection version 7 { ... }`."""
-        self.undotted(name, "policy")
-        found = self.parts("policy", name, [part for part in given if isinstance(part, Part)])
-        self.declare(
-            PolicyDecl(
-                span=span,
-                name=name,
-                version=version,
-                rules=tuple(rule for rule in given if isinstance(rule, Rule)),
-                airspace=found["airspace"].value if "airspace" in found else None,
-                contingency=found["contingency"].value if "contingency" in found else (),
-                uses=tuple(use for use in given if isinstance(use, Use)),
-                delegations=tuple(each for each in given if isinstance(each, Delegation)),
-                without_evidence=found["without evidence"].value if "without evidence" in found else "land",
-                without_link=found["without link"].value if "without link" in found else None,
-            ),
-            name,
-        )
+
+def argument(reader: Reader, span: Span, *parts: Any) -> ArgumentValue:
+    """`altitude = 20 m`, or a value by its place."""
+    name, value = parts if len(parts) == 2 else (None, *parts)
+    return ArgumentValue(span=span, name=name, value=value)
+
+
+def step(
+    reader: Reader,
+    span: Span,
+    skill: Name,
+    arguments: tuple[ArgumentValue, ...] | None,
+    otherwise: Any,
+    tighter: tuple[Span, tuple[Part, ...]] | None,
+) -> Step:
+    """`goto(bridge_a.entry, altitude = 20 m) on inadmissible skip { deadline 2 s }`."""
+    return Step(
+        span=span,
+        skill=skill,
+        arguments=arguments or (),
+        on_inadmissible=otherwise or "abort",
+        overrides=None if tighter is None else _overrides(reader, skill, *tighter),
+    )
+
+
+def overrides(reader: Reader, span: Span, *given: Part) -> tuple[Span, tuple[Part, ...]]:
+    """`{ deadline 2 s }`, after a step."""
+    return span, given
+
+
+def _overrides(reader: Reader, skill: Name, span: Span, given: tuple[Part, ...]) -> Overrides:
+    found = reader.parts("the step", skill, given)
+    for each in given:
+        if each.key in ("require", "assume", "maintain") and any(clause.where_fitted for clause in each.value):
+            reader.report(
+                SYNTAX,
+                "`where fitted` says nothing in a step, whose mission names its vehicle",
+                each.span,
+                "leave `where fitted` out; if the vehicle is without the sensor, leave the clause out",
+            )
+    validity, phases = found.get("valid", (None, ()))
+    return Overrides(
+        span=span,
+        deadline=found.get("deadline"),
+        validity=validity,
+        duration=found.get("lasts"),
+        grace=found.get("grace"),
+        energy=found.get("energy"),
+        phases=phases,
+        require=found.get("require", ()),
+        assume=found.get("assume", ()),
+        maintain=found.get("maintain", ()),
+        record=found.get("record", ()),
+    )
+
+
+def repeat(reader: Reader, span: Span, count: Quantity, *items: Item) -> Node:
+    """`repeat 3 { ... }`."""
+    made = Repeat(span=span, count=count, items=items)
+    return reader.nested(made, *items, help="write one `repeat` with the product of the counts")
+
+
+def phase(reader: Reader, span: Span, name: Name, *items: Item) -> Phase:
+    """`phase inspection { ... }`."""
+    reader.undotted(name, "phase")
+    return Phase(span=span, name=name, items=items)
+
+
+def mission(
+    reader: Reader,
+    span: Span,
+    name: Name,
+    parameters: tuple[Parameter, ...] | None,
+    policy: Name,
+    version: int,
+    vehicle: Name,
+    *given: Phase | Part,
+) -> None:
+    """`mission inspect_bridge_a(height: altitude) under bridge_inspection@7 on quad { ... }`."""
+    reader.undotted(name, "mission")
+    found = reader.parts("mission", name, [part for part in given if isinstance(part, Part)])
+    source, proposer, role = found.get("proposed", (None, None, None))
+    reader.declare(
+        MissionDecl(
+            span=span,
+            name=name,
+            policy=policy,
+            policy_version=version,
+            vehicle=vehicle,
+            intent=found.get("intent"),
+            source=source,
+            proposer=proposer,
+            role=role,
+            phases=tuple(phase for phase in given if isinstance(phase, Phase)),
+            parameters=parameters or (),
+            most_time=found.get("lasts"),
+            most_energy=found.get("energy"),
+            most_steps=found.get("steps"),
+        ),
+        name,
+    )

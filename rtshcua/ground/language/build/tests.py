@@ -1,16 +1,35 @@
-"""Nominals and tests."""
+"""Nominals, tests and scenarios: what holds, what is asked or goes wrong, and what must come of it."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from itertools import chain
+from typing import Any
 
-from rtshcua.diagnostics.codes import WRITTEN_TWICE
-from rtshcua.diagnostics.diagnostic import Label
+from rtshcua.diagnostics.codes import SYNTAX, WRITTEN_TWICE
+from rtshcua.diagnostics.diagnostic import Fix, Label
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.language.build.base import Part
-from rtshcua.ground.language.build.policies import Policies
+from rtshcua.ground.language.build.literals import text
+from rtshcua.ground.language.build.reader import Action, Part, Reader, node, part, several
 from rtshcua.ground.language.wording import short
-from rtshcua.model.ir.expression import Condition, Quantity, Value
+from rtshcua.model.ir.expression import Quantity, Value
 from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.scenarios import (
+    AfterStep,
+    AtTime,
+    Begins,
+    Charge,
+    Decides,
+    Delay,
+    Ends,
+    FaultCall,
+    Flies,
+    Incident,
+    Keeps,
+    Lands,
+    OnCondition,
+    Reacts,
+    ScenarioDecl,
+    Seeds,
+)
 from rtshcua.model.ir.skills import ArgumentValue
 from rtshcua.model.ir.tests import (
     Answer,
@@ -36,204 +55,243 @@ from rtshcua.model.ir.tests import (
     TestDecl,
 )
 
-#: parts of which there may be several
+#: of how many people a rule may ask for an approval
+PEOPLE = 2
+
+#: parts of a nominal or a test of which there may be several
 _LISTED = ("given", "answer")
 
+FORMS: dict[str, Action] = {
+    "under": part("under"),
+    "aboard": part("on"),
+    "asker": part("by", node(Asker, "role", "source")),
+    "over_time": node(OverTime, "condition"),
+    "given": part("given", several),
+    "instant": part("at", node(Instant, "utc_us", "within")),
+    "in_phase": part("phase", node(InPhase, "phase", "order", order=())),
+    "released": part("released"),
+    "issued": part("issued", node(Issue, "distance", ahead=False)),
+    "issued_ahead": part("issued", node(Issue, "distance", ahead=True)),
+    "in_force": part("version", node(InForce, "version")),
+    "identified": part("identity", node(Identity, "text")),
+    "reason": node(Name, "text"),
+    "outcome": several,
+    "flown_mission": part("flies"),
+    "flavours": part("aboard"),
+    "start": part("start", several),
+    "begins": node(Begins, "utc_us"),
+    "charge": node(Charge, "name", "value"),
+    "at_time": node(AtTime, "delay"),
+    "after_step": node(AfterStep, "delay", "skill", "number"),
+    "on_condition": node(OnCondition, "delay", "condition"),
+    "incident": part("incident", node(Incident, "moment", "fault")),
+    "ends": part("demand", node(Ends, "endings")),
+    "flies": part("demand", node(Flies, "skill", never=False)),
+    "never": part("demand", node(Flies, "skill", never=True)),
+    "bound": node(Name, "text"),
+    "lands": part("demand", node(Lands, "zone")),
+}
 
-class Outcome(NamedTuple):
-    """`fallback return_home`, within an expectation."""
 
-    outcome: Any
-    target: Name | None
+def title(reader: Reader, span: Span, raw: str) -> Quoted:
+    """A text that names something, or quotes a clause."""
+    return Quoted(span=span, text=text(reader, span, raw))
 
 
-class Tests(Policies):
-    """What must be decided, and where that starts from."""
+def cell(reader: Reader, span: Span, value: Value | str, measured: Quantity | None) -> Cell:
+    """`20 %`, `unknown`, `fix_3d measured 3 s ago`."""
+    return Cell(span=span, value=None if isinstance(value, str) else value, measured=measured)
 
-    def title(self, span: Span, raw: str) -> Quoted:
-        """A text that names something, or quotes a clause."""
-        return Quoted(span=span, text=self.text(span, raw))
 
-    def under(self, span: Span, policy: Name) -> Part:
-        """`under bridge_inspection`."""
-        return Part("under", span, policy)
+def assignment(reader: Reader, span: Span, subject: Name | OverTime, cell: Cell) -> Assignment:
+    """`battery = 20 %`."""
+    return Assignment(span=span, subject=_subject(subject), cell=cell)
 
-    def aboard(self, span: Span, vehicle: Name) -> Part:
-        """`on quad`."""
-        return Part("on", span, vehicle)
 
-    def asker(self, span: Span, role: Name, source: Name | None) -> Part:
-        """`by role operator through agent`."""
-        return Part("by", span, Asker(span=span, role=role, source=source))
+def answer(reader: Reader, span: Span, word: str, role: Name, ago: Quantity | None) -> Part:
+    """`approved by role supervisor 2 s ago`, `refused by role supervisor`."""
+    return Part("answer", span, Answer(span=span, granted=word == "approved", role=role, ago=ago))
 
-    def over_time(self, span: Span, condition: Condition) -> OverTime:
-        """`(battery < 30 % for the last 5 s)`."""
-        return OverTime(span=span, condition=condition)
 
-    def cell(self, span: Span, value: Value | str, measured: Quantity | None) -> Cell:
-        """`20 %`, `unknown`, `fix_3d measured 3 s ago`."""
-        return Cell(span=span, value=None if isinstance(value, str) else value, measured=measured)
+def deed(reader: Reader, span: Span, word: Any) -> Part:
+    """`replayed`, `tampered`."""
+    return Part(word, span, Deed(span=span, kind=word))
 
-    def assignment(self, span: Span, subject: Name | OverTime, cell: Cell) -> Assignment:
-        """`battery = 20 %`."""
-        return Assignment(span=span, subject=_subject(subject), cell=cell)
 
-    def given(self, span: Span, *assignments: Assignment) -> Part:
-        """`given battery = 20 %, gps.fix = fix_3d`."""
-        return Part("given", span, assignments)
+def asked(
+    reader: Reader,
+    span: Span,
+    skill: Name,
+    arguments: tuple[ArgumentValue, ...] | None,
+    role: Name | None,
+    source: Name | None,
+) -> Part:
+    """`when inspect_area(area = bridge_a, altitude = 20 m) by operator through agent`."""
+    said = [name.span for name in (role, source) if name is not None]
+    asker = Asker(span=said[0].to(said[-1]), role=role, source=source) if said else None
+    return Part("when", span, Request(span=span, skill=skill, arguments=arguments or (), asker=asker))
 
-    def instant(self, span: Span, utc_us: int, within: Quantity | None) -> Part:
-        """`at "2026-06-01T08:00:00Z" within 2 s`."""
-        return Part("at", span, Instant(span=span, utc_us=utc_us, within=within))
 
-    def in_phase(self, span: Span, phase: Name, order: tuple[Name, ...] | None) -> Part:
-        """`phase departure of departure, inspection`."""
-        return Part("phase", span, InPhase(span=span, phase=phase, order=order or ()))
+def expectation(
+    reader: Reader, span: Span, outcome: tuple[Any, ...], reason: Name | None, clause: Quoted | None
+) -> Part:
+    """`expect fallback return_home because state/violated`."""
+    word, target = outcome if len(outcome) == 2 else (*outcome, None)
+    return Part("expect", span, Expectation(span=span, outcome=word, target=target, reason=reason, clause=clause))
 
-    def answer(self, span: Span, word: str, role: Name, ago: Quantity | None) -> Part:
-        """`approved by role supervisor 2 s ago`, `refused by role supervisor`."""
-        return Part("answer", span, Answer(span=span, granted=word == "approved", role=role, ago=ago))
 
-    def released(self, span: Span, ago: Quantity) -> Part:
-        """`released 3 s ago`."""
-        return Part("released", span, ago)
+def columns(reader: Reader, span: Span, *subjects: Name | OverTime) -> tuple[Subject, ...]:
+    """`battery, wind.speed`."""
+    return tuple(map(_subject, subjects))
 
-    def issued(self, span: Span, ago: Quantity) -> Part:
-        """`issued 11 min ago`."""
-        return Part("issued", span, Issue(span=span, distance=ago, ahead=False))
 
-    def issued_ahead(self, span: Span, ahead: Quantity) -> Part:
-        """`issued in 5 s`."""
-        return Part("issued", span, Issue(span=span, distance=ahead, ahead=True))
+def row(reader: Reader, span: Span, *parts: Any) -> Row:
+    """`20 %, 3 m/s expect allow`."""
+    *cells, expectation = parts
+    return Row(span=span, cells=tuple(cells), expectation=expectation.value)
 
-    def in_force(self, span: Span, version: int) -> Part:
-        """`version 8 in force`."""
-        return Part("version", span, InForce(span=span, version=version))
 
-    def identified(self, span: Span, text: str) -> Part:
-        """`identity "quad-08"`."""
-        return Part("identity", span, Identity(span=span, text=text))
+def rows(reader: Reader, span: Span, columns: tuple[Subject, ...], *rows: Row) -> Part:
+    """`table battery, wind.speed { ... }`."""
+    return Part("table", span, Table(span=span, columns=columns, rows=rows))
 
-    def deed(self, span: Span, word: Any) -> Part:
-        """`replayed`, `tampered`."""
-        return Part(word, span, Deed(span=span, kind=word))
 
-    def asked(
-        self,
-        span: Span,
-        skill: Name,
-        arguments: tuple[ArgumentValue, ...] | None,
-        role: Name | None,
-        source: Name | None,
-    ) -> Part:
-        """`when inspect_area(area = bridge_a, altitude = 20 m) by operator through agent`."""
-        said = [name.span for name in (role, source) if name is not None]
-        asker = Asker(span=said[0].to(said[-1]), role=role, source=source) if said else None
-        return Part("when", span, Request(span=span, skill=skill, arguments=arguments or (), asker=asker))
-
-    def reason(self, span: Span, text: str) -> Name:
-        """`state/violated`."""
-        return Name(span=span, text=text)
-
-    def outcome(self, span: Span, word: str, target: Name | None = None) -> Outcome:
-        """`allow`, `fallback return_home`."""
-        return Outcome(word, target)
-
-    def expectation(self, span: Span, outcome: Outcome, reason: Name | None, clause: Quoted | None) -> Part:
-        """`expect fallback return_home because state/violated`."""
-        word, target = outcome
-        return Part("expect", span, Expectation(span=span, outcome=word, target=target, reason=reason, clause=clause))
-
-    def columns(self, span: Span, *subjects: Name | OverTime) -> tuple[Subject, ...]:
-        """`battery, wind.speed`."""
-        return tuple(map(_subject, subjects))
-
-    def row(self, span: Span, *parts: Any) -> Row:
-        """`20 %, 3 m/s expect allow`."""
-        *cells, expectation = parts
-        return Row(span=span, cells=tuple(cells), expectation=expectation.value)
-
-    def rows(self, span: Span, columns: tuple[Subject, ...], *rows: Row) -> Part:
-        """`table battery, wind.speed { ... }`."""
-        return Part("table", span, Table(span=span, columns=columns, rows=rows))
-
-    def nominal(self, span: Span, name: Name, *given: Part) -> None:
-        """`nominal morning { under bridge_inspection on quad ... }`."""
-        self.undotted(name, "nominal")
-        premises, found = self._premises(span, "nominal", name, given, ("under", "on"))
-        if not self.sound:
-            self.abandon(name)
-            return
-        self.declare(
-            NominalDecl(
-                span=span,
-                name=name,
-                policy=found["under"],
-                vehicle=found["on"],
-                asker=found.get("by"),
-                premises=premises,
-            ),
-            name,
-        )
-
-    def test(self, span: Span, name: Quoted, nominal: Name | None, *given: Part) -> None:
-        """`test "low battery turns an inspection into a return" { ... }`."""
-        premises, found = self._premises(span, "test", name, given)
-        self.declare(
-            TestDecl(
-                span=span,
-                name=name,
-                nominal=nominal,
-                premises=premises,
-                request=found.get("when"),
-                expectation=found.get("expect"),
-                table=found.get("table"),
-            )
-        )
-
-    def _premises(
-        self, span: Span, owner: str, name: Name | Quoted, given: Sequence[Part], required: Sequence[str] = ()
-    ) -> tuple[Premises, dict[str, Any]]:
-        """What holds, and the other parts by their key."""
-        once = [part for part in given if part.key not in _LISTED]
-        found = {key: part.value for key, part in self.parts(owner, name, once, required).items()}
-        answers: list[Answer] = []
-        for part in given:
-            if part.key == "answer":
-                self._answer(answers, part.value)
-        premises = Premises(
+def nominal(reader: Reader, span: Span, name: Name, *given: Part) -> None:
+    """`nominal morning { under bridge_inspection on quad ... }`."""
+    reader.undotted(name, "nominal")
+    found = reader.parts("nominal", name, given, ("under", "on"), _LISTED)
+    premises = _premises(reader, span, found)
+    if not reader.sound:
+        reader.abandon(name)
+        return
+    reader.declare(
+        NominalDecl(
             span=span,
-            given=tuple(each for part in given if part.key == "given" for each in part.value),
-            instant=found.get("at"),
-            phase=found.get("phase"),
-            answers=tuple(answers),
-            released=found.get("released"),
-            issued=found.get("issued"),
-            in_force=found.get("version"),
-            identity=found.get("identity"),
-            replayed=found.get("replayed"),
-            tampered=found.get("tampered"),
+            name=name,
+            policy=found["under"],
+            vehicle=found["on"],
+            asker=found.get("by"),
+            premises=premises,
+        ),
+        name,
+    )
+
+
+def test(reader: Reader, span: Span, name: Quoted, nominal: Name | None, *given: Part) -> None:
+    """`test "low battery turns an inspection into a return" { ... }`."""
+    found = reader.parts("test", name, given, (), _LISTED)
+    reader.declare(
+        TestDecl(
+            span=span,
+            name=name,
+            nominal=nominal,
+            premises=_premises(reader, span, found),
+            request=found.get("when"),
+            expectation=found.get("expect"),
+            table=found.get("table"),
         )
-        return premises, found
-
-    def _answer(self, answers: list[Answer], answer: Answer) -> None:
-        """Each answer is of another person; no rule asks more than two."""
-        same = [each for each in answers if each.role.text == answer.role.text]
-        if len(same) < _PEOPLE:
-            answers.append(answer)
-            return
-        self.report(
-            WRITTEN_TWICE,
-            f"`{short(answer.role.text)}` answers more than twice",
-            answer.span,
-            "keep two of them: a rule asks two people at most",
-            labels=(Label(same[0].span, "first written here"),),
-        )
+    )
 
 
-#: of how many people a rule may ask for an approval
-_PEOPLE = 2
+def _premises(reader: Reader, span: Span, found: dict[str, Any]) -> Premises:
+    """What holds, of the parts that say it."""
+    return Premises(
+        span=span,
+        given=tuple(chain.from_iterable(found["given"])),
+        instant=found.get("at"),
+        phase=found.get("phase"),
+        answers=_answers(reader, found["answer"]),
+        released=found.get("released"),
+        issued=found.get("issued"),
+        in_force=found.get("version"),
+        identity=found.get("identity"),
+        replayed=found.get("replayed"),
+        tampered=found.get("tampered"),
+    )
+
+
+def _answers(reader: Reader, given: Sequence[Answer]) -> tuple[Answer, ...]:
+    """Each answer is of another person; no rule asks more than two."""
+    kept: list[Answer] = []
+    for answer in given:
+        same = [each for each in kept if each.role.text == answer.role.text]
+        if len(same) < PEOPLE:
+            kept.append(answer)
+        else:
+            reader.report(
+                WRITTEN_TWICE,
+                f"`{short(answer.role.text)}` answers more than twice",
+                answer.span,
+                "keep two of them: a rule asks two people at most",
+                labels=(Label(same[0].span, "first written here"),),
+            )
+    return tuple(kept)
 
 
 def _subject(subject: Name | OverTime) -> Subject:
     return Named(span=subject.span, name=subject) if isinstance(subject, Name) else subject
+
+
+def seeds(reader: Reader, span: Span, first: Quantity, last: Quantity | None) -> Part:
+    """`seeds 1 .. 20`."""
+    return Part("seeds", span, Seeds(span=span, first=first, last=last or first))
+
+
+def fault(reader: Reader, span: Span, name: str, arguments: tuple[ArgumentValue, ...] | None) -> FaultCall:
+    """`link_silence(for = 5 s, way = up)`."""
+    named = Name(span=Span(span.file, span.start, span.start + len(name)), text=name)
+    return FaultCall(span=span, name=named, arguments=arguments or ())
+
+
+def delay(reader: Reader, span: Span, low: Quantity, high: Quantity | None) -> Delay:
+    """`30 s .. 40 s`."""
+    return Delay(span=span, low=low, high=high or low)
+
+
+def demand(reader: Reader, span: Span, decision: Part) -> Part:
+    """`expect fallback return_home because state/violated`."""
+    return Part("demand", span, Decides(span=span, decision=decision.value))
+
+
+def reaction(reader: Reader, span: Span, operator: Name, most: Quantity) -> Part:
+    """`expect reaction <= 200 ms`."""
+    _bounded(reader, operator, "<=", "a reaction is bounded from above")
+    return Part("demand", span, Reacts(span=span, most=most))
+
+
+def distance(reader: Reader, span: Span, place: Name, operator: Name, least: Quantity) -> Part:
+    """`expect distance to school >= 20 m`."""
+    _bounded(reader, operator, ">=", "a distance is bounded from below")
+    return Part("demand", span, Keeps(span=span, place=place, least=least))
+
+
+def _bounded(reader: Reader, operator: Name, meant: str, why: str) -> None:
+    """The one comparison that has a meaning there."""
+    if operator.text != meant:
+        reader.report(
+            SYNTAX,
+            f"found `{operator.text}`, expected `{meant}`: {why}",
+            operator.span,
+            f"write `{meant}`",
+            fixes=(Fix(operator.span, meant, f"write `{meant}`"),),
+        )
+
+
+def scenario(reader: Reader, span: Span, name: Quoted, *given: Part) -> None:
+    """`scenario "a dropout over the bridge" { ... }`."""
+    found = reader.parts("scenario", name, given, ("flies",), ("incident", "demand"))
+    if "flies" not in found:
+        reader.settle()
+        return
+    reader.declare(
+        ScenarioDecl(
+            span=span,
+            name=name,
+            mission=found["flies"],
+            flavours=found.get("aboard", ()),
+            seeds=found.get("seeds"),
+            start=found.get("start", ()),
+            incidents=tuple(found["incident"]),
+            demands=tuple(found["demand"]),
+        )
+    )

@@ -4,7 +4,7 @@ import pytest
 
 from rtshcua.diagnostics.codes import NOT_WRITTEN, SYNTAX, TOO_DEEP, UNCLOSED, UNKNOWN_UNIT, WRITTEN_TWICE
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.build.base import MAX_DEPTH, MAX_FINDINGS
+from rtshcua.ground.language.build.reader import MAX_DEPTH, MAX_FINDINGS
 from rtshcua.ground.language.parse import Parsed, parse
 
 GOOD = "zone good{0} = circle(1 N, 2 E, 3 m)\n"

@@ -1,0 +1,189 @@
+"""Numbers that have no exact value in the unit that they are kept in: what is wrong with each, and the mend."""
+
+import re
+from fractions import Fraction
+
+from rtshcua.diagnostics.codes import NOT_EXACT, OUT_OF_BOUNDS, UNKNOWN_UNIT
+from rtshcua.diagnostics.diagnostic import Fix
+from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import nearest
+from rtshcua.ground.language.build.reader import Reader
+from rtshcua.ground.language.exact import CANONICAL, Exact, Trouble, exact
+from rtshcua.ground.language.wording import SHOWN, short
+from rtshcua.model.flat.limits import MAX_DURATION, MAX_SPEED, MAX_VALUE
+from rtshcua.model.flat.zone import MAX_COORDINATE
+from rtshcua.model.quantity import UNITS, Dimension, display
+
+#: Other ways to write the units, and the ones meant.
+MEANT = {
+    "metre": "m", "metres": "m", "meter": "m", "meters": "m", "mps": "m/s", "kph": "km/h", "kmh": "km/h",
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "minute": "min", "minutes": "min", "mins": "min",
+    "hr": "h", "hour": "h", "hours": "h", "msec": "ms", "µs": "us", "usec": "us", "percent": "%", "pct": "%",
+    "degree": "deg", "degrees": "deg", "°": "deg",
+}  # fmt: skip
+
+#: The largest number of each dimension that is kept on board, where it is not `MAX_VALUE`.
+LARGEST = {
+    Dimension.LENGTH: MAX_COORDINATE,
+    Dimension.SPEED: MAX_SPEED,
+    Dimension.DURATION: MAX_DURATION,
+}
+
+#: The dimension that a word before a number calls for; the help for an unknown unit shows the units of that first.
+DIMENSION_OF = {
+    word: dimension
+    for dimension, words in (
+        (Dimension.LENGTH, "altitude height floor ceiling elevation error circle width grow length distance"),
+        (Dimension.SPEED, "speed climb"),
+        (Dimension.DURATION, "after deadline for last within grace lasts valid duration time"),
+        (Dimension.RATIO, "energy battery reserve ratio"),
+        (Dimension.ANGLE, "angle heading"),
+        (Dimension.VOLTAGE, "voltage cell"),
+    )
+    for word in words.split()
+}
+
+#: The points of the compass, which stand after a latitude or a longitude, and their opposites.
+POINTS = {"N": "S", "S": "N", "E": "W", "W": "E"}
+
+_EXPONENT = re.compile(r"[eE][0-9]*")
+
+LOOK_BACK = 120  # characters before a number in which such a word is looked for
+
+
+_NUMBER = r"-?[0-9]{1,3}(?:\.[0-9]{1,12})?"
+#: two numbers without a unit, as a place is written elsewhere; and what stands around a value of its own
+_TWO_NUMBERS = re.compile(rf"(?P<latitude>{_NUMBER})\s*,\s*(?P<longitude>{_NUMBER})(?=\s*[,)])")
+_NUMBER_BEFORE = re.compile(rf"[(=]\s*(?P<pair>{_NUMBER}\s*,\s*)$")
+_BEFORE_VALUE = re.compile(r"[(=]\s*$")
+
+
+def degrees(reader: Reader, span: Span, number: str, what: str, negative: bool) -> int:
+    """A latitude or a longitude, in 1e-7 degree."""
+    found = exact(number, "deg", negative)
+    if found.trouble is Trouble.OUT_OF_BOUNDS:
+        return 360 * UNITS["deg"].numerator
+    if found.trouble is Trouble.NOT_EXACT:
+        reader.report(
+            NOT_EXACT,
+            f"the {what} `{short(number)}` has more than 7 decimals",
+            span,
+            "places are kept in 1e-7 degree, which is about 1 cm",
+        )
+    return found.value
+
+
+def report_trouble(
+    reader: Reader,
+    found: Exact,
+    written: str,
+    span: Span,
+    unit: str | None = None,
+    datum: str | None = None,
+    plain: str | None = None,
+) -> None:
+    """Reports what is wrong with a number, if anything is; `plain` are the digits of a value without a unit."""
+    match found.trouble:
+        case Trouble.UNKNOWN_UNIT if unit is not None:
+            _unknown_unit(reader, unit, written, span)
+        case Trouble.NOT_EXACT:
+            _not_exact(reader, found, written, span, unit, datum, plain)
+        case Trouble.OUT_OF_BOUNDS:
+            limit = LARGEST.get(found.dimension, MAX_VALUE)
+            whole_units = 0 if unit is None else limit * UNITS[unit].denominator // UNITS[unit].numerator
+            most = f"{whole_units} {unit}" if whole_units else display(limit, found.dimension)
+            reader.report(OUT_OF_BOUNDS, f"`{short(written)}` is too large", span, f"at most `{most}` fits")
+
+
+def _unknown_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
+    if unit in POINTS or _EXPONENT.fullmatch(unit):
+        _no_unit(reader, unit, written, span)
+        return
+    meant = MEANT.get(unit.casefold()) or (nearest(unit, UNITS) if len(unit) <= SHOWN else None)
+    fixes: tuple[Fix, ...] = ()
+    if meant:
+        help = f"did you mean `{meant}`?"
+        fixes = (Fix(span, written.replace(unit, meant, 1), f"write `{meant}`"),)
+    else:
+        expected = _expected_dimension(reader, span)
+        names = sorted(UNITS, key=lambda name: UNITS[name].dimension is not expected)
+        help = "units are " + ", ".join(f"`{name}`" for name in names)
+    reader.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit", span, help, fixes=fixes)
+
+
+def _not_exact(
+    reader: Reader, found: Exact, written: str, span: Span, unit: str | None, datum: str | None, plain: str | None
+) -> None:
+    whole = CANONICAL[found.dimension]
+    message = f"`{short(written)}` is not a whole number"
+    kept = f"a {found.dimension.value} is kept in whole {whole}" if whole else "it is a plain number"
+    if plain is not None and datum is None:
+        if _place(reader, written, span):
+            return
+        if len(plain) <= SHOWN:
+            reader.report(NOT_EXACT, message, span, f"{kept}; {_exactly(plain)}")
+            return
+    near = _written(found, unit) + (f" above {datum}" if datum else "")
+    message += f" of {whole}" if whole else ""
+    fix = Fix(span, near, f"write `{near}`")
+    reader.report(NOT_EXACT, message, span, f"{kept}; the nearest is `{near}`", fixes=(fix,))
+
+
+def _place(reader: Reader, written: str, span: Span) -> bool:
+    """Reports `47.4, 8.5` where a place is meant, once for both numbers; whether this is one of two such."""
+    text, last = reader.source.text, reader.diagnostics[-1] if reader.diagnostics else None
+    told = last.span if last is not None and last.code is NOT_EXACT else None
+    if told is not None and told.start <= span.start and span.end <= told.end:
+        return True
+    before = _NUMBER_BEFORE.search(text[max(0, span.start - LOOK_BACK) : span.start])
+    start = span.start
+    if before is not None:
+        start -= len(before["pair"])
+    pair = _TWO_NUMBERS.match(text, start)
+    if pair is None or pair.end() < span.end or _BEFORE_VALUE.search(text[max(0, start - LOOK_BACK) : start]) is None:
+        return False
+    latitude, longitude = pair["latitude"], pair["longitude"]
+    if max(abs(Fraction(latitude)) * 2, abs(Fraction(longitude))) > 180:
+        return False
+    north, east = "S" if latitude[0] == "-" else "N", "W" if longitude[0] == "-" else "E"
+    place = f"{latitude.lstrip('-')} {north}, {longitude.lstrip('-')} {east}"
+    both = Span(span.file, start, pair.end("longitude"))
+    help, fix = f"for a place, write `{place}`", Fix(both, place, f"write `{place}`")
+    reader.report(NOT_EXACT, f"`{short(written)}` is not a whole number", both, help, fixes=(fix,))
+    return True
+
+
+def _no_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
+    """`-47.4 N, 8.5 E` where a value stands, and `2e3`."""
+    if unit in POINTS:
+        plain = written.removeprefix("-").strip()
+        opposite = plain[: -len(unit)] + POINTS[unit]
+        help = "a place is its latitude and longitude, as in `47.3977 N, 8.5456 E`"
+        if written.startswith("-"):
+            help = f"a place has no sign: write `{opposite}`, or `{plain}`"
+        last = reader.diagnostics[-1].span if reader.diagnostics else None
+        if unit in "EW" and last is not None and reader.source.text[last.end : span.start].strip() == ",":
+            return  # the longitude of a latitude that was reported
+    else:
+        help = "numbers have no exponents: write all digits, which `_` may group, as in `20_000 m`"
+    reader.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit", span, help)
+
+
+def _expected_dimension(reader: Reader, span: Span) -> Dimension | None:
+    """The dimension that the words before a number call for, if any does."""
+    before = re.findall(r"[a-z]+", reader.source.text[max(0, span.start - LOOK_BACK) : span.start])
+    return next((DIMENSION_OF[word] for word in reversed(before) if word in DIMENSION_OF), None)
+
+
+def _exactly(digits: str) -> str:
+    """A plain number with decimals, as what it is exactly."""
+    value = Fraction(digits.replace("_", ""))
+    ratio = f", or `{display(int(value * 10_000), Dimension.RATIO)}`" if (value * 10_000).denominator == 1 else ""
+    return f"in a product, write `({value})`{ratio}"
+
+
+def _written(found: Exact, unit: str | None) -> str:
+    """A canonical value in the unit that the author used, if it is whole there."""
+    if unit is not None and found.value * UNITS[unit].denominator % UNITS[unit].numerator == 0:
+        return f"{found.value * UNITS[unit].denominator // UNITS[unit].numerator} {unit}"
+    return display(found.value, found.dimension)

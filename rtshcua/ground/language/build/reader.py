@@ -160,7 +160,7 @@ def node(kind: type[Node], /, *fields: str, **constants: object) -> Action:
     missing = dict.fromkeys(required.difference(fields)) | constants
     spanned = ("span", *fields)
 
-    def make(reader: Reader, *values: object) -> object:
+    def make(reader: Reader, *values: Any) -> object:
         return kind(**dict(zip(spanned, values, strict=True)))
 
     def make_partly(reader: Reader, span: Span, *values: object) -> object:

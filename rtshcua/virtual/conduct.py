@@ -11,11 +11,12 @@
 | `release` | a step's deadline was not counted from when the step before it ended |
 | `unrecorded` | a frame that only a step sends left before the record of that step's decision was kept |
 
-Supervision is done again here, by the rules that `decision` has, from the values that the loop was given.
+Supervision is done again, by rules of the judge's own (`naive_supervision`), from the values that the loop was given.
+That those are true is judged too (`untrue`).
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot
@@ -23,23 +24,15 @@ from typing import Any, Final
 
 import msgspec
 
-from rtshcua.decision.fallbacks import choose_fallback
-from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
-from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.situation import Now, State
+from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import step_words
-from rtshcua.onboard.ports import Readings
-from rtshcua.onboard.runtime.journal import Detail, said
-from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.link import STOOD_STILL
-from rtshcua.onboard.runtime.monitor import StateMonitor
-from rtshcua.onboard.runtime.supervisor import DURATION, Supervisor
 from rtshcua.virtual.excuses import Failure
 from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
+from rtshcua.virtual.naive_supervision import DURATION, RunningStep, Situation, Span, WatchedStep, supervise
+from rtshcua.virtual.zone_truth import local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 
 Record = dict[str, Any]
@@ -58,6 +51,12 @@ _STANDS_MM_S: Final = 1_800
 #: us: in this time a command that got no answer was sent again; and in this all tries of a last link are over
 _AGAIN_US: Final = 2_000_000
 _HELD_OUT_US: Final = 60_000_000
+#: us: a computer that did nothing for longer stood still, and fresh state is awaited for so long; how often the last
+#: link is tried again (docs/flying/supervision.md)
+_STALLED_US, _FRESH_US, _TRIES = 1_000_000, 1_500_000, 5
+_STOOD_STILL: Final = "stood-still"
+#: how a record writes the truth of a temporal monitor
+_TRUTHS: Final = {1: True, 2: False, 4: None}
 _ONLY_STEPS: Final = frozenset({MotionKind.FLY, MotionKind.COVER, MotionKind.CLIMB})
 _HOMEWARD: Final = frozenset({MotionKind.HOME, MotionKind.LAND})
 #: what makes a vehicle tell what is not so
@@ -81,18 +80,12 @@ class Flight:
 
 
 class Conduct:
-    """What is to be said of the runtime in one flight. `motion` are its frames that move the vehicle; `local_mm` says
-    where east and north of home a place is.
-    """
+    """What is to be said of the runtime in one flight. `motion` are its frames that move the vehicle."""
 
-    def __init__(
-        self, flown: ScenarioFlown, motion: Motion, local_mm: Callable[[Policy, int, int], tuple[float, float]]
-    ) -> None:
+    def __init__(self, flown: ScenarioFlown, motion: Motion) -> None:
         self._flown = flown
-        self._local_mm = local_mm
         self._motion = motion
         self._times = [sample.at_us for sample in flown.samples]
-        self._limits = Limits()
         self._kinds = {contract.name: MotionKind(contract.motion.kind) for contract in flown.policy.contracts}
 
     def failures(self) -> Iterator[Failure]:
@@ -100,7 +93,6 @@ class Conduct:
         lives = [life for life in self._flown.lives if life.turns]  # else what it heard is not told
         if not lives:
             return
-        self._prepare()
         for life in lives:
             records = list(_records(life))
             flights = list(self._flights(records))
@@ -113,14 +105,6 @@ class Conduct:
             yield from self._released(records)
             yield from self._recorded(life, records)
         yield from self._left()
-
-    def _prepare(self) -> None:
-        policy = prepare(self._flown.policy)
-        assert not isinstance(policy, Refusal)
-        self._policy: PreparedPolicy = policy
-        invocations = prepare_mission(self._flown.mission, policy)
-        assert not isinstance(invocations, Refusal)
-        self._invocations: tuple[PreparedInvocation, ...] = invocations
 
     # -------------------------------------------------------- what a log says
 
@@ -139,6 +123,11 @@ class Conduct:
                 "" if end is None else end["event"],
                 "" if end is None else end["detail"],
             )  # fmt: skip
+
+    @property
+    def _bound_us(self) -> int:
+        """How long after its cause a reaction of the loop may come."""
+        return self._flown.wait_us + 2 * self._flown.tick_us
 
     # -------------------------------------------------------- what really was
 
@@ -203,7 +192,7 @@ class Conduct:
         return hypot(x - plan.path[-2], y - plan.path[-1]) <= REACHED_MM
 
     def _place(self, sample: Sample) -> tuple[float, float]:
-        return self._local_mm(self._flown.policy, sample.latitude, sample.longitude)
+        return local_mm(self._flown.policy, sample.latitude, sample.longitude)
 
     def _told(self, life: Life) -> Iterator[Failure]:
         """A place was taken over, and the vehicle was nowhere near since it is said to have been measured."""
@@ -280,79 +269,44 @@ class Conduct:
     def _watched(self, life: Life, records: Sequence[Record], flights: Sequence[Flight]) -> Iterator[Failure]:
         steps = [each for each in flights if each.kind == STEP]
         decision = next((record for record in records if record["type"] == "decision"), None)
-        if not steps or not life.turns or decision is None:
+        if not steps or decision is None:
             return
         silences = list(self._silences(records))
         judged = [(since_us, until_us) for since_us, until_us, _ in silences]
         waited = [(since_us, until_us + more_us) for since_us, until_us, more_us in silences]
         late = self._supervised(life, decision, steps, waited)
         early = late if judged == waited else self._supervised(life, decision, steps, judged)
-        if early is late:
-            yield from late
-        else:
-            yield from (each for each in late if each.slug == "not-watched")
-            yield from (each for each in early if each.slug == "needless")
+        for step, watched in zip(steps, late, strict=True):
+            if watched.sure is not None:
+                yield from self._ignored(life, step, watched.sure, waited)
+        for step, watched in zip(steps, early, strict=True):
+            if step.how == "violated" and watched.doubtful is None and watched.looked_us == step.until_us:
+                text = f"{step_words(step.step)} was broken off, and as heard holds: {step.detail}"
+                yield Failure("needless", watched.looked_us, text)
 
     def _supervised(
-        self, life: Life, decision: Record, steps: Sequence[Flight], silences: Sequence[tuple[int, int]]
-    ) -> Iterator[Failure]:
+        self, life: Life, decision: Record, steps: Sequence[Flight], silences: Sequence[Span]
+    ) -> Sequence[RunningStep]:
         """What the steps rest on, by what was heard; nothing is judged in the silences."""
-        ahead_us = decision["utc_us"] - decision["at_us"]
-        monitor = StateMonitor(self._policy)
-        queue = iter(steps)
-        step = next(queue, None)
-        supervisor: Supervisor | None = None
-        stood_us: int | None = None
-        away_us = 0
-        bound_us = self._flown.wait_us + 2 * self._flown.tick_us
-        start_us = self._flown.start_us
-        found: Detail | None = None
-        for turn in life.turns:
-            at_us = turn.at_us
-            now = Now(at_us + start_us, at_us + start_us + ahead_us, decision["utc_error_us"])
-            while step is not None and step.until_us is not None and step.until_us < at_us:
-                step, supervisor = next(queue, None), None
-            runs = step is not None and step.since_us < at_us
-            if runs and step is not None and supervisor is None:
-                supervisor = Supervisor(self._invocations[step.step], self._policy, step.since_us + start_us)
-                found, stood_us, away_us = None, None, 0
-            began_us = next((since_us for since_us, until_us in silences if since_us <= at_us < until_us), None)
-            silent = began_us is not None
-            if runs and began_us is not None and stood_us is None and step is not None:
-                stood_us = max(began_us, step.since_us)  # a stall is told once it is over
-            if runs and not silent and stood_us is not None and supervisor is not None:
-                supervisor.grace.stood(now.monotonic_us - stood_us - start_us)
-                away_us += at_us - stood_us
-                stood_us = None
-            for heard in turn.heard:
-                readings = Readings(heard.measured_us, heard.values)
-                if runs and not silent and found is None and supervisor is not None and monitor.hides(readings):
-                    found = supervisor.violated(monitor.state(now.monotonic_us), now, away_us)
-                    monitor.seen()
-                monitor.update(readings)
-            monitor.observe(now)
-            if not runs or supervisor is None or step is None or silent:
-                continue
-            if found is None:
-                found = supervisor.violated(monitor.state(now.monotonic_us), now, away_us)
-            ended_us = step.until_us
-            if found is not None and (ended_us is None or ended_us > at_us + bound_us):
-                if ended_us is not None or life.ended_us > at_us + bound_us:
-                    end = "it went on" if ended_us is None else f"it ended {(ended_us - at_us) / 1e6:.2f} s later"
-                    # what answers nothing is not recorded as a silence, and counts for no time limit either
-                    mute = said(found).startswith(DURATION) and self._before(at_us, faults.LinkFault, faults.Stall)
-                    if not mute and not self._excused(at_us, silences, bound_us):
-                        yield Failure(
-                            "not-watched", at_us, f"{step_words(step.step)} rests on `{said(found)}`, and {end}"
-                        )
-                step, supervisor = next(queue, None), None
-            elif ended_us == at_us and step.how == "violated" and found is None:
-                yield Failure(
-                    "needless", at_us, f"{step_words(step.step)} was broken off, and as heard holds: {step.detail}"
-                )
+        policy, mission, start_us = self._flown.policy, self._flown.mission, self._flown.start_us
+        ahead_us = start_us + decision["utc_us"] - decision["at_us"]
+        watched = [RunningStep(policy, mission, each.step, (each.since_us, each.until_us), silences) for each in steps]
+        supervise(policy, watched, life.turns, lambda us: Now(us + start_us, us + ahead_us, decision["utc_error_us"]))
+        return watched
 
-    def _excused(self, at_us: int, silences: Sequence[tuple[int, int]], bound_us: int) -> bool:
-        return any(since_us - bound_us <= at_us + bound_us and at_us <= until_us for since_us, until_us in silences)
+    def _ignored(
+        self, life: Life, step: Flight, broken: tuple[int, str], silences: Sequence[Span]
+    ) -> Iterator[Failure]:
+        """What a step rests on broke, and it went on for longer than a turn or two."""
+        (at_us, what), bound_us = broken, self._bound_us
+        if (life.ended_us if step.until_us is None else step.until_us) <= at_us + bound_us:
+            return
+        # what answers nothing is not recorded as a silence, and counts for no time limit either
+        mute = what.startswith(DURATION) and self._before(at_us, faults.LinkFault, faults.Stall)
+        silent = any(since_us <= at_us + 2 * bound_us and at_us <= until_us for since_us, until_us in silences)
+        if not mute and not silent:
+            end = "it went on" if step.until_us is None else f"it ended {(step.until_us - at_us) / 1e6:.2f} s later"
+            yield Failure("not-watched", at_us, f"{step_words(step.step)} rests on `{what}`, and {end}")
 
     def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int, int]]:
         """From when a link was lost, or the computer stood still, until state was judged again, and for how long after
@@ -367,13 +321,13 @@ class Conduct:
                 since_us = self._at(record)
             elif record["event"] == "link-back":
                 back_us = self._at(record)
-            elif record["event"] == STOOD_STILL:
+            elif record["event"] == _STOOD_STILL:
                 back_us = self._at(record)
                 stood_us = int(record["detail"].split()[1]) * 1_000
-                began_us = back_us - stood_us + self._limits.stalled_us
+                began_us = back_us - stood_us + _STALLED_US
                 since_us = began_us if since_us is None else since_us
             elif record["event"] in ("fresh", "not-fresh") and since_us is not None:
-                yield since_us, self._at(record), max(0, back_us + self._limits.fresh_us - self._at(record))
+                yield since_us, self._at(record), max(0, back_us + _FRESH_US - self._at(record))
                 since_us = None
         if since_us is not None:
             yield since_us, 1 << 60, 0
@@ -413,18 +367,20 @@ class Conduct:
 
     def _first(self, asked: Record) -> Iterator[Failure]:
         """The first link that a chain begins with is the first that could fly."""
-        state = State(**{name: tuple(value) for name, value in asked["state"].items()})
         now = Now(asked["at_us"], asked["utc_us"], asked["utc_error_us"])
-        choice = choose_fallback(self._invocations[asked["step"]], state, self._policy, now)
-        if choice is None or choice.index == asked["link"]:
+        said, policy = asked["state"], self._flown.policy
+        monitors = [_TRUTHS[truth] for truth in said.get("monitors", ())]
+        situation = Situation(policy, said["values"], said["ages"], monitors, now)
+        link = situation.first_link(WatchedStep(policy, self._flown.mission, asked["step"]))
+        if link is None or link == asked["link"] or situation.doubtful:
             return
         of = step_words(asked["step"])
-        text = f"the fallback of {of} begins with link {asked['link']}, and {choice.index} could fly"
+        text = f"the fallback of {of} begins with link {asked['link']}, and {link} could fly"
         yield Failure("chain", self._at(asked), text)
 
     def _recalled(self, at_us: int, flights: Sequence[Flight], records: Sequence[Record]) -> Iterator[Failure]:
         """A step that goes nowhere near home ends at once."""
-        bound_us = self._flown.wait_us + 2 * self._flown.tick_us
+        bound_us = self._bound_us
         silent = any(
             since_us <= at_us + bound_us and at_us <= until_us for since_us, until_us, _ in self._silences(records)
         )
@@ -440,16 +396,16 @@ class Conduct:
         """The last link was tried as often as may be."""
         last = len(self._flown.policy.contingency) - 1
         tried = sum(each.kind == CONTINGENCY_LINK and each.link == last for each in flights)
-        if tried < 1 + self._limits.tries:
+        if tried < 1 + _TRIES:
             yield Failure("chain", self._at(record), f"given up after the last link was tried {tried} times")
 
     def _hasty(self, record: Record, records: Sequence[Record]) -> Iterator[Failure]:
         """Fresh state is waited for as long as it may still come."""
         before = [each for each in records if each["type"] == "effect" and each["at_us"] <= record["at_us"]]
-        backs = [each for each in before if each["event"] in ("link-back", STOOD_STILL)]
+        backs = [each for each in before if each["event"] in ("link-back", _STOOD_STILL)]
         ends = [each for each in before if each["event"] in ("fresh", "not-fresh") and each is not record]
         in_this = [each for each in backs if not ends or each["at_us"] > ends[-1]["at_us"]]
-        if len(in_this) == 1 and record["at_us"] - in_this[0]["at_us"] < self._limits.fresh_us:
+        if len(in_this) == 1 and record["at_us"] - in_this[0]["at_us"] < _FRESH_US:
             yield Failure("chain", self._at(record), f"fresh state was not waited for: {record['detail']}")
 
     # -------------------------------------------------------- releases and records

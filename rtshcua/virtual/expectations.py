@@ -26,7 +26,8 @@ from rtshcua.model.scenario import (
     ReactsWithin,
 )
 from rtshcua.virtual.flown import ScenarioFlown
-from rtshcua.virtual.judge import Judgement, inside_mm, local_mm
+from rtshcua.virtual.judge import Judgement
+from rtshcua.virtual.zone_truth import inside_mm, local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 
 #: the reading of expectations shows so many decisions at most

@@ -1,8 +1,9 @@
 """An independent judge of a flight of a scenario: what went wrong, by what really was.
 
-It reads where the simulated vehicle really was, and which frames of ours it really received. Of the runtime it uses no
-code: zones are judged in floating point, and pymavlink reads the frames. The auditor says whether the logs verify and
-whether their decisions are derived again; what the logs say is then held against the frames.
+It reads where the simulated vehicle really was, and which frames of ours it really received. It uses no code of the
+runtime or of the decision (import contracts hold that): zones are judged in floating point, pymavlink reads the frames,
+and supervision is done again in `naive_supervision`. The auditor says whether the logs verify and whether their
+decisions are derived again; what the logs say is then held against the frames.
 
 | slug | is a failure |
 |---|---|
@@ -25,8 +26,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, hypot, inf, radians, sqrt
-from typing import Any, Final, NamedTuple
+from math import cos, hypot, inf, radians
+from typing import Any, Final
 
 import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -35,12 +36,11 @@ from rtshcua.evidence.report import Verdict
 from rtshcua.ground.audit.audit import Auditor
 from rtshcua.model.faults import Mode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.policy import Policy, Vehicle
-from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
 from rtshcua.model.step_number import step_words
 from rtshcua.virtual.conduct import Conduct
 from rtshcua.virtual.excuses import Excuses, Failure
 from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
+from rtshcua.virtual.zone_truth import airspace_mm, in_force, is_timed, local_mm
 
 SLUGS: Final = (
     "outside-fence", "collision", "motion-after-takeover", "not-ended", "late", "log", "derive", "unlogged-effect",
@@ -89,7 +89,7 @@ def judge(flown: ScenarioFlown) -> Judgement:
     end, ended_us = _end(flown)
     found = [
         *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
-        *_unlogged(flown, motion), *_faults(flown), *Conduct(flown, motion, local_mm).failures(),
+        *_unlogged(flown, motion), *_faults(flown), *Conduct(flown, motion).failures(),
     ]  # fmt: skip
     judged = [each if each.cause is not None else excuses.judged(each) for each in found]
     margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)
@@ -112,109 +112,6 @@ def _told(found: Sequence[Failure]) -> tuple[Failure, ...]:
 # ---------------------------------------------------------------- place
 
 
-def inside_mm(zone: Zone, x: float, y: float, up: float) -> float:
-    """How far inside a zone a point is, in mm; negative: how far outside. x is east, y is north of home."""
-    level = _level_mm(zone, x, y)
-    height = min(zone.ceiling - up, up - zone.floor)
-    return -hypot(level, height) if level < 0 and height < 0 else min(level, height)
-
-
-def _level_mm(zone: Zone, x: float, y: float) -> float:
-    if zone.shape == CIRCLE:
-        east, north, square = zone.data
-        return sqrt(square) - hypot(x - east, y - north)
-    within, nearest = False, inf
-    for ring in _rings(zone):
-        for (ax, ay), (bx, by) in zip(ring, (*ring[1:], ring[0]), strict=True):
-            if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
-                within = not within
-            dx, dy = bx - ax, by - ay
-            along = max(0.0, min(1.0, ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)))
-            nearest = min(nearest, hypot(x - ax - along * dx, y - ay - along * dy))
-    return nearest if within else -nearest
-
-
-def _rings(zone: Zone) -> list[list[tuple[int, int]]]:
-    data = zone.data
-    if zone.shape == POLYGON:
-        return [list(zip(data[::2], data[1::2], strict=True))]
-    counts, at, rings = data[1 : 1 + data[0]], 1 + data[0], []
-    for count in counts:
-        rings.append(list(zip(data[at : at + 2 * count : 2], data[at + 1 : at + 2 * count : 2], strict=True)))
-        at += 2 * count
-    return rings
-
-
-class Airspace(NamedTuple):
-    """The zones that must be kept, and those that must be kept out of."""
-
-    inside: tuple[Zone, ...]
-    outside: tuple[Zone, ...]
-
-
-def airspace(policy: Policy, utc_us: int) -> Airspace:
-    """Those that are there at a time. Within a second of its first or last moment a zone is there if it must be kept,
-    and is not there if it must be kept out of: no clock is truer than that.
-    """
-    stated = policy.airspace
-    if stated is None:
-        return Airspace((), ())
-
-    def there(number: int, slack_us: int) -> bool:
-        zone = policy.zones[number]
-        return _exists(zone, utc_us, policy.vehicle, slack_us)
-
-    return Airspace(
-        tuple(policy.zones[number] for number in stated.inside if there(number, _SLACK_US)),
-        tuple(policy.zones[number] for number in stated.outside if there(number, -_SLACK_US)),
-    )
-
-
-_SLACK_US: Final = 1_000_000
-_DAY_US: Final = 86_400_000_000
-
-
-def _exists(zone: Zone, utc_us: int, vehicle: Vehicle, slack_us: int) -> bool:
-    if zone.dates and not zone.dates[0] - slack_us <= utc_us <= zone.dates[1] + slack_us:
-        return False
-    if not zone.daily and not zone.weekly:
-        return True
-    looked = (_shown(zone, utc_us + late_us, vehicle) for late_us in (-slack_us, 0, slack_us))
-    return any(looked) if slack_us > 0 else all(looked)
-
-
-def _shown(zone: Zone, utc_us: int, vehicle: Vehicle) -> bool:
-    """Whether a clock on the wall shows a time at which a zone is there."""
-    known = [
-        offset for since, offset in zip(vehicle.offsets[::2], vehicle.offsets[1::2], strict=False) if since <= utc_us
-    ]
-    local_us = utc_us + (known[-1] if known else vehicle.utc_offset_us)
-    if zone.daily:
-        start, end = zone.daily
-        return (local_us - start) % _DAY_US <= (end - start) % _DAY_US
-    since_monday_us = (local_us + 3 * _DAY_US) % (7 * _DAY_US)  # 1970 began on a Thursday
-    return any(start <= since_monday_us < end for start, end in zip(zone.weekly[::2], zone.weekly[1::2], strict=True))
-
-
-def airspace_mm(there: Airspace, x: float, y: float, up: float) -> float:
-    """How far inside the airspace a point is, in mm; negative: outside. Infinite where there is none."""
-    return min(
-        (
-            *(inside_mm(zone, x, y, up) for zone in there.inside),
-            *(-inside_mm(zone, x, y, up) for zone in there.outside),
-        ),
-        default=inf,
-    )
-
-
-def local_mm(policy: Policy, latitude: int, longitude: int) -> tuple[float, float]:
-    """East and north of home, in mm, as the policy projects."""
-    projection = policy.projection
-    scale = 1 / (1 << SHIFT)
-    turned = (longitude - projection.longitude + 1_800_000_000) % 3_600_000_000 - 1_800_000_000
-    return turned * projection.east * scale, (latitude - projection.latitude) * projection.north * scale
-
-
 def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
     """Where it left the airspace, the first time and farthest out; how far inside it always was.
 
@@ -224,11 +121,8 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
     stated = flown.policy.airspace
     if stated is None:
         return [], None
-    timed = any(
-        zone.daily or zone.weekly or zone.dates
-        for zone in (flown.policy.zones[n] for n in (*stated.inside, *stated.outside))
-    )
-    there = airspace(flown.policy, flown.utc_us)
+    timed = any(is_timed(flown.policy.zones[number]) for number in (*stated.inside, *stated.outside))
+    there = in_force(flown.policy, flown.utc_us)
     worst, found = inf, list[Failure]()
     x0 = y0 = up0 = 0.0
     known = -inf  # how far inside it was at x0, y0, up0
@@ -237,7 +131,7 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
             break
         if not sample.in_air:
             continue
-        if timed and (now := airspace(flown.policy, flown.utc_us + sample.at_us)) != there:
+        if timed and (now := in_force(flown.policy, flown.utc_us + sample.at_us)) != there:
             there, known = now, -inf
         if len(there.inside) < len(stated.inside):
             found.append(

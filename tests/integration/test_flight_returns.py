@@ -13,7 +13,8 @@ from rtshcua.model.faults import Fault, Mode
 from rtshcua.model.scenario import AfterStep
 from rtshcua.onboard.ports import Ending
 from rtshcua.virtual.flown import Sample, ScenarioFlown
-from rtshcua.virtual.judge import judge, local_mm
+from rtshcua.virtual.judge import judge
+from rtshcua.virtual.zone_truth import local_mm
 from virtual import case
 from virtual.flight import Flight
 from virtual.sampling import each_once

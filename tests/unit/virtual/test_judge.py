@@ -16,7 +16,8 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import AREA, Zone, unproject
 from rtshcua.model.scenario import Start
 from rtshcua.virtual.flown import Frame, Happened, Reaction, Sample, ScenarioFlown
-from rtshcua.virtual.judge import SLUGS, Judgement, inside_mm, judge, moves
+from rtshcua.virtual.judge import SLUGS, Judgement, judge, moves
+from rtshcua.virtual.zone_truth import inside_mm
 from virtual import case
 from virtual.once import once
 from virtual.rows import rows

@@ -22,16 +22,14 @@ from itertools import pairwise
 from math import hypot
 from typing import Any, Final
 
-import msgspec
-
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import step_words
 from rtshcua.virtual.excuses import Failure
-from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
-from rtshcua.virtual.naive_supervision import DURATION, RunningStep, Situation, Span, WatchedStep, supervise
+from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown, records_of
+from rtshcua.virtual.naive_supervision import DURATION, JudgedState, RunningStep, Span, WatchedStep, supervise
 from rtshcua.virtual.zone_truth import local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 
@@ -51,6 +49,7 @@ _STANDS_MM_S: Final = 1_800
 #: us: in this time a command that got no answer was sent again; and in this all tries of a last link are over
 _AGAIN_US: Final = 2_000_000
 _HELD_OUT_US: Final = 60_000_000
+_NEVER: Final = 1 << 60
 #: us: a computer that did nothing for longer stood still, and fresh state is awaited for so long; how often the last
 #: link is tried again (docs/flying/supervision.md)
 _STALLED_US, _FRESH_US, _TRIES = 1_000_000, 1_500_000, 5
@@ -94,7 +93,7 @@ class Conduct:
         if not lives:
             return
         for life in lives:
-            records = list(_records(life))
+            records = records_of(life)
             flights = list(self._flights(records))
             yield from self._succeeded(flights)
             yield from self._stops(flights)
@@ -222,25 +221,25 @@ class Conduct:
     def _stops(self, flights: Sequence[Flight]) -> Iterator[Failure]:
         """From the first frame of a stop that got there: so long later it is slower."""
         after_us = (self._flown.policy.vehicle.reaction_us or 1_000_000) + _STOPS_US
-        heard = [frame for frame, _ in self._motion if frame.heard_us is not None]
+        heard = [(frame.sent_us, frame.heard_us) for frame, _ in self._motion if frame.heard_us is not None]
         for flight in flights:
             if flight.motion is not MotionKind.HOLD:
                 continue
-            ends_us = 1 << 60 if flight.until_us is None else flight.until_us
-            frame = next((each for each in heard if flight.since_us <= each.sent_us < ends_us), None)
-            if frame is None or frame.heard_us is None:
+            ends_us = _NEVER if flight.until_us is None else flight.until_us
+            heard_us = next((us for sent_us, us in heard if flight.since_us <= sent_us < ends_us), None)
+            if heard_us is None:
                 yield from self._unheard(flight)
-                continue
-            at_us = frame.heard_us
-            then_us = at_us + after_us
-            if at_us - flight.since_us > 1_000_000 or ends_us < then_us - 300_000 or self._is_others(then_us):
-                continue
-            if self._before(then_us, *_DECEIVES, *_DISTURBS):
-                continue
-            fast, then = self._sample(at_us).speed_mm_s, self._sample(then_us)
-            if fast >= _FAST_MM_S and then.speed_mm_s > max(fast - _LOST_MM_S, _SLOW_MM_S):
-                text = f"told to stop at {fast / 1000:.1f} m/s, and {then.speed_mm_s / 1000:.1f} m/s are left"
-                yield Failure("no-stop", then_us, text, then.speed_mm_s)
+            elif heard_us - flight.since_us <= 1_000_000 and ends_us >= heard_us + after_us - 300_000:
+                yield from self._slows(heard_us, heard_us + after_us)
+
+    def _slows(self, at_us: int, then_us: int) -> Iterator[Failure]:
+        """Whoever hears a stop, and is disturbed by nothing, is slower then."""
+        if self._is_others(then_us) or self._before(then_us, *_DECEIVES, *_DISTURBS):
+            return
+        fast, left = self._sample(at_us).speed_mm_s, self._sample(then_us).speed_mm_s
+        if fast >= _FAST_MM_S and left > max(fast - _LOST_MM_S, _SLOW_MM_S):
+            text = f"told to stop at {fast / 1000:.1f} m/s, and {left / 1000:.1f} m/s are left"
+            yield Failure("no-stop", then_us, text, left)
 
     def _unheard(self, flight: Flight) -> Iterator[Failure]:
         """A stop of which nothing got there, though it would have in the end, was not said again."""
@@ -277,8 +276,7 @@ class Conduct:
         late = self._supervised(life, decision, steps, waited)
         early = late if judged == waited else self._supervised(life, decision, steps, judged)
         for step, watched in zip(steps, late, strict=True):
-            if watched.sure is not None:
-                yield from self._ignored(life, step, watched.sure, waited)
+            yield from self._ignored(life, step, watched.sure, waited)
         for step, watched in zip(steps, early, strict=True):
             if step.how == "violated" and watched.doubtful is None and watched.looked_us == step.until_us:
                 text = f"{step_words(step.step)} was broken off, and as heard holds: {step.detail}"
@@ -295,9 +293,11 @@ class Conduct:
         return watched
 
     def _ignored(
-        self, life: Life, step: Flight, broken: tuple[int, str], silences: Sequence[Span]
+        self, life: Life, step: Flight, broken: tuple[int, str] | None, silences: Sequence[Span]
     ) -> Iterator[Failure]:
         """What a step rests on broke, and it went on for longer than a turn or two."""
+        if broken is None:
+            return
         (at_us, what), bound_us = broken, self._bound_us
         if (life.ended_us if step.until_us is None else step.until_us) <= at_us + bound_us:
             return
@@ -330,7 +330,7 @@ class Conduct:
                 yield since_us, self._at(record), max(0, back_us + _FRESH_US - self._at(record))
                 since_us = None
         if since_us is not None:
-            yield since_us, 1 << 60, 0
+            yield since_us, _NEVER, 0
 
     # -------------------------------------------------------- chains
 
@@ -338,11 +338,7 @@ class Conduct:
         airborne = [record for record in records if self._sample(self._at(record)).in_air]
         for number, (record, after) in enumerate(pairwise(airborne)):
             if record["type"] == "decision":
-                if record["kind"] == STEP and record["outcome"] == "deny":
-                    asked = next((each for each in airborne[number + 1 :] if each["type"] == "decision"), None)
-                    if asked is not None and asked["kind"] == FALLBACK_LINK:
-                        text = f"{step_words(record['step'])} was denied, and its own fallback was asked for"
-                        yield Failure("chain", self._at(record), text)
+                yield from self._denied(record, airborne[number + 1 :])
                 continue
             match record.get("event"):
                 case "violated" if after["type"] == "decision" and after["kind"] == FALLBACK_LINK:
@@ -353,6 +349,14 @@ class Conduct:
                     yield from self._stranded(record, flights)
                 case "not-fresh":
                     yield from self._hasty(record, records)
+
+    def _denied(self, record: Record, later: Sequence[Record]) -> Iterator[Failure]:
+        """Nothing that a denied step says itself is listened to."""
+        if record["kind"] == STEP and record["outcome"] == "deny":
+            asked = next((each for each in later if each["type"] == "decision"), None)
+            if asked is not None and asked["kind"] == FALLBACK_LINK:
+                text = f"{step_words(record['step'])} was denied, and its own fallback was asked for"
+                yield Failure("chain", self._at(record), text)
 
     def _went_on(self, records: Sequence[Record]) -> Iterator[Failure]:
         """Nothing is decided or sent after a takeover or a crash was told."""
@@ -370,7 +374,7 @@ class Conduct:
         now = Now(asked["at_us"], asked["utc_us"], asked["utc_error_us"])
         said, policy = asked["state"], self._flown.policy
         monitors = [_TRUTHS[truth] for truth in said.get("monitors", ())]
-        situation = Situation(policy, said["values"], said["ages"], monitors, now)
+        situation = JudgedState(policy, said["values"], said["ages"], monitors, now)
         link = situation.first_link(WatchedStep(policy, self._flown.mission, asked["step"]))
         if link is None or link == asked["link"] or situation.doubtful:
             return
@@ -427,18 +431,11 @@ class Conduct:
 
     def _recorded(self, life: Life, records: Sequence[Record]) -> Iterator[Failure]:
         """What only steps send leaves after the record of the last such step's decision was kept."""
-        policy = self._flown.policy
-        links = {policy.contracts[link.skill].motion.kind for link in policy.contingency}
-        links |= {policy.contracts[link.skill].motion.kind for c in policy.contracts for link in c.fallback}
-        links |= {policy.contracts[r.target.skill].motion.kind for r in policy.rules if r.target is not None}
-        allowed: list[tuple[int, int, MotionKind]] = []  # when it was decided, when that was kept, what then flies
-        for number, record in enumerate(records[: len(life.kept_us)]):
-            if record["type"] == "decision" and record["kind"] == STEP and record["outcome"] == "allow":
-                kind = MotionKind(self._flown.mission.invocations[record["step"]].contract.motion.kind)
-                allowed.append((self._at(record), life.kept_us[number], kind))
+        allowed = list(self._allowed(life, records))
         decided = [decided_us for decided_us, _, _ in allowed]
+        only_steps = _ONLY_STEPS - self._kinds_of_links()
         for frame, parts in self._motion:
-            if not life.began_us <= frame.sent_us <= life.ended_us or not parts or not parts <= _ONLY_STEPS - links:
+            if not life.began_us <= frame.sent_us <= life.ended_us or not parts or not parts <= only_steps:
                 continue
             at = bisect_right(decided, frame.sent_us) - 1
             _, kept_us, kind = allowed[at] if at >= 0 else (0, frame.sent_us + 1, MotionKind.HOLD)
@@ -447,11 +444,16 @@ class Conduct:
                 yield Failure("unrecorded", frame.sent_us, text)
                 return
 
+    def _allowed(self, life: Life, records: Sequence[Record]) -> Iterator[tuple[int, int, MotionKind]]:
+        """When a step was allowed, when the record of that was kept, and what then flies."""
+        for record, kept_us in zip(records, life.kept_us, strict=False):
+            if record["type"] == "decision" and record["kind"] == STEP and record["outcome"] == "allow":
+                kind = self._flown.mission.invocations[record["step"]].contract.motion.kind
+                yield self._at(record), kept_us, MotionKind(kind)
 
-def _records(life: Life) -> Iterator[Record]:
-    for line in life.lines:
-        try:
-            record: Record = msgspec.json.decode(line)
-        except msgspec.DecodeError:
-            return
-        yield record
+    def _kinds_of_links(self) -> set[int]:
+        """What the links of all chains fly, and the targets of rules."""
+        policy = self._flown.policy
+        links = [*policy.contingency, *(link for contract in policy.contracts for link in contract.fallback)]
+        links += [rule.target for rule in policy.rules if rule.target is not None]
+        return {policy.contracts[link.skill].motion.kind for link in links}

@@ -296,20 +296,22 @@ class Excuses:
         silent = (faults.PilotPause, faults.PilotSticks, faults.PilotVelocity, faults.PilotGoto)
         for fault in self._before(failure.at_us, *silent):
             if isinstance(fault, faults.PilotGoto):
-                if self._ends_the_climb(fault):
-                    return True
-                continue
-            sample, left_mm = self._sample(fault.at_us), self._left_mm(fault.at_us + _STANDS_US)
-            if isinstance(fault, faults.PilotVelocity):
-                if self._left_mm(failure.at_us - failure.amount) is None and failure.amount <= _KEPT_US:
-                    return True  # in its takeoff it names no target that could vanish, until it rises no further
-                continue
-            far = left_mm is not None and left_mm > _FAR_MM
-            moved = sample is not None and sample.speed_mm_s >= _MOVED_MM_S
-            shows = isinstance(fault, faults.PilotPause) and alone and far and moved
-            if not shows or failure.at_us - fault.at_us <= _STANDS_US + _NOTICED_US:
+                is_silent = self._ends_the_climb(fault)
+            elif isinstance(fault, faults.PilotVelocity):
+                # in its takeoff it names no target that could vanish, until it rises no further
+                is_silent = self._left_mm(failure.at_us - failure.amount) is None and failure.amount <= _KEPT_US
+            else:
+                noticed = failure.at_us - fault.at_us > _STANDS_US + _NOTICED_US
+                is_silent = not (alone and noticed and self._pause_shows(fault))
+            if is_silent:
                 return True
         return False
+
+    def _pause_shows(self, fault: Fault) -> bool:
+        """Whether it is a pause of what moved, and far from the end of its leg once it stood."""
+        sample, left_mm = self._sample(fault.at_us), self._left_mm(fault.at_us + _STANDS_US)
+        far = left_mm is not None and left_mm > _FAR_MM
+        return isinstance(fault, faults.PilotPause) and far and sample is not None and sample.speed_mm_s >= _MOVED_MM_S
 
     def _stands(self, fault: Fault) -> bool:
         """Whether a pilot chose the mode that ArduCopter was in: that changes nothing (Copter::set_mode, mode.cpp)."""

@@ -4,7 +4,9 @@ All times are those of the simulation, in us since its start, unless a name says
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import msgspec
 
 from rtshcua.model.faults import Fault, Mode
 from rtshcua.model.flat.mission import Mission
@@ -90,6 +92,17 @@ class Life:
     """What it heard, turn by turn of its loop."""
     kept_us: tuple[int, ...] = ()
     """When each line of its log was kept, but for those that recovery added."""
+
+
+def records_of(life: Life) -> list[dict[str, Any]]:
+    """What of its log can be read."""
+    records = []
+    for line in life.lines:
+        try:
+            records.append(msgspec.json.decode(line))
+        except msgspec.DecodeError:
+            break
+    return records
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,14 +22,13 @@ What it owes besides, from supervision to the order of chains, has slugs of its 
 A failure that physics does not allow to prevent is an *exception* instead, with its `cause` (`excuses`).
 """
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, hypot, inf, radians
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.evidence.report import Verdict
@@ -39,7 +38,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.step_number import step_words
 from rtshcua.virtual.conduct import Conduct
 from rtshcua.virtual.excuses import Excuses, Failure
-from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown
+from rtshcua.virtual.flown import Frame, Sample, ScenarioFlown, records_of
 from rtshcua.virtual.zone_truth import airspace_mm, in_force, is_timed, local_mm
 
 SLUGS: Final = (
@@ -283,7 +282,8 @@ def _moves(message: Any, name: str, flavour: str) -> frozenset[MotionKind] | Non
     return None if message.command in _ASKS else frozenset()
 
 
-Motion = Sequence[tuple[Frame, frozenset[MotionKind]]]
+Obeyed = tuple[Frame, frozenset[MotionKind]]
+Motion = Sequence[Obeyed]
 """Frames that move the vehicle, in the order in which they were sent, and what each can be a part of."""
 
 
@@ -305,15 +305,8 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     """
     times = [sample.at_us for sample in flown.samples]
     found, latest, crossed = list[Failure](), None, False
-    last: tuple[Frame, frozenset[MotionKind]] | None = None  # of ours that was obeyed before
-    for frame, kinds in motion:
-        at = bisect_left(times, frame.sent_us)
-        since_us = flown.samples[at].taken_over_us if at < len(times) else None
-        if since_us is None or (frame.heard_us or frame.sent_us) <= since_us:
-            if frame.heard_us is not None:
-                last = frame, kinds
-            crossed = crossed or (since_us is not None and frame.heard_us == since_us)  # at that very moment
-            continue
+    for frame, kinds, since_us, last, met in _after_takeovers(flown, motion, times):
+        crossed = crossed or met
         after_us = frame.sent_us - since_us
         latest = max(latest or 0, after_us)
         within_us = MODE_WITHIN_US[flown.flavour] + flown.tick_us + flown.wait_us
@@ -321,11 +314,8 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
             crossed = crossed or frame.heard_us is not None
             continue
         text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
-        lands = kinds == {MotionKind.LAND} and not flown.samples[at].in_air
-        then = flown.samples[bisect_left(times, since_us)]
-        ends = _ends_at(last, then) or _ends_at(_obeyed(motion, since_us - _SHOWS_US), then)
-        stands = then.in_air and (ends or _stops(last, then, flown.samples, times))
-        stood = excuses.paused_at(since_us) and stands
+        lands = kinds == {MotionKind.LAND} and not flown.samples[bisect_left(times, frame.sent_us)].in_air
+        stood = excuses.paused_at(since_us) and _stood(flown, motion, times, last, since_us)
         as_lost = _flies_as_lost(flown, motion, times, since_us, max(since_us, frame.sent_us - within_us))
         cause = "crossed" if crossed else "unseen" if stood or as_lost else "ground" if lands else None
         crossed = crossed or (as_lost and frame.heard_us is not None)
@@ -333,12 +323,38 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     return found, latest
 
 
-def _obeyed(motion: Motion, by_us: int) -> tuple[Frame, frozenset[MotionKind]] | None:
+def _after_takeovers(
+    flown: ScenarioFlown, motion: Motion, times: Sequence[int]
+) -> Iterator[tuple[Frame, frozenset[MotionKind], int, Obeyed | None, bool]]:
+    """Frames that came after somebody took over, since when he flies it, our last frame that was obeyed before, and
+    whether one of ours came at the very moment of a takeover.
+    """
+    last, met = None, False
+    for frame, kinds in motion:
+        at = bisect_left(times, frame.sent_us)
+        since_us = flown.samples[at].taken_over_us if at < len(times) else None
+        if since_us is not None and (frame.heard_us or frame.sent_us) > since_us:
+            yield frame, kinds, since_us, last, met
+        else:
+            last = last if frame.heard_us is None else (frame, kinds)
+            met = met or (since_us is not None and frame.heard_us == since_us)
+
+
+def _stood(flown: ScenarioFlown, motion: Motion, times: Sequence[int], last: Obeyed | None, at_us: int) -> bool:
+    """Whether it stood already, or stopped, as we had told it."""
+    then = flown.samples[bisect_left(times, at_us)]
+    if not then.in_air:
+        return False
+    shown = _obeyed(motion, at_us - _SHOWS_US)
+    return _ends_at(last, then) or _ends_at(shown, then) or _stops(last, then, flown.samples, times)
+
+
+def _obeyed(motion: Motion, by_us: int) -> Obeyed | None:
     """Our last frame that had arrived by then: what a report could show at that time."""
     return next((each for each in reversed(motion) if each[0].heard_us is not None and each[0].heard_us <= by_us), None)
 
 
-def _ends_at(last: tuple[Frame, frozenset[MotionKind]] | None, sample: Sample) -> bool:
+def _ends_at(last: Obeyed | None, sample: Sample) -> bool:
     """Whether a pause there ends what it was told where that ends: to stop, to climb, or a leg, whose end is no farther
     ahead than PX4 says that it will stop.
     """
@@ -357,9 +373,7 @@ def _ends_at(last: tuple[Frame, frozenset[MotionKind]] | None, sample: Sample) -
     return abs(left - ahead) <= _SAME_MM
 
 
-def _stops(
-    last: tuple[Frame, frozenset[MotionKind]] | None, then: Sample, samples: Sequence[Sample], times: Sequence[int]
-) -> bool:
+def _stops(last: Obeyed | None, then: Sample, samples: Sequence[Sample], times: Sequence[int]) -> bool:
     """Whether it slows down then, since we told it to stop."""
     if last is None or last[1] != {MotionKind.HOLD} or last[0].heard_us is None:
         return False
@@ -445,24 +459,28 @@ def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
     """The first frame of a command leaves within its permit's time, a step's within its deadline."""
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
-        decided: dict[tuple[int, int, int], dict[str, Any]] = {}
-        records = _records(life)
-        sent_us = [(kinds.get(r["detail"]), r["at_us"]) for r in records if r.get("event") == "dispatched"]
-        for record in records:
-            ref = (record.get("kind", -1), record.get("step", -1), record.get("link", -1))
-            if record["type"] == "decision":
-                decided[ref] = record
-            elif record.get("event") == "dispatched" and ref in decided:
-                at_us = record["at_us"] - flown.start_us
-                kind = kinds.get(record["detail"])
-                # from the next command of its kind on they are that one's
-                later = (each_us for of, each_us in sent_us if of == kind and each_us > record["at_us"])
-                end_us = min(next(later, 1 << 62) - 1 - flown.start_us, life.ended_us)
-                sent = (frame for frame, parts in motion if kind in parts and at_us <= frame.sent_us <= end_us)
-                first = next(sent, None)
-                decision = decided.pop(ref)  # what is sent again is by another permit, or by a standing one
-                if first is not None:
-                    yield from _in_time(flown, first, decision)
+        records = records_of(life)
+        commands = list(_commands(records, flown.start_us))
+        for decision, record in _decided(records):
+            kind, at_us = kinds.get(record["detail"]), record["at_us"] - flown.start_us
+            # from the next command of its kind on they are that one's
+            later = [each.at_us for each in commands if kinds.get(each.skill) == kind and each.at_us > at_us]
+            end_us = min([life.ended_us + 1, *later])
+            frames = (frame for frame, parts in motion if kind in parts and at_us <= frame.sent_us < end_us)
+            first = next(frames, None)
+            if first is not None:
+                yield from _in_time(flown, first, decision)
+
+
+def _decided(records: Sequence[dict[str, Any]]) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+    """Each decision with what was sent by it first; what is sent again is by another permit, or by a standing one."""
+    decided: dict[tuple[int, int, int], dict[str, Any]] = {}
+    for record in records:
+        ref = (record.get("kind", -1), record.get("step", -1), record.get("link", -1))
+        if record["type"] == "decision":
+            decided[ref] = record
+        elif record.get("event") == "dispatched" and ref in decided:
+            yield decided.pop(ref), record
 
 
 def _in_time(flown: ScenarioFlown, first: Frame, decision: dict[str, Any]) -> Iterator[Failure]:
@@ -482,17 +500,6 @@ def _in_time(flown: ScenarioFlown, first: Frame, decision: dict[str, Any]) -> It
 
 
 # ---------------------------------------------------------------- logs
-
-
-def _records(life: Life) -> list[dict[str, Any]]:
-    """What of a log can be read."""
-    records = []
-    for line in life.lines:
-        try:
-            records.append(msgspec.json.decode(line))
-        except msgspec.DecodeError:
-            break
-    return records
 
 
 def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
@@ -518,36 +525,53 @@ def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
         yield Failure(slug, at_us, f"record {report.failure.record}: {report.failure.slug}: {report.failure.text}")
 
 
-def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
-    """Frames that carry out no command that a log had at that time: its last command is of another kind, or over.
+class _Sent(NamedTuple):
+    """A command of a log: when it was dispatched, and when and how it was over (never: None, empty)."""
 
-    Of commands that were dispatched at the very moment of the frame, any may be it.
-    """
+    at_us: int
+    skill: str
+    over_us: int | None
+    over: str
+
+
+def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
+    """Frames that carry out no command that a log had at that time: its last command is of another kind, or over."""
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
-        effects = [record for record in _records(life) if record["type"] == "effect" and record["token"] >= 0]
-        times = [record["at_us"] - flown.start_us for record in effects]
-        over: dict[int, dict[str, Any]] = {}
-        for record in effects:
-            if record["event"] != "dispatched":
-                over.setdefault(record["token"], record)
+        commands = list(_commands(records_of(life), flown.start_us))
         for frame, parts in motion:
-            if not life.began_us <= frame.sent_us <= life.ended_us:
-                continue
-            begun = [r for r in effects[: bisect_right(times, frame.sent_us)] if r["event"] == "dispatched"]
-            if not begun:
-                yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent, and no command was")
-                continue
-            now_us = frame.sent_us + flown.start_us
-            may_be = [r for r in begun if r["at_us"] == now_us] + [r for r in begun if r["at_us"] < now_us][-1:]
-            fitting = [record for record in may_be if kinds.get(record["detail"]) in parts]
-            ended = [over[record["token"]] for record in fitting if record["token"] in over]
-            if not fitting:
-                text = f"{_name(frame)} was sent, and the last command was `{begun[-1]['detail']}`"
-                yield Failure("unlogged-effect", frame.sent_us, text)
-            elif len(ended) == len(fitting) and all(record["at_us"] < now_us for record in ended):
-                text = f"{_name(frame)} was sent after `{fitting[0]['detail']}` had ended: {ended[0]['event']}"
-                yield Failure("unlogged-effect", frame.sent_us, text)
+            if life.began_us <= frame.sent_us <= life.ended_us:
+                why = _unexplained(
+                    frame.sent_us, [each for each in commands if each.at_us <= frame.sent_us], parts, kinds
+                )
+                if why:
+                    yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent{why}")
     for frame, _ in motion:
         if not any(life.began_us <= frame.sent_us <= life.ended_us for life in flown.lives):
             yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")
+
+
+def _commands(records: Sequence[dict[str, Any]], start_us: int) -> Iterator[_Sent]:
+    effects = [record for record in records if record["type"] == "effect" and record["token"] >= 0]
+    over: dict[int, dict[str, Any]] = {}
+    for record in effects:
+        if record["event"] != "dispatched":
+            over.setdefault(record["token"], record)
+    for record in effects:
+        if record["event"] == "dispatched":
+            end = over.get(record["token"])
+            ended = (None, "") if end is None else (end["at_us"] - start_us, end["event"])
+            yield _Sent(record["at_us"] - start_us, record["detail"], *ended)
+
+
+def _unexplained(sent_us: int, begun: Sequence[_Sent], parts: frozenset[MotionKind], kinds: Mapping[str, int]) -> str:
+    """Why a frame belongs to no command that had begun; empty: it may, as to any that was dispatched at its moment."""
+    if not begun:
+        return ", and no command was"
+    may_be = [each for each in begun if each.at_us == sent_us] + [each for each in begun if each.at_us < sent_us][-1:]
+    fitting = [each for each in may_be if kinds.get(each.skill) in parts]
+    if not fitting:
+        return f", and the last command was `{begun[-1].skill}`"
+    if all(each.over_us is not None and each.over_us < sent_us for each in fitting):
+        return f" after `{fitting[0].skill}` had ended: {fitting[0].over}"
+    return ""

@@ -28,9 +28,9 @@ from rtshcua.virtual.zone_truth import Answers as Truths
 from rtshcua.virtual.zone_truth import Edge, apart_mm, both, daily, edges, exists, is_timed, level_mm, shown
 
 #: a multiple of the height, and what is added to it; None: not known
-Number = tuple[int, int] | None
+HeightTerm = tuple[int, int] | None
 #: east and north of home, in mm
-Place = tuple[float, float]
+GroundPoint = tuple[float, float]
 #: from when until before when, in us since the start
 Span = tuple[int, int]
 
@@ -67,30 +67,30 @@ def everywhere(truths: Truths) -> bool | None:
     return False if False in truths else None if None in truths else True
 
 
-class Path(NamedTuple):
+class SweptPath(NamedTuple):
     """Every place on the straight way between two, at all heights between two, in mm; widened by `error` over ground.
 
     `start` is None where the place is not known, `heights` where the height is not.
     """
 
-    start: Place | None
-    end: Place
+    start: GroundPoint | None
+    end: GroundPoint
     heights: tuple[float, float] | None
     error: int = 0
 
 
-class Query(NamedTuple):
+class ConditionQuery(NamedTuple):
     """What a condition is asked about: a skill's arguments, the number of the phase among the policy's (-1: none), and
     either where it is now, or every place of a path at any time until `through_us` from now.
     """
 
     arguments: Sequence[int] = ()
     phase: int = -1
-    path: Path | None = None
+    path: SweptPath | None = None
     through_us: int = 0
 
 
-class Broken(NamedTuple):
+class UnmetCondition(NamedTuple):
     """The text of something that should hold and does not; `truth` is False or None, `sure`: it is not in doubt."""
 
     text: str
@@ -98,7 +98,7 @@ class Broken(NamedTuple):
     sure: bool
 
 
-class Stretch(NamedTuple):
+class TruthInterval(NamedTuple):
     """A time, both ends included, in which a condition had one truth."""
 
     truth: bool | None
@@ -107,7 +107,7 @@ class Stretch(NamedTuple):
     to_us: int
 
 
-class History:
+class TruthHistory:
     """The truth of a temporal monitor's condition over time. Between two observations it is that of the first, and not
     known where they are more than `MAX_GAP` apart.
     """
@@ -116,15 +116,15 @@ class History:
         self.monitor = monitor
         self.doubtful = False
         """What it said last rests on an answer that was too near to call."""
-        self._stretches: list[Stretch] = []
+        self._stretches: list[TruthInterval] = []
         self._last: tuple[bool | None, bool, int] | None = None
 
     def observed(self, truth: bool | None, doubtful: bool, at_us: int) -> bool | None:
         """What the monitor says when its condition has this truth."""
         before, doubted, since_us = self._last or (None, False, -(1 << 62))
         known = self._last is not None and at_us - since_us <= MAX_GAP
-        self._add(Stretch(before if known else None, known and doubted, since_us + 1, at_us - 1))
-        self._add(Stretch(truth, doubtful, at_us, at_us))
+        self._add(TruthInterval(before if known else None, known and doubted, since_us + 1, at_us - 1))
+        self._add(TruthInterval(truth, doubtful, at_us, at_us))
         self._last = truth, doubtful, at_us
         kind, from_us = self.monitor.kind, at_us - self.monitor.window_us
         if kind in (MonitorKind.RISING, MonitorKind.FALLING):
@@ -138,14 +138,14 @@ class History:
             return everywhere(seen)
         return True if True in seen else None if None in seen else False
 
-    def _add(self, stretch: Stretch) -> None:
+    def _add(self, stretch: TruthInterval) -> None:
         if stretch.from_us <= stretch.to_us:
             if self._stretches and self._stretches[-1][:2] == stretch[:2]:
                 stretch = stretch._replace(from_us=self._stretches.pop().from_us)
             self._stretches.append(stretch)
 
 
-class Memory:
+class HeardState:
     """What was heard of the vehicle, and what the policy's temporal monitors say of it."""
 
     def __init__(self, policy: Policy) -> None:
@@ -153,7 +153,7 @@ class Memory:
         self._values: list[int | None] = [None] * policy.slots
         self._measured_us: list[int | None] = [None] * policy.slots
         self._new: set[int] = set()  # slots with a value that nobody looked at
-        self._histories = [History(monitor) for monitor in policy.monitors]
+        self._histories = [TruthHistory(monitor) for monitor in policy.monitors]
         self._says: list[bool | None] = [None] * len(policy.monitors)
 
     def hear(self, heard: Heard) -> None:
@@ -168,12 +168,12 @@ class Memory:
         """Whether this replaces a value that nobody looked at."""
         return any(slot in self._new for slot, _ in heard.values)
 
-    def look(self, now: Now) -> "Situation":
+    def look(self, now: Now) -> "JudgedState":
         """What is known at a moment."""
         self._new.clear()
         ages = [0 if each is None else max(0, now.monotonic_us - each) for each in self._measured_us]
         doubts = [history.doubtful for history in self._histories]
-        return Situation(self._policy, self._values, ages, self._says, now, doubts)
+        return JudgedState(self._policy, self._values, ages, self._says, now, doubts)
 
     def observe(self, now: Now) -> None:
         """Let the temporal monitors look, once a turn; one may ask those before it."""
@@ -182,12 +182,12 @@ class Memory:
         for history in self._histories:
             situation = self.look(now)
             situation.monitors = says
-            truth = everywhere(situation.truths(history.monitor.when.code, Query()))
+            truth = everywhere(situation.truths(history.monitor.when.code, ConditionQuery()))
             says.append(history.observed(truth, situation.doubtful, now.monotonic_us))
         self._says = says
 
 
-class Situation:
+class JudgedState:
     """What is known at one moment, and what holds then."""
 
     def __init__(
@@ -215,16 +215,16 @@ class Situation:
         height = self._known(vehicle.height)
         self._place = None if x is None or y is None else (x, y)
         self._height = None if height is None else (height, height)
-        self._here = Path(self._place, self._place or (0, 0), self._height)
+        self._here = SweptPath(self._place, self._place or (0, 0), self._height)
 
     def _known(self, slot: int) -> int | None:
         return None if slot < 0 else self._slots[slot]
 
     # -------------------------------------------------------- conditions
 
-    def truths(self, code: Sequence[int], query: "Query") -> Truths:
+    def truths(self, code: Sequence[int], query: "ConditionQuery") -> Truths:
         """What a condition may be."""
-        numbers: list[Number] = []
+        numbers: list[HeightTerm] = []
         found: list[Truths] = []
         for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True):
             if op in (Op.CONST, Op.SIGNAL, Op.ARGUMENT):
@@ -248,7 +248,7 @@ class Situation:
                 found.append(self._atom(op, a, b, query))
         return found.pop()
 
-    def _number(self, op: int, a: int, query: "Query") -> Number:
+    def _number(self, op: int, a: int, query: "ConditionQuery") -> HeightTerm:
         if op == Op.CONST:
             return 0, a
         if op == Op.ARGUMENT:
@@ -258,7 +258,7 @@ class Situation:
         value = self._slots[a]
         return None if value is None else (0, value)
 
-    def _atom(self, op: int, a: int, b: int, query: "Query") -> Truths:
+    def _atom(self, op: int, a: int, b: int, query: "ConditionQuery") -> Truths:
         policy, arguments, through_us = self._policy, query.arguments, query.through_us
         match op:
             case Op.POSITION_IN_ARGUMENT if not 0 <= arguments[a] < len(policy.tables[b]):
@@ -268,7 +268,7 @@ class Situation:
                 return self.inside(policy.zones[zone], query.path or self._here, through_us)
             case Op.ARGUMENT_POINT_IN:
                 point = arguments[a], arguments[a + 1]
-                return self.inside(policy.zones[b], Path(point, point, None), through_us, flat=True)
+                return self.inside(policy.zones[b], SweptPath(point, point, None), through_us, flat=True)
             case Op.ARGUMENT_IN:
                 return frozenset({arguments[a] in policy.sets[b]})
             case Op.PHASE_IN:
@@ -290,7 +290,7 @@ class Situation:
 
     # -------------------------------------------------------- places
 
-    def inside(self, zone: Zone, path: Path, through_us: int, *, flat: bool = False) -> Truths:
+    def inside(self, zone: Zone, path: SweptPath, through_us: int, *, flat: bool = False) -> Truths:
         """Whether the places of a path are inside a zone, at any time until `through_us` from now."""
         level = None if path.start is None else level_mm(zone, *path.start)
         wide, narrow = (_covers(zone, path, level, by, flat=flat) for by in (_SLACK_MM, -_SLACK_MM))
@@ -303,7 +303,7 @@ class Situation:
         self.doubtful = self.doubtful or len(later) > 1
         return both(wide, later | {now})
 
-    def in_airspace(self, path: Path, through_us: int) -> bool | None:
+    def in_airspace(self, path: SweptPath, through_us: int) -> bool | None:
         """Whether all of a path is in the airspace."""
         airspace, zones = self._policy.airspace, self._policy.zones
         if airspace is None:
@@ -312,15 +312,15 @@ class Situation:
         found += [_not(self.inside(zones[each], path, through_us)) for each in airspace.outside]
         return everywhere(frozenset().union(*found))
 
-    def ahead(self) -> tuple[Path, int]:
+    def ahead(self) -> tuple[SweptPath, int]:
         """Every place where it may be before it could stand still, and how long that takes at most, in us."""
         vehicle, place = self._policy.vehicle, self._place
         error = vehicle.position_error
-        nowhere = Path(None, (0, 0), None, error), 0
+        nowhere = SweptPath(None, (0, 0), None, error), 0
         if place is None:
             return nowhere
         if not vehicle.braking:
-            return Path(place, place, self._height, error), 0
+            return SweptPath(place, place, self._height, error), 0
         north, east, down = (self._known(slot) for slot in (vehicle.north, vehicle.east, vehicle.down))
         if north is None or east is None or down is None:
             return nowhere
@@ -337,11 +337,11 @@ class Situation:
         if self._height is not None:
             to = self._height[0] - down * goes_s
             heights = min(self._height[0], to), max(self._height[0], to)
-        return Path(place, end, heights, error), round((reaction_s + brakes_s) * 1e6)
+        return SweptPath(place, end, heights, error), round((reaction_s + brakes_s) * 1e6)
 
     # -------------------------------------------------------- what a running step rests on
 
-    def broken(self, step: "WatchedStep") -> Iterator[Broken]:
+    def broken(self, step: "WatchedStep") -> Iterator[UnmetCondition]:
         """What of it does not hold."""
         contract = step.invocation.contract
         for clause in contract.assume:
@@ -356,24 +356,24 @@ class Situation:
         if contract.motion.kind not in (MotionKind.HOME, MotionKind.LAND):
             yield from self._broken(WAY_HOME, frozenset({self._way_home(step, path)}))
 
-    def _broken(self, text: str, truths: Truths) -> Iterator[Broken]:
+    def _broken(self, text: str, truths: Truths) -> Iterator[UnmetCondition]:
         truth, sure, self.doubtful = everywhere(truths), not self.doubtful, False
         if truth is not True:
-            yield Broken(text, truth, sure)
+            yield UnmetCondition(text, truth, sure)
 
     def _matches(self, rule: Rule, step: "WatchedStep") -> Truths:
         if rule.when is None:
             return _TRUE
         return self.truths(rule.when.code, step.query)
 
-    def _maintained(self, clause: Clause, step: "WatchedStep", path: Path, lasts_us: int) -> Truths:
+    def _maintained(self, clause: Clause, step: "WatchedStep", path: SweptPath, lasts_us: int) -> Truths:
         """Over the whole path; what is wrong already where it is, is wrong wherever it goes."""
         over = self.truths(clause.code, step.query._replace(path=path, through_us=lasts_us))
         if everywhere(over) is None:
             over |= self.truths(clause.code, step.query)
         return over
 
-    def _way_home(self, step: "WatchedStep", path: Path) -> bool | None:
+    def _way_home(self, step: "WatchedStep", path: SweptPath) -> bool | None:
         """Whether the battery holds the reserve and the way home from the farthest place of a path."""
         vehicle, battery = self._policy.vehicle, self._known(self._policy.vehicle.battery)
         if battery is None or path.start is None or (vehicle.speeds is not None and path.heights is None):
@@ -406,7 +406,7 @@ class Situation:
         """What it requires is true, and it leads nowhere out of the airspace; from outside it may always go home."""
         contract, vehicle = self._policy.contracts[link.skill], self._policy.vehicle
         for clause in contract.require:
-            if everywhere(self.truths(clause.code, Query(link.arguments, phase))) is not True:
+            if everywhere(self.truths(clause.code, ConditionQuery(link.arguments, phase))) is not True:
                 return False
         kind, motion = contract.motion.kind, contract.motion
         if kind in (MotionKind.HOLD, MotionKind.LAND):
@@ -426,7 +426,7 @@ class Situation:
         longest_us = link.limit_us or contract.duration_us or vehicle.endurance_us
         return everywhere(frozenset(self.in_airspace(path, longest_us) for path in paths)) is True
 
-    def _home(self, here: Path) -> list[Path]:
+    def _home(self, here: SweptPath) -> list[SweptPath]:
         """Up where it is, across to home, and down there."""
         vehicle, heights = self._policy.vehicle, here.heights
         returns = vehicle.return_altitude
@@ -436,7 +436,7 @@ class Situation:
         across = up
         if up is not None and returns and self._place is not None and hypot(*self._place) > near_mm:
             across = max(up[0], returns - _SHORT_MM), up[1]
-        home = Path(here.start and (0, 0), (0, 0), down, here.error)
+        home = SweptPath(here.start and (0, 0), (0, 0), down, here.error)
         return [here._replace(heights=up), here._replace(end=(0, 0), heights=across), home]
 
 
@@ -446,7 +446,7 @@ class WatchedStep:
     def __init__(self, policy: Policy, mission: Mission, step: int) -> None:
         self.invocation: Invocation = mission.invocations[step]
         of, name = self.invocation, mission.phases[self.invocation.phase]
-        self.query = Query(of.arguments, policy.phases.index(name) if name in policy.phases else -1)
+        self.query = ConditionQuery(of.arguments, policy.phases.index(name) if name in policy.phases else -1)
         self.degrades = [
             rule
             for rule in policy.rules
@@ -496,7 +496,7 @@ class RunningStep(WatchedStep):
         """Whether nothing is judged then."""
         return any(start <= at_us < end for start, end in self._silences)
 
-    def look(self, situation: "Situation", at_us: int) -> None:
+    def look(self, situation: "JudgedState", at_us: int) -> None:
         """Judge what is known then."""
         if self.sure is not None:
             return
@@ -524,7 +524,7 @@ def supervise(policy: Policy, steps: Sequence[RunningStep], turns: Sequence[Turn
     """Look at the steps that flew one after the other, as often as the loop turned, and at each of the frames that came
     at once. `clock` is the moment at a time of the simulation.
     """
-    memory, left = Memory(policy), deque(steps)
+    memory, left = HeardState(policy), deque(steps)
     for turn in turns:
         at_us = turn.at_us
         while left and (until_us := left[0].until_us) is not None and until_us < at_us:
@@ -558,11 +558,11 @@ def _reaching(heights: tuple[float, float] | None, to: int | None) -> tuple[floa
     return heights if heights is None or to is None else (min(heights[0], to), max(heights[1], to))
 
 
-def _sum(left: Number, right: Number, sign: int) -> Number:
+def _sum(left: HeightTerm, right: HeightTerm, sign: int) -> HeightTerm:
     return None if left is None or right is None else (left[0] + sign * right[0], left[1] + sign * right[1])
 
 
-def _compared(op: int, difference: Number, heights: tuple[float, float] | None) -> Truths:
+def _compared(op: int, difference: HeightTerm, heights: tuple[float, float] | None) -> Truths:
     """What a difference is to 0, at all heights between two."""
     if difference is None:
         return _UNKNOWN
@@ -572,7 +572,7 @@ def _compared(op: int, difference: Number, heights: tuple[float, float] | None) 
     return frozenset(_RELATIONS[op](each, 0) for each in ends)
 
 
-def _covers(zone: Zone, path: Path, level: float | None, by: int, *, flat: bool) -> Truths:
+def _covers(zone: Zone, path: SweptPath, level: float | None, by: int, *, flat: bool) -> Truths:
     """Whether the places of a path that is widened by so much more are inside a zone, while that exists. Its start is
     `level` mm inside over ground.
     """
@@ -590,7 +590,7 @@ def _covers(zone: Zone, path: Path, level: float | None, by: int, *, flat: bool)
     return both(upright, _level(zone, path.start, path.end, level, path.error + by, by))
 
 
-def _level(zone: Zone, start: Place, end: Place, inside: float, error: int, by: int) -> Truths:
+def _level(zone: Zone, start: GroundPoint, end: GroundPoint, inside: float, error: int, by: int) -> Truths:
     """The same over ground. What is out of reach from the start needs no closer look."""
     away = error * sqrt(2)
     if abs(inside) > hypot(end[0] - start[0], end[1] - start[1]) + away:
@@ -609,7 +609,7 @@ def _level(zone: Zone, start: Place, end: Place, inside: float, error: int, by: 
     return _TRUE | _FALSE if met else _TRUE if inside > 0 else _FALSE
 
 
-def _touches(start: Place, end: Place, error: int, edge: Edge) -> bool:
+def _touches(start: GroundPoint, end: GroundPoint, error: int, edge: Edge) -> bool:
     """Whether an edge shares a place with a way that is widened by a box: no line parts them."""
     ax, ay, bx, by = edge
     across = ((1, 0), (0, 1), (end[1] - start[1], start[0] - end[0]), (by - ay, ax - bx))

@@ -134,15 +134,9 @@ def _executed(executor: Executor, kind: int, rest: bytes) -> bytes | Refusal:
     """What the executor is asked or told."""
     match kind:
         case calls.DISPATCH:
-            sealed = rest[_TIME.size :]
-            permit = open_permit(sealed, _SESSION)
-            ref = (0, 0, 0) if permit is None else (permit.kind, permit.step, permit.link)
-            return _permitted(ref, executor.dispatch(sealed, *_TIME.unpack_from(rest)))
+            return _dispatch(executor, rest)
         case calls.STAND_IN:
-            (now_us, what, link), sealed = _STANDING.unpack_from(rest), rest[_STANDING.size :]
-            permit = open_permit(sealed, _SESSION)
-            step = -1 if permit is None or what != FALLBACK_LINK else permit.step
-            return _permitted((what, step, link), executor.stand_in(sealed, what, link, now_us))
+            return _stand_in(executor, rest)
         case calls.AHEAD:
             return _ahead(executor, rest)
         case calls.WITHDRAW:
@@ -162,6 +156,20 @@ def _executed(executor: Executor, kind: int, rest: bytes) -> bytes | Refusal:
         case _:
             return _MALFORMED
     return _NONE
+
+
+def _dispatch(executor: Executor, rest: bytes) -> bytes | Refusal:
+    sealed = rest[_TIME.size :]
+    permit = open_permit(sealed, _SESSION)
+    ref = (0, 0, 0) if permit is None else (permit.kind, permit.step, permit.link)
+    return _permitted(ref, executor.dispatch(sealed, *_TIME.unpack_from(rest)))
+
+
+def _stand_in(executor: Executor, rest: bytes) -> bytes | Refusal:
+    (now_us, what, link), sealed = _STANDING.unpack_from(rest), rest[_STANDING.size :]
+    permit = open_permit(sealed, _SESSION)
+    step = -1 if permit is None or what != FALLBACK_LINK else permit.step
+    return _permitted((what, step, link), executor.stand_in(sealed, what, link, now_us))
 
 
 def _permitted(ref: tuple[int, int, int], command: Command | Refusal) -> bytes | Refusal:

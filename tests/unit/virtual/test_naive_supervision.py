@@ -22,7 +22,14 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import NUMBER, Signal
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.virtual.flown import Heard, Turn
-from rtshcua.virtual.naive_supervision import Memory, Query, RunningStep, Situation, WatchedStep, supervise
+from rtshcua.virtual.naive_supervision import (
+    ConditionQuery,
+    HeardState,
+    JudgedState,
+    RunningStep,
+    WatchedStep,
+    supervise,
+)
 
 MANY = settings(max_examples=settings().max_examples * 4)
 VELOCITY = ("velocity.north", "velocity.east", "velocity.down")
@@ -39,8 +46,8 @@ def prepared(policy: Policy, invocation: Invocation) -> tuple[PreparedPolicy, Pr
     return made, step
 
 
-def situation(policy: Policy, state: State, now: Now) -> Situation:
-    return Situation(policy, state.values, state.ages, [TRUTHS[each] for each in state.monitors], now)
+def situation(policy: Policy, state: State, now: Now) -> JudgedState:
+    return JudgedState(policy, state.values, state.ages, [TRUTHS[each] for each in state.monitors], now)
 
 
 def watched(policy: Policy, invocation: Invocation) -> WatchedStep:
@@ -127,7 +134,7 @@ def test_temporal_monitors_say_what_the_product_makes_of_the_same_past(of: Rando
     made = prepare(policy)
     assume(isinstance(made, PreparedPolicy))
     assert isinstance(made, PreparedPolicy)
-    memory, before, at_us = Memory(policy), initial(made), 500 * S
+    memory, before, at_us = HeardState(policy), initial(made), 500 * S
     for _ in range(12):
         at_us += of.choice([0, 1, 50_000, 50_000, 400_000, S, S + 1, 3 * S])
         state = worlds.state(of)
@@ -139,7 +146,7 @@ def test_temporal_monitors_say_what_the_product_makes_of_the_same_past(of: Rando
         says = memory.look(now)
         for number, truth in enumerate(truths):
             says.doubtful = False
-            assert says.truths((Op.MONITOR, number, 0), Query()) == {TRUTHS[truth]} or says.doubtful
+            assert says.truths((Op.MONITOR, number, 0), ConditionQuery()) == {TRUTHS[truth]} or says.doubtful
 
 
 STEP = flat.INVOCATIONS[flat.INSPECTION_STEP]

@@ -14,10 +14,10 @@ from time import perf_counter_ns
 from lark import Lark
 
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.format.attempt import lay_out
 from rtshcua.ground.format.format import formatted
-from rtshcua.ground.format.read import read
+from rtshcua.ground.format.format_text import lay_out
 from rtshcua.ground.format.style import WIDTH
+from rtshcua.ground.format.token_reader import read
 from rtshcua.ground.language.generate import GRAMMAR, lark
 from rtshcua.ground.language.parse import parse
 

@@ -11,15 +11,15 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 829,
-    "code lines": 83_881,
-    "shared class names": 134,
-    "of them across packages": 114,
-    "shared file names": 98,
+    "modules": 819,
+    "code lines": 83_849,
+    "shared class names": 127,
+    "of them across packages": 110,
+    "shared file names": 95,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 50,
+    "modules below 80 lines with one importer": 49,
     "functions of more than 60 lines": 21,
-    "functions of a complexity over 15": 166,
+    "functions of a complexity over 15": 165,
     "functions of a complexity over 25": 14,
 }
 

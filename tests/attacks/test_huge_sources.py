@@ -22,9 +22,9 @@ from rtshcua.front.cli.formatting.each import of_file
 from rtshcua.ground.checker.geojson import read_area
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.elaborate import elaborate
-from rtshcua.ground.format import attempt as attempting
-from rtshcua.ground.format.attempt import attempt
-from rtshcua.ground.format.comments import gap_of
+from rtshcua.ground.format import format_text as attempting
+from rtshcua.ground.format.format_text import format_text
+from rtshcua.ground.format.token_sheet import gap_of
 from rtshcua.ground.language import load as loading
 from rtshcua.ground.language import parse as parsing
 from rtshcua.ground.language.load import load
@@ -182,7 +182,7 @@ def test_comments_on_one_line_are_put_together_once() -> None:
 def test_a_line_with_many_ignores_is_looked_through_once(text: str) -> None:
     source = text.format(word='import "a.rts" ', comment="/* rtshcua: ignore E1303 because why */ ")
     before = process_time()
-    made = attempt(source)
+    made = format_text(source)
     assert isinstance(made, str)
     assert made.count("ignore") == 6_000
     assert process_time() - before < 8  # a minute and more, when each walked all of it
@@ -191,7 +191,7 @@ def test_a_line_with_many_ignores_is_looked_through_once(text: str) -> None:
 def test_more_comments_than_are_laid_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(attempting, "MAX_TOKENS", 20)
     fits = "//\n" * 10 + "/**/" * 10 + 'import "//"' + "\n"
-    assert isinstance(attempt(fits), str)
+    assert isinstance(format_text(fits), str)
     many = tmp_path / "many.rts"
     many.write_text("//" * 50 + "\n" + fits)
     laid = of_file(many, 100, write=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.project.patterns import matches
-from rtshcua.ground.project.settings import NAMES, SHARED, Settings, misconfigured, parse_settings
+from rtshcua.ground.project.file_patterns import matches
+from rtshcua.ground.project.settings import NAMES, SHARED, ProjectSettings, misconfigured, parse_settings
 
 #: a configuration is a page or two; more than this of it is not read
 LARGEST = 1 << 20
@@ -17,7 +17,7 @@ LARGEST = 1 << 20
 class Project:
     """Settings, the file that they stand in (None: the defaults), and the folder that its paths are relative to."""
 
-    settings: Settings
+    settings: ProjectSettings
     root: Path
     file: Path | None = None
 
@@ -41,7 +41,7 @@ class Projects:
         if config is not None:
             self._given = _read(config) or misconfigured(str(config), "it has no table `[tool.rtshcua]`")
         elif isolated:
-            self._given = Project(Settings(), _absolute(Path()))
+            self._given = Project(ProjectSettings(), _absolute(Path()))
         self._by_folder: dict[Path, Project | Refusal] = {}
 
     def of(self, path: Path) -> Project | Refusal:
@@ -59,7 +59,7 @@ class Projects:
             passed.append(each)
             if found is not None:
                 break
-        found = found or Project(Settings(), _absolute(Path()))
+        found = found or Project(ProjectSettings(), _absolute(Path()))
         self._by_folder |= dict.fromkeys(passed, found)
         return found
 

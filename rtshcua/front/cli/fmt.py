@@ -19,7 +19,7 @@ from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.formatting.each import Laid, of_file, of_text
 from rtshcua.front.cli.formatting.shown import difference
 from rtshcua.front.cli.stdout import out, out_rendered
-from rtshcua.ground.format.finding import not_formatted
+from rtshcua.ground.format.format_text import not_formatted
 from rtshcua.ground.language.size import MAX_SIZE
 
 app = typer.Typer(add_completion=False)

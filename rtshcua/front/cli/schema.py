@@ -12,8 +12,8 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out_json
-from rtshcua.ground.agent.forms import FORMS, Schema
-from rtshcua.ground.agent.schema import schema as mission_schema
+from rtshcua.ground.agent.specification_schema import schema as mission_schema
+from rtshcua.ground.agent.tool_forms import FORMS, Schema
 from rtshcua.ground.language.load import Program
 
 app = typer.Typer(add_completion=False)
@@ -55,7 +55,7 @@ def schema(
 def _narrowed(path: Path, name: str | None, findings: Findings) -> Schema | ExitCode:
     """The schema under the policy of a source; or how the command ends without one."""
     from rtshcua.app.programs import examine, read_sources
-    from rtshcua.ground.agent.narrowed import narrowed
+    from rtshcua.ground.agent.narrowed_schema import narrowed
 
     reading = read_sources([path])
     program = reading.program

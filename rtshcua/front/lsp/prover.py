@@ -27,7 +27,7 @@ from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.lint.filter import filter_findings
 from rtshcua.ground.lint.lint import lint
 from rtshcua.ground.pipeline.program import examine_program
-from rtshcua.ground.project.settings import Ignored
+from rtshcua.ground.project.settings import IgnoredCode
 from rtshcua.mavlink import dialect
 
 LENGTH = 8  # bytes, in front of each message
@@ -84,7 +84,7 @@ def examined(known: Desk, job: Job) -> tuple[Diagnostic, ...]:
     return filter_findings(found, view.program.sources, {asked}, _configured(view), untold).found
 
 
-def _configured(view: View) -> dict[str, tuple[Ignored, ...]]:
+def _configured(view: View) -> dict[str, tuple[IgnoredCode, ...]]:
     """What the project's configuration ignores in the first file."""
     project = Projects().of(Path(view.name))
     if not isinstance(project, Project):

@@ -9,8 +9,7 @@ from typing import Any, Final
 from rtshcua.adapters.store.readable import Readable
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.agent.narrowed import narrowed
-from rtshcua.ground.agent.permitted import permitted
+from rtshcua.ground.agent.narrowed_schema import narrowed, permitted_skills
 from rtshcua.ground.agent.rejections import frame_of, rejections
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.ground.language.load import load
@@ -67,7 +66,7 @@ class Missions:
         self.lowered = lowered[0]
         path = program.stable.get(program.units[0].file, "")
         self.schema = narrowed(self.lowered, program.units, path if path.startswith("lib:") else None)
-        self.skills = permitted(self.lowered, ())
+        self.skills = permitted_skills(self.lowered, ())
         self._frame = frame_of(self.schema, self.skills)
         self._pins = Pins("agent", None, frozenset({self.policy.name}), self.policy.version)
 

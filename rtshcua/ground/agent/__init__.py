@@ -1,1 +1,1 @@
-"""Mission specifications: missions as structured data, the way an agent proposes them."""
+"""Mission specifications: missions as JSON, as an agent proposes them."""

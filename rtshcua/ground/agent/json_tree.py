@@ -1,9 +1,11 @@
-"""JSON (RFC 8259) with the place of everything in it, strict: no key twice, no NaN, no number that is not written so.
+"""JSON (RFC 8259) with the place of every value, and JSON Pointers (RFC 6901) to these places.
 
-The depth and the size are bounded before anything is built, so that hostile input costs little.
+The reader is strict: no key twice, no NaN, no fractions. Depth and size are bounded before anything is built, so that
+hostile input costs little.
 """
 
 import re
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from json.decoder import JSONDecodeError, scanstring  # type: ignore[attr-defined]
@@ -30,7 +32,7 @@ Path = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Tree:
+class JsonTree:
     """A JSON value, and where each of its parts is written: `spans` by path, `keys` the keys of objects by path."""
 
     value: Any
@@ -38,7 +40,7 @@ class Tree:
     keys: dict[Path, Span]
 
 
-class _Stop(Exception):
+class _Unreadable(Exception):
     """The text cannot be read any further."""
 
     def __init__(self, code: Code, message: str, start: int, end: int, help: str | None = None) -> None:
@@ -46,7 +48,7 @@ class _Stop(Exception):
         self.code, self.message, self.start, self.end, self.help = code, message, start, end, help
 
 
-def read_json(file: str, data: bytes) -> tuple[Source, Tree | None, tuple[Diagnostic, ...]]:
+def read_json(file: str, data: bytes) -> tuple[Source, JsonTree | None, tuple[Diagnostic, ...]]:
     """The source text, its tree (None where it is no JSON), and what is wrong with it."""
     if len(data) > MAX_BYTES:
         message = f"the specification has {len(data)} bytes, and at most {MAX_BYTES} are read"
@@ -64,11 +66,11 @@ def read_json(file: str, data: bytes) -> tuple[Source, Tree | None, tuple[Diagno
     reader = _Reader(source)
     try:
         value = reader.document()
-    except _Stop as stop:
+    except _Unreadable as stop:
         span = Span(file, stop.start, stop.end)
         found = Diagnostic(stop.code, stop.message, span, stop.help)
         return source, None, (*reader.found, found)
-    return source, Tree(value, reader.spans, reader.keys), tuple(reader.found)
+    return source, JsonTree(value, reader.spans, reader.keys), tuple(reader.found)
 
 
 class _Reader:
@@ -97,7 +99,7 @@ class _Reader:
     def _value(self, at: int, path: Path) -> tuple[Any, int]:
         if len(path) > MAX_DEPTH:
             message = f"the specification is nested more than {MAX_DEPTH} deep"
-            raise _Stop(codes.SPECIFICATION_SIZE, message, at, at + 1)
+            raise _Unreadable(codes.SPECIFICATION_SIZE, message, at, at + 1)
         first = self.text[at : at + 1]
         value: Any
         if first == "{":
@@ -163,9 +165,9 @@ class _Reader:
         try:
             value, end = scanstring(self.text, at + 1, True)
         except JSONDecodeError as error:
-            raise _Stop(codes.NOT_JSON, error.msg[0].lower() + error.msg[1:], error.pos, error.pos + 1) from error
+            raise _Unreadable(codes.NOT_JSON, error.msg[0].lower() + error.msg[1:], error.pos, error.pos + 1) from error
         if any("\ud800" <= character <= "\udfff" for character in value):
-            raise _Stop(codes.NOT_JSON, "the text has half of a surrogate pair", at, end)
+            raise _Unreadable(codes.NOT_JSON, "the text has half of a surrogate pair", at, end)
         return value, end
 
     def _scalar(self, at: int) -> tuple[Any, int]:
@@ -177,13 +179,49 @@ class _Reader:
             raise self._unexpected(at, "a value")
         if matched[2] or matched[3]:
             help = 'quantities are written as texts with their unit, such as "12.5 m"'
-            raise _Stop(codes.NOT_JSON, f"`{matched[0][:40]}` is not a whole number", *matched.span(), help)
+            raise _Unreadable(codes.NOT_JSON, f"`{matched[0][:40]}` is not a whole number", *matched.span(), help)
         if len(matched[0].lstrip("-")) > MAX_DIGITS:
-            raise _Stop(codes.SPECIFICATION_SIZE, f"the number has more than {MAX_DIGITS} digits", *matched.span())
+            raise _Unreadable(
+                codes.SPECIFICATION_SIZE, f"the number has more than {MAX_DIGITS} digits", *matched.span()
+            )
         return int(matched[0]), matched.end()
 
-    def _unexpected(self, at: int, expected: str) -> _Stop:
+    def _unexpected(self, at: int, expected: str) -> _Unreadable:
         found = self.text[at : at + 1]
         if not found:
-            return _Stop(codes.NOT_JSON, f"the text ends where {expected} is expected", len(self.text), len(self.text))
-        return _Stop(codes.NOT_JSON, f"`{found}` stands where {expected} is expected", at, at + 1)
+            return _Unreadable(
+                codes.NOT_JSON, f"the text ends where {expected} is expected", len(self.text), len(self.text)
+            )
+        return _Unreadable(codes.NOT_JSON, f"`{found}` stands where {expected} is expected", at, at + 1)
+
+
+def pointer(path: Path) -> str:
+    """The pointer to a path; the whole document is the empty one."""
+    return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in path)
+
+
+class JsonPlaces:
+    """The values and keys of a tree by where they stand, for as many questions as there are findings."""
+
+    def __init__(self, tree: JsonTree) -> None:
+        found = [
+            (place.start, -place.end, path) for places in (tree.spans, tree.keys) for path, place in places.items()
+        ]
+        found.sort(key=lambda each: each[:2])
+        self._starts = [start for start, _, _ in found]
+        self._ends = [-end for _, end, _ in found]
+        self._paths = [path for _, _, path in found]
+        self._around: list[int] = []  # of each place the one that it lies in, -1 for the whole
+        open_places: list[int] = []
+        for number, end in enumerate(self._ends):
+            while open_places and self._ends[open_places[-1]] < end:
+                open_places.pop()
+            self._around.append(open_places[-1] if open_places else -1)
+            open_places.append(number)
+
+    def innermost(self, span: Span) -> Path:
+        """The path of the smallest value that holds a span, or of the member whose key does."""
+        at = bisect_right(self._starts, span.start) - 1
+        while at >= 0 and self._ends[at] < span.end:
+            at = self._around[at]
+        return () if at < 0 else self._paths[at]

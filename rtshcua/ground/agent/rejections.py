@@ -1,7 +1,7 @@
-"""What is wrong with a proposal, so that a program can put it right: where, the limit, what stands there, the nearest.
+"""Rejections of a proposal, for a program to correct it: the place, the limit, the value found, and the nearest one.
 
-The compiler says what is wrong. Of what it finds, the schema that its policy narrows says the limit and the nearest
-value that fits; where that says nothing, a fix of the finding does, or its help in words.
+The compiler finds what is wrong. The schema that its policy narrows gives the limit and the nearest value that fits;
+where it gives none, a fix of the finding does, or its help.
 """
 
 import json
@@ -14,10 +14,11 @@ from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.agent.patterns import written
-from rtshcua.ground.agent.permitted import Permitted
-from rtshcua.ground.agent.said import decimal, said
-from rtshcua.ground.agent.shape import untold
+from rtshcua.ground.agent.json_tree import pointer as pointer_to
+from rtshcua.ground.agent.narrowed_schema import PermittedSkill
+from rtshcua.ground.agent.quantity_reading import decimal, read_quantity
+from rtshcua.ground.agent.specification_schema import uncounted_findings
+from rtshcua.ground.agent.value_patterns import written
 from rtshcua.model.flat.contract import QUANTITY
 from rtshcua.model.quantity import Dimension
 
@@ -36,7 +37,7 @@ _ARTICLED = {
 _MOST_JSON = 65_536
 
 
-class Range(NamedTuple):
+class PermittedRange(NamedTuple):
     """The least and the most of an argument that some permit leaves, in the canonical unit of its dimension."""
 
     low: int
@@ -44,17 +45,17 @@ class Range(NamedTuple):
     dimension: Dimension
 
 
-class Frame(NamedTuple):
+class ProposalFrame(NamedTuple):
     """What a policy leaves an agent: the narrowed schema, the ranges of quantities by skill and argument, and the
     phases that a skill is bound to.
     """
 
     schema: Mapping[str, Any]
-    ranges: Mapping[tuple[str, str], Range]
+    ranges: Mapping[tuple[str, str], PermittedRange]
     phases: Mapping[str, tuple[str, ...]]
 
 
-class Misfit(NamedTuple):
+class SchemaMisfit(NamedTuple):
     """A place that does not fit. `near` is the value that fits and says the same, or the nearest one; None where the
     limit is `ABSENT`, or what stands there says nothing that can be asked for. `of` is what it is found by, where that
     is another place; `why` says what is wrong, or how it should stand there.
@@ -67,20 +68,19 @@ class Misfit(NamedTuple):
     why: str = ""
 
 
-def frame_of(schema: Mapping[str, Any], skills: Iterable[Permitted]) -> Frame:
+def frame_of(schema: Mapping[str, Any], skills: Iterable[PermittedSkill]) -> ProposalFrame:
     """What a policy leaves an agent: `schema` is narrowed by it, `skills` are those that it permits."""
     known = tuple(skills)
-    phases = {each.contract.name: tuple(each.contract.phases) for each in known if each.contract.phases}
-    return Frame(schema, _ranges(known), phases)
-
-
-def _ranges(skills: Iterable[Permitted]) -> dict[tuple[str, str], Range]:
-    return {
-        (skill.contract.name, each.parameter.name): Range(each.low, each.high, Dimension(each.parameter.dimension))
-        for skill in skills
+    ranges = {
+        (skill.contract.name, each.parameter.name): PermittedRange(
+            each.low, each.high, Dimension(each.parameter.dimension)
+        )
+        for skill in known
         for each in skill.allowed
         if each.parameter.kind == QUANTITY
     }
+    phases = {each.contract.name: tuple(each.contract.phases) for each in known if each.contract.phases}
+    return ProposalFrame(schema, ranges, phases)
 
 
 class Rejections(NamedTuple):
@@ -90,55 +90,43 @@ class Rejections(NamedTuple):
     more: int
 
 
-def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: Frame) -> Rejections:
+def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: ProposalFrame) -> Rejections:
     """One rejection for each error of the compiler on the specification `value`, whose text is `source`. Of many the
     first 40, and how many more there are: findings that the compiler counts and does not tell are among them.
     """
-    fit = islice(_Fit(frame).misfits(frame.schema, value, "", ("", "")), _MOST_MISFITS)
-    misfits = [*fit, *islice(_Whole(frame, value).misfits(), _MOST_MISFITS)]
+    fit = islice(_SchemaFit(frame).misfits(frame.schema, value, "", ("", "")), _MOST_MISFITS)
+    misfits = [*fit, *islice(_StepOrder(frame, value).misfits(), _MOST_MISFITS)]
     told: dict[str, dict[str, Any]] = {}
     more = 0
     for each in found:
-        if untold(each):
-            more += untold(each)
+        if uncounted_findings(each):
+            more += uncounted_findings(each)
         elif each.severity is Severity.ERROR:
             for one in _rejections(each, value, source, misfits):
                 told.setdefault(json.dumps([one["field"], one["limit"] or one["code"]]), one)
     return Rejections(list(told.values())[:_MOST], max(len(told) - _MOST, 0) + more)
 
 
-def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[Misfit]) -> Iterator[dict[str, Any]]:
+def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[SchemaMisfit]) -> Iterator[dict[str, Any]]:
     pointer = found.pointer or ""
     own = [each for each in misfits if pointer == (each.of or each.pointer)]
-    below = [each for each in misfits if not each.of and each.pointer.startswith(f"{pointer}/")]
-    above = [each for each in misfits if not each.of and pointer.startswith(f"{each.pointer}/")]
-    for misfit in own or below or above:
-        yield _told(found, misfit.pointer, value, misfit.limit, misfit.near, misfit.why)
-    if not (own or below or above):
+    others = [each for each in misfits if not each.of]
+    below = [each for each in others if each.pointer.startswith(f"{pointer}/")]
+    about = own or below or [each for each in others if pointer.startswith(f"{each.pointer}/")]
+    for misfit in about:
+        yield _rejection(found, misfit.pointer, value, misfit.limit, misfit.near, misfit.why)
+    if not about:
         near = _fixed(found, source)
-        yield _told(found, pointer, value, None if near is None else {"one_of": [near]}, near)
+        yield _rejection(found, pointer, value, None if near is None else {"one_of": [near]}, near)
 
 
-def _told(
+def _rejection(
     found: Diagnostic, pointer: str, value: Any, limit: Mapping[str, Any] | None, near: Any, why: str = ""
 ) -> dict[str, Any]:
     there, observed = _at(value, pointer)
     message = found.message
     if there and limit is not None and set(limit) == {"type"} and pointer != (found.pointer or ""):
         message = f"{_ARTICLED[limit['type']]} is asked, and this is `{observed}`"  # `found` is the first of several
-    if limit == ABSENT:
-        how = f"leave `{pointer}` out"
-    elif isinstance(near, dict | list) and why:
-        how = f"{why} at `{pointer}`"
-    elif near is not None:
-        how = f"write {json.dumps(near, ensure_ascii=False)} at `{pointer}`" + (f": {why}" if why else "")
-    elif limit is not None and "least" in limit:
-        how = (f"{why}; " if why else "") + f"from {limit['least']} to {limit['most']} is permitted at `{pointer}`"
-    elif limit is not None and limit.get("one_of", limit.get("places")):
-        listed = ", ".join(json.dumps(each, ensure_ascii=False) for each in limit.get("one_of", limit.get("places")))
-        how = f"accepted at `{pointer}`: {listed}" + ("" if "one_of" in limit else ", or a place in degrees")
-    else:
-        how = why or found.help or message
     return {
         "code": found.code.id,
         "field": pointer,
@@ -147,8 +135,25 @@ def _told(
         "observed": observed if there else None,
         "age_us": None,
         "nearest": near,
-        "repair": how,
+        "repair": _repair(pointer, limit or {}, near, why) or found.help or message,
     }
+
+
+def _repair(pointer: str, limit: Mapping[str, Any], near: Any, why: str) -> str:
+    """What to do, in words, as far as the limit, the nearest value or the reason tell it."""
+    accepted = limit.get("one_of", limit.get("places"))
+    if limit == ABSENT:
+        return f"leave `{pointer}` out"
+    if isinstance(near, dict | list) and why:
+        return f"{why} at `{pointer}`"
+    if near is not None:
+        return f"write {json.dumps(near, ensure_ascii=False)} at `{pointer}`" + (f": {why}" if why else "")
+    if "least" in limit:
+        return (f"{why}; " if why else "") + f"from {limit['least']} to {limit['most']} is permitted at `{pointer}`"
+    if accepted:
+        listed = ", ".join(json.dumps(each, ensure_ascii=False) for each in accepted)
+        return f"accepted at `{pointer}`: {listed}" + ("" if "one_of" in limit else ", or a place in degrees")
+    return why
 
 
 def _at(value: Any, pointer: str) -> tuple[bool, Any]:
@@ -175,16 +180,16 @@ def _fixed(found: Diagnostic, source: Source) -> Any:
     return None
 
 
-class _Whole:
+class _StepOrder:
     """Holds the steps of a specification against each other: in which phase each may stand, and that each begins where
     the one before it ended.
     """
 
-    def __init__(self, frame: Frame, value: Any) -> None:
+    def __init__(self, frame: ProposalFrame, value: Any) -> None:
         self._frame = frame
         self._phases = value.get("phases") if isinstance(value, dict) else None
 
-    def misfits(self) -> Iterator[Misfit]:
+    def misfits(self) -> Iterator[SchemaMisfit]:
         """What does not fit beside the rest."""
         before: tuple[str, Any] | None = None
         names: list[Any] = []
@@ -193,18 +198,18 @@ class _Whole:
                 continue
             name, at = phase.get("name"), f"/phases/{number}"
             if name in names:
-                yield Misfit(f"{at}/name", {"none_of": list(names)}, f"phase_{number + 1}")
+                yield SchemaMisfit(f"{at}/name", {"none_of": list(names)}, f"phase_{number + 1}")
             names.append(name)
             for index, step in enumerate(phase["steps"]):
                 here = f"{at}/steps/{index}"
                 bound = self._frame.phases.get(_skill(step), ())
                 if bound and name not in bound:
-                    yield Misfit(f"{at}/name", {"one_of": list(bound)}, bound[0], f"{here}/skill")
+                    yield SchemaMisfit(f"{at}/name", {"one_of": list(bound)}, bound[0], f"{here}/skill")
                 if before is not None and isinstance(step, dict):
                     yield from self._continued(before, step, here)
                 before = (here, step)
 
-    def _continued(self, before: tuple[str, Any], step: Mapping[str, Any], here: str) -> Iterator[Misfit]:
+    def _continued(self, before: tuple[str, Any], step: Mapping[str, Any], here: str) -> Iterator[SchemaMisfit]:
         """What the step before would have to say for this one to begin where that one ends."""
         at, earlier = before
         old, new = (each.get("arguments") if isinstance(each, dict) else None for each in (earlier, step))
@@ -213,42 +218,42 @@ class _Whole:
             return
         for name, wanted in new.items():
             if name in old and old[name] != wanted and (_skill(step), name) in self._frame.ranges:
-                yield Misfit(f"{at}/arguments/{name}", {"one_of": [wanted]}, wanted, here)
+                yield SchemaMisfit(f"{at}/arguments/{name}", {"one_of": [wanted]}, wanted, here)
         entries = [f"{each}.entry" for each in new.values() if isinstance(each, str)]
         for name, each in schema["properties"]["arguments"]["properties"].items():
             fits = [entry for entry in entries if "pattern" in each and _fits(each, entry)]
             if fits and old.get(name) not in fits:
-                yield Misfit(f"{at}/arguments/{name}", {"one_of": fits}, fits[0], here)
+                yield SchemaMisfit(f"{at}/arguments/{name}", {"one_of": fits}, fits[0], here)
 
 
-class _Fit:
+class _SchemaFit:
     """Holds a value against the narrowed schema: the keywords that it uses, and no others."""
 
-    def __init__(self, frame: Frame) -> None:
+    def __init__(self, frame: ProposalFrame) -> None:
         self._frame = frame
         self._defs: Mapping[str, Any] = frame.schema["$defs"]
 
-    def misfits(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[Misfit]:
+    def misfits(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[SchemaMisfit]:
         """What of `value`, which stands `at` a pointer, does not fit; `of` names the skill and the argument."""
         if "anyOf" in schema:
             yield from self._step(value, at)
         elif _NAMES.get(type(value)) != schema["type"]:
             limit = {"type": schema["type"], **(self._limit(schema, of) if schema["type"] == "string" else {})}
             near, why = self._near(schema, value, of)
-            yield Misfit(at, limit, near, why=why)
+            yield SchemaMisfit(at, limit, near, why=why)
         elif schema["type"] == "object":
             yield from self._object(schema, value, at, of)
         elif schema["type"] == "array":
             for number, each in enumerate(value):
                 if number >= schema.get("maxItems", len(value)):
-                    yield Misfit(f"{at}/{number}", ABSENT, None)
+                    yield SchemaMisfit(f"{at}/{number}", ABSENT, None)
                 else:
                     yield from self.misfits(schema["items"], each, f"{at}/{number}", of)
         elif not _fits(schema, value):
             near, why = self._near(schema, value, of)
-            yield Misfit(at, self._limit(schema, of), near, why=why)
+            yield SchemaMisfit(at, self._limit(schema, of), near, why=why)
 
-    def _step(self, value: Any, at: str) -> Iterator[Misfit]:
+    def _step(self, value: Any, at: str) -> Iterator[SchemaMisfit]:
         """A step: the skill that it names says what else it has."""
         named = _skill(value)
         if named in self._defs:
@@ -256,7 +261,7 @@ class _Fit:
             return
         near = nearest(named, self._defs)
         given = value.get("arguments") if isinstance(value, dict) else None
-        yield Misfit(f"{at}/skill", {"one_of": list(self._defs)}, near or self._alike(given))
+        yield SchemaMisfit(f"{at}/skill", {"one_of": list(self._defs)}, near or self._alike(given))
 
     def _alike(self, given: Any) -> str:
         """The skill whose arguments are most like those that are given."""
@@ -268,18 +273,18 @@ class _Fit:
 
         return min(self._defs, key=differs)
 
-    def _object(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[Misfit]:
+    def _object(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[SchemaMisfit]:
         skill, _ = of
         for name in value:
             if name not in schema["properties"]:
-                yield Misfit(f"{at}/{_part(name)}", ABSENT, None)
+                yield SchemaMisfit(f"{at}{pointer_to((name,))}", ABSENT, None)
         for name, each in schema["properties"].items():
             here = (skill, name)
             if name in value:
                 yield from self.misfits(each, value[name], f"{at}/{name}", here)
             elif name in schema["required"]:
                 limit = {"required": True, **self._limit(each, here)}
-                yield Misfit(f"{at}/{name}", limit, self._near(each, None, here)[0])
+                yield SchemaMisfit(f"{at}/{name}", limit, self._near(each, None, here)[0])
 
     def _limit(self, schema: Mapping[str, Any], of: tuple[str, str]) -> dict[str, Any]:
         span = self._frame.ranges.get(of)
@@ -331,11 +336,11 @@ def _fits(schema: Mapping[str, Any], value: Any) -> bool:
     return not long and ("pattern" not in schema or re.fullmatch(schema["pattern"], value) is not None)
 
 
-def _clamped(value: Any, span: Range) -> tuple[str | None, str]:
+def _clamped(value: Any, span: PermittedRange) -> tuple[str | None, str]:
     """The quantity that a text or a number says, within the range, as the language writes it; and why that is asked."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         return None, ""
-    found, why = said(str(value), span.dimension)
+    found, why = read_quantity(str(value), span.dimension)
     if found is None:
         return None, why
     near = min(max(round(found), span.low), span.high)
@@ -367,7 +372,3 @@ def _name(schema: Mapping[str, Any], value: Any) -> str | None:
         if _fits(schema, text):
             return text
     return None
-
-
-def _part(name: str) -> str:
-    return name.replace("~", "~0").replace("/", "~1")

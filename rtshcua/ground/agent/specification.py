@@ -1,7 +1,7 @@
-"""A mission specification to the same IR that a source gives, every finding with a JSON Pointer (RFC 6901).
+"""Reads a mission specification into the IR of a mission; every finding has a JSON Pointer (RFC 6901).
 
 Spans are places in the JSON text itself. A specification comes from an agent, so it may import from the shipped library
-only: the policy's own sources are named by whoever runs the compiler, never by the agent that is bound by them.
+only: whoever runs the compiler names the policy's own sources, never the agent that is bound by them.
 """
 
 import json
@@ -11,22 +11,157 @@ from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
 
+from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import HIDDEN_CHARACTER, IMPORT_PATH, NO_SUCH_FILE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import hiding, visible
 from rtshcua.diagnostics.kinds import foreign
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.agent.json_tree import Tree, read_json
-from rtshcua.ground.agent.mission import mission_of
-from rtshcua.ground.agent.pointers import Places, pointer
-from rtshcua.ground.agent.schema import SpecificationShape
-from rtshcua.ground.agent.shape import shape_errors, uncounted
+from rtshcua.ground.agent.json_tree import JsonPlaces, JsonTree, Path, pointer, read_json
+from rtshcua.ground.agent.specification_schema import (
+    RESERVED,
+    OverridesShape,
+    SpecificationShape,
+    StepShape,
+    more_findings,
+    shape_errors,
+)
+from rtshcua.ground.checker.agent_values import Moved, parse_clauses, parse_quantity, parse_value
 from rtshcua.ground.language.faults import not_a_source
 from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
 from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
 from rtshcua.ground.pipeline.pins import PROPOSED, Pins, claims
-from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.ir.expression import Quantity
+from rtshcua.model.ir.missions import MissionDecl, Overrides, Phase, Step
+from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.program import Import, Unit
+from rtshcua.model.ir.skills import ArgumentValue, Clause
+
+
+def mission_of(
+    shape: SpecificationShape, tree: JsonTree, source: Source
+) -> tuple[MissionDecl | None, tuple[Diagnostic, ...]]:
+    """The mission, or None, and what its values say wrong."""
+    made = _MissionBuilder(tree, source)
+    mission = made.mission(shape)
+    return (None if made.found else mission), tuple(made.found)
+
+
+class _MissionBuilder:
+    """Makes the nodes of one specification."""
+
+    def __init__(self, tree: JsonTree, source: Source) -> None:
+        self.tree = tree
+        self.source = source
+        self.found: list[Diagnostic] = []
+
+    def mission(self, shape: SpecificationShape) -> MissionDecl:
+        """The whole mission. The policy's place is that of its name and version together."""
+        phases = tuple(
+            Phase(
+                span=self.tree.spans["phases", number],
+                name=self.name(phase.name, ("phases", number, "name")),
+                items=tuple(
+                    self.step(step, ("phases", number, "steps", index)) for index, step in enumerate(phase.steps)
+                ),
+            )
+            for number, phase in enumerate(shape.phases)
+        )
+        by = shape.proposed_by
+        return MissionDecl(
+            span=self.tree.spans[()],
+            name=self.name(shape.name, ("name",)),
+            policy=Name(span=self.tree.spans["policy",], text=self.name(shape.policy.name, ("policy", "name")).text),
+            policy_version=shape.policy.version,
+            vehicle=self.name(shape.vehicle, ("vehicle",)),
+            intent=shape.intent,
+            source=self.name(by.source, ("proposed_by", "source")),
+            proposer=self.name(by.name, ("proposed_by", "name")),
+            role=self.name(by.role, ("proposed_by", "role")),
+            phases=phases,
+        )
+
+    def step(self, shape: StepShape, path: Path) -> Step:
+        """One step; an argument that says nothing sensible is reported and left out."""
+        arguments: list[ArgumentValue] = []
+        for key, text in shape.arguments.items():
+            here = (*path, "arguments", key)
+            place = self.tree.spans[here]
+            value, found = parse_value(text, *self.within(here))
+            self.found += found
+            if value is not None:
+                name = Name(span=self.tree.keys[here], text=key)
+                arguments.append(ArgumentValue(span=place, name=name, value=value))
+        return Step(
+            span=self.tree.spans[path],
+            skill=self.name(shape.skill, (*path, "skill")),
+            arguments=tuple(arguments),
+            on_inadmissible=shape.on_inadmissible,
+            overrides=None if shape.overrides is None else self.overrides(shape.overrides, (*path, "overrides")),
+        )
+
+    def overrides(self, shape: OverridesShape, path: Path) -> Overrides:
+        """What a step is held to beyond its skill's contract; what says nothing sensible is reported and left out."""
+        return Overrides(
+            span=self.tree.spans[path],
+            deadline=self.quantity("deadline", shape.deadline, (*path, "deadline")),
+            validity=self.quantity("valid for", shape.valid_for, (*path, "valid_for")),
+            duration=self.quantity("lasts at most", shape.lasts_at_most, (*path, "lasts_at_most")),
+            grace=self.quantity("grace", shape.grace, (*path, "grace")),
+            energy=self.quantity("energy at most", shape.energy_at_most, (*path, "energy_at_most")),
+            phases=tuple(self.name(text, (*path, "during", at)) for at, text in enumerate(shape.during)),
+            require=self.clauses("require", shape.require, (*path, "require")),
+            assume=self.clauses("assume", shape.assume, (*path, "assume")),
+            maintain=self.clauses("maintain", shape.maintain, (*path, "maintain")),
+            record=tuple(self.name(text, (*path, "record", at)) for at, text in enumerate(shape.record)),
+        )
+
+    def quantity(self, words: str, text: str | None, path: Path) -> Quantity | None:
+        """The quantity of an override, if it is given."""
+        if text is None:
+            return None
+        value, found = parse_quantity(words, text, *self.within(path))
+        self.found += found
+        return value
+
+    def clauses(self, words: str, texts: Sequence[str], path: Path) -> tuple[Clause, ...]:
+        """The clauses of conditions."""
+        clauses: list[Clause] = []
+        for number, text in enumerate(texts):
+            some, found = parse_clauses(words, text, *self.within((*path, number)))
+            clauses += some
+            self.found += found
+        return tuple(clauses)
+
+    def within(self, path: Path) -> tuple[Span, Moved]:
+        """Where a text stands between its quotes, and where each of its characters does."""
+        place = self.tree.spans[path]
+        return Span(place.file, place.start + 1, place.end - 1), string_offsets(self.source.text, place).__getitem__
+
+    def name(self, text: str, path: Path) -> Name:
+        """A name with its place; the language's reserved words are none."""
+        span = self.tree.spans[path]
+        if text in RESERVED:
+            message = f"`{text}` is a word of the language, and no name"
+            self.found.append(Diagnostic(codes.SPECIFICATION_SHAPE, message, span, "choose another name"))
+        return Name(span=span, text=text)
+
+
+def string_offsets(text: str, place: Span) -> list[int]:
+    """Where each character of a JSON string stands in the text, and where the string ends."""
+    offsets: list[int] = []
+    at, end = place.start + 1, place.end - 1
+    while at < end:
+        offsets.append(at)
+        if text[at] != "\\":
+            at += 1
+        elif text[at + 1] != "u":
+            at += 2
+        else:
+            pair = 0xD800 <= int(text[at + 2 : at + 6], 16) < 0xDC00
+            at += 12 if pair else 6
+    return [*offsets, end]
+
 
 #: findings on one specification: what is wrong a hundred times over is not mended by reading it all
 MAX_FINDINGS = 100
@@ -39,16 +174,16 @@ class Specification:
     """A specification as a unit of a program; the unit has no mission where the specification has errors."""
 
     source: Source
-    tree: Tree | None
+    tree: JsonTree | None
     unit: Unit
     diagnostics: tuple[Diagnostic, ...]
 
     def pointed(self, diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
         """The findings, those on this specification with a JSON Pointer to the value they are about."""
-        places = None if self.tree is None else Places(self.tree)
+        places = None if self.tree is None else JsonPlaces(self.tree)
         return tuple(self._pointed(diagnostic, places) for diagnostic in diagnostics)
 
-    def _pointed(self, diagnostic: Diagnostic, places: Places | None) -> Diagnostic:
+    def _pointed(self, diagnostic: Diagnostic, places: JsonPlaces | None) -> Diagnostic:
         span = diagnostic.span
         if span is None or span.file != self.source.file or diagnostic.pointer is not None:
             return diagnostic
@@ -77,7 +212,7 @@ def parse_specification(file: str, data: bytes) -> Specification:
     return _specification(source, tree, unit, found)
 
 
-def _hiding(source: Source, tree: Tree) -> Iterator[Diagnostic]:
+def _hiding(source: Source, tree: JsonTree) -> Iterator[Diagnostic]:
     """The texts that hold a control character, or one that hides or reorders what a person reads."""
     for span in (*tree.keys.values(), *tree.spans.values()):
         written = source.text[span.start : span.end]
@@ -149,11 +284,11 @@ def load_specification(
 
 
 def _specification(
-    source: Source, tree: Tree | None, unit: Unit | None, found: tuple[Diagnostic, ...]
+    source: Source, tree: JsonTree | None, unit: Unit | None, found: tuple[Diagnostic, ...]
 ) -> Specification:
     whole = Span(source.file, 0, len(source.text))
     if len(found) > MAX_FINDINGS + 1:
-        found = (*found[:MAX_FINDINGS], uncounted(len(found) - MAX_FINDINGS, source.file))
+        found = (*found[:MAX_FINDINGS], more_findings(len(found) - MAX_FINDINGS, source.file))
     specification = Specification(source, tree, unit or _unit(whole, (), ()), ())
     return replace(specification, diagnostics=specification.pointed(found))
 

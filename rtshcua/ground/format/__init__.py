@@ -1,7 +1,7 @@
-"""One style for sources: `formatted` lays a text out anew, keeps every comment, and refuses rather than change meaning.
+"""The formatter of sources: one style, every comment kept, and a refusal rather than a change of meaning.
 
-`read` runs the parser's own table and notes where tokens and items are; `sheet` says what stands between the tokens,
-`comments` included; `layout` makes lines of them on a `page`, by the tables in `style`; `align` pads columns; `same`
-compares what came of it with what was there. `attempt` is all of that, `format` adds the parser's findings on what it
-does not take, `finding` is what lint and editor say. `docs/formatting.md` shows the style.
+`token_reader` runs the parser's table and notes where tokens and items are; `token_sheet` says what stands between the
+tokens, comments included; `layout` makes lines of them by the tables in `style`; `format_text` does all of that and
+compares the result with the original. `format` adds the parser's findings on a text that cannot be formatted.
+`docs/formatting.md` shows the style.
 """

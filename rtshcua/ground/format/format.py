@@ -1,13 +1,12 @@
-"""`formatted`: a source in the one style, or why it is left as it is."""
+"""Formats a source, or reports why it is left as it is."""
 
 from dataclasses import dataclass
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.format.attempt import attempt, crowded
-from rtshcua.ground.format.read import read
-from rtshcua.ground.format.same import Difference
+from rtshcua.ground.format.format_text import FormatDifference, format_text, has_too_many_comments
 from rtshcua.ground.format.style import WIDTH
+from rtshcua.ground.format.token_reader import read
 from rtshcua.ground.language.faults import too_many_comments
 from rtshcua.ground.language.parse import parse
 
@@ -26,12 +25,12 @@ def formatted(source: Source, width: int = WIDTH) -> Formatted:
     A text that the parser does not take is refused with what `parse` says of it. So is one of which the result would
     not say the same, with the same comments in the same places (E1502).
     """
-    made = attempt(source.text, width)
+    made = format_text(source.text, width)
     if isinstance(made, str):
         return Formatted(made)
     if made is None:
         told = parse(source).diagnostics
-        if not told and (taken := read(source.text)) is not None and crowded(taken):
+        if not told and (taken := read(source.text)) is not None and has_too_many_comments(taken):
             told = (too_many_comments(source.file),)
-        return Formatted(None, told or (Difference("what can be read", 0).told(source),))
+        return Formatted(None, told or (FormatDifference("what can be read", 0).told(source),))
     return Formatted(None, (made.told(source),))

@@ -1,19 +1,118 @@
-"""Makes lines of a sheet: on one line what fits and was not ended by its author, and the rest by rule.
+"""Lays out the tokens of a text in lines, then aligns columns and comments of neighbouring lines.
 
-Ranges are of tokens, `[first, end)`; columns count from 0.
+A line holds what fits and what its author did not end; `style` says where else it may end. Ranges are of tokens,
+`[first, end)`; columns count from 0.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
-from rtshcua.ground.format.page import Line, Page
-from rtshcua.ground.format.sheet import BLOCK, GROUP, Sheet
 from rtshcua.ground.format.style import COLUMNS, INDENT, ITEMS, LEADS, PLACES, Style
+from rtshcua.ground.format.token_sheet import BLANKS, BLOCK, GROUP, TokenSheet
+
+
+@dataclass(slots=True)
+class OutputLine:
+    """One line: what stands on it after its indentation, piece by piece, and the comment at its end.
+
+    `width` counts the indentation, and not the comment. `kind` and `cuts` are for lines that align with neighbours of
+    their kind: which columns it has, and where in its text each begins. `blank` asks for an empty line before it, `own`
+    says that it is a comment alone.
+    """
+
+    indent: int
+    pieces: list[str] = field(default_factory=list)
+    width: int = 0
+    comment: str = ""
+    blank: bool = False
+    own: bool = False
+    kind: str = ""
+    cuts: tuple[tuple[int, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        """Counts what it has so far."""
+        self.width = self.indent + sum(map(len, self.pieces))
+
+    @property
+    def text(self) -> str:
+        """What stands on it."""
+        return "".join(self.pieces)
+
+
+@dataclass(slots=True)
+class OutputPage:
+    """Takes text token by token; `line` is the one that is being written."""
+
+    sheet: TokenSheet
+    line: OutputLine = field(default_factory=lambda: OutputLine(0))
+    lines: list[OutputLine] = field(default_factory=list)
+
+    @property
+    def column(self) -> int:
+        """Where the next character would stand, from 0."""
+        return self.line.width
+
+    @property
+    def fresh(self) -> bool:
+        """Whether nothing stands on the line yet."""
+        return self.line.width == self.line.indent
+
+    def add(self, text: str) -> None:
+        """Goes on, on the same line."""
+        self.line.pieces.append(text)
+        self.line.width += len(text)
+
+    def word(self, token: int) -> None:
+        """The token itself, without what stands before it."""
+        self.add(self.sheet.written[2 * token + 1])
+
+    def step(self, token: int, indent: int) -> None:
+        """What stands before a token in the middle of a line, which a comment may end all the same."""
+        if self.sheet.ends_before(token):
+            self.new(token, indent)
+        else:
+            self.add(self.sheet.gaps[token])
+
+    def new(self, token: int, indent: int, *, blank: bool = False, closing: bool = False) -> None:
+        """Ends the line before `token`, with the comments that stand there; `blank` if an empty line may follow.
+
+        Comments before a closing bracket are indented as what is within. On a line that is held it goes on.
+        """
+        gap = self.sheet.note(token)
+        if token in self.sheet.held:
+            self.add(self.sheet.gaps[token])
+            return
+        deeper = indent + INDENT if closing else indent
+        before = ""
+        for number, comment in enumerate(gap.comments):
+            alone = not comment.first and not comment.last and number == 0
+            several = "\n" in comment.text
+            opens = token > 0 and self.sheet.read.symbols[token - 1] in ("{", "(", ",")
+            if not comment.first and number == 0 and (not alone or several or not opens):
+                # it ended the line before; but what opens a list or a block is not followed by several lines
+                if several and alone and opens:
+                    self._begin(OutputLine(deeper, [comment.text], blank=False, own=True))
+                else:
+                    self.line.comment = comment.text
+            elif comment.last or several or number < len(gap.comments) - 1:
+                self._begin(OutputLine(deeper, [comment.text], blank=blank and comment.blank, own=True))
+                blank = True
+            else:  # code follows on its line, and goes on to do so
+                before = comment.text + " "
+                gap = gap._replace(blank=comment.blank)
+        self._begin(OutputLine(indent, [before], blank=blank and gap.blank and not closing))
+
+    def _begin(self, line: OutputLine) -> None:
+        if not self.fresh or self.line.comment or self.lines:
+            self.lines.append(self.line)
+        self.line = line
+
 
 _PLAIN = Style()
 _CELLS = 1000  # more than a row of a table has; its cells are columns too, before those that a style names
 
 
-def layout(sheet: Sheet, width: int) -> list[Line]:
+def layout(sheet: TokenSheet, width: int) -> list[OutputLine]:
     """The lines of a text, before their columns are aligned."""
     made = _Layout(sheet, width)
     count = len(sheet.read.words)
@@ -25,8 +124,8 @@ def layout(sheet: Sheet, width: int) -> list[Line]:
 class _Layout:
     """Walks the tokens; `page` has what was written."""
 
-    def __init__(self, sheet: Sheet, width: int) -> None:
-        self.sheet, self.limit, self.page = sheet, width, Page(sheet)
+    def __init__(self, sheet: TokenSheet, width: int) -> None:
+        self.sheet, self.limit, self.page = sheet, width, OutputPage(sheet)
         self.symbols = sheet.read.symbols
 
     def items(self, first: int, end: int, indent: int, owner: str) -> None:
@@ -214,10 +313,89 @@ class _Layout:
         page.new(close, indent, closing=True)
         page.word(close)
 
-    def cut_part(self, first: int, line: Line, *, named: bool, action: str) -> None:
+    def cut_part(self, first: int, line: OutputLine, *, named: bool, action: str) -> None:
         """Notes the column in a parameter, after its colon, and in an enumerator."""
         at = first + 2 if named else first + 1
         if named or action == "enum":
             sheet = self.sheet
             place = sheet.places[2 * at] - sheet.places[2 * first + 1] + (len(sheet.gaps[at]) if named else 0)
             line.kind, line.cuts = ("part", ((0, place),))
+
+
+ROW = "row"
+_APART = 2  # blanks before a comment
+
+
+def align(lines: list[OutputLine], width: int) -> str:
+    """The text of the lines, with what stands in columns in columns."""
+    for run in _runs(lines, lambda line, last: line.kind not in ("", ROW) and line.kind == last.kind):
+        _columns(run, width)
+    for run in _tables(lines):
+        _columns(run, width)
+    for run in _runs(lines, lambda line, last: not line.own and not last.own and "\n" not in last.comment):
+        _comments(run, width)
+    made = []
+    for line in lines:
+        if line.blank:
+            made.append("")
+        made.append(f"{' ' * line.indent}{line.text}{line.comment}".rstrip(BLANKS))
+    return "\n".join(made) + "\n" if made else ""
+
+
+def _runs(lines: list[OutputLine], belongs: Callable[[OutputLine, OutputLine], bool]) -> Iterator[list[OutputLine]]:
+    """Neighbours of one indentation that belong together."""
+    run = lines[:1]
+    for line in lines[1:]:
+        if run[-1].indent == line.indent and not line.blank and belongs(line, run[-1]):
+            run.append(line)
+        else:
+            yield run
+            run = [line]
+    yield run
+
+
+def _tables(lines: list[OutputLine]) -> Iterator[list[OutputLine]]:
+    """The rows of each table, whatever stands between them."""
+    run: list[OutputLine] = []
+    for line in lines:
+        if run and line.indent < run[0].indent:
+            yield run
+            run = []
+        if line.kind == ROW:
+            run.append(line)
+    if run:
+        yield run
+
+
+def _columns(run: list[OutputLine], width: int) -> None:
+    """Aligns as many columns, from the left, as leave no line too wide that was not."""
+    cuts = [dict(line.cuts) for line in run]
+    room = [max(width - line.width, 0) for line in run]
+    pads: list[list[tuple[int, int]]] = [[] for _ in run]
+    shifts = [0] * len(run)
+    for column in sorted({number for each in cuts for number in each}):
+        here = [number for number, each in enumerate(cuts) if column in each]
+        target = max(cuts[number][column] + shifts[number] for number in here)
+        missing = {number: target - cuts[number][column] - shifts[number] for number in here}
+        if any(shifts[number] + pad > room[number] for number, pad in missing.items()):
+            break
+        for number, pad in missing.items():
+            shifts[number] += pad
+            pads[number].append((cuts[number][column], pad))
+    for line, padded, shift in zip(run, pads, shifts, strict=True):
+        if shift:
+            text, pieces, at = line.text, [], 0
+            for place, pad in padded:
+                pieces += [text[at:place], " " * pad]
+                at = place
+            line.pieces = [*pieces, text[at:]]
+            line.width += shift
+
+
+def _comments(run: list[OutputLine], width: int) -> None:
+    """Puts the comments of a run below each other, if that makes no line too wide that was not."""
+    told = [line for line in run if line.comment]
+    column = max((line.width for line in told), default=0) + _APART
+    fits = all(column + len(line.comment) <= max(width, line.width + _APART + len(line.comment)) for line in told)
+    for line in told:
+        line.comment = " " * (column - line.width if fits else _APART) + line.comment

@@ -8,7 +8,7 @@ from rtshcua.diagnostics.codes import NOT_FORMATTED, can_be_ignored
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.lint.ignores import Ignore, ignores, unused_ignore
-from rtshcua.ground.project.settings import Ignored
+from rtshcua.ground.project.settings import IgnoredCode
 
 
 class Suppressed(NamedTuple):
@@ -24,14 +24,14 @@ class FilteredFindings(NamedTuple):
 
     found: tuple[Diagnostic, ...]
     ignored: tuple[Suppressed, ...]
-    used: frozenset[Ignored]
+    used: frozenset[IgnoredCode]
 
 
 def filter_findings(
     found: Iterable[Diagnostic],
     sources: Mapping[str, Source],
     asked: Collection[str],
-    configured: Mapping[str, Sequence[Ignored]],
+    configured: Mapping[str, Sequence[IgnoredCode]],
     incomplete: Collection[str] = (),
     formatted: Collection[str] = (),
 ) -> FilteredFindings:
@@ -45,7 +45,7 @@ def filter_findings(
     kept: list[Diagnostic] = []
     taken: list[Suppressed] = []
     by_comment: set[Ignore] = set()
-    by_project: set[Ignored] = set()
+    by_project: set[IgnoredCode] = set()
     for each in found:
         span = each.span
         comments, settings = [], []

@@ -20,7 +20,7 @@ from rtshcua.diagnostics.codes import REGISTRY, Code, Severity, can_be_ignored, 
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.project.reasons import says_why
+from rtshcua.ground.project.strict_tables import is_reason
 
 #: what a comment may ask for: about a line, or about the whole file
 LINE, FILE = "ignore", "ignore-file"
@@ -148,7 +148,7 @@ def _parse_ignore(
         faults.append(Diagnostic(codes.UNKNOWN_IGNORE, message, comment.span, _HELP))
         return
     names = [(each[0], Span(source.file, start + each.start(), start + each.end())) for each in _NAME.finditer(written)]
-    if not says_why(reason):
+    if not is_reason(reason):
         faults.append(_without_reason(comment))
         return
     if not names:

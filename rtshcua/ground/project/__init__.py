@@ -1,1 +1,1 @@
-"""A project of sources: what its `rtshcua.toml` says, and which files a pattern there means. Pure."""
+"""The configuration of a project: what its `rtshcua.toml` says, and which files a pattern there matches."""

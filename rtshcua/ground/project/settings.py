@@ -1,4 +1,4 @@
-"""What a project says in `rtshcua.toml`, or in `pyproject.toml` below `[tool.rtshcua]`: the text, as `Settings`.
+"""What a project says in `rtshcua.toml`, or in `pyproject.toml` below `[tool.rtshcua]`: the text, as `ProjectSettings`.
 
 Nothing is guessed: an unknown key, a value of the wrong type, an ignore without a reason is a refusal, with the nearest
 that would be accepted. `docs/linting.md` has all keys.
@@ -10,7 +10,7 @@ from typing import Literal
 
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.project.tables import NotSo, Table
+from rtshcua.ground.project.strict_tables import SettingError, SettingsTable
 
 #: the names under which a configuration is looked for, of one folder the first that has one
 OWN, SHARED = "rtshcua.toml", "pyproject.toml"
@@ -22,7 +22,7 @@ WIDTH, NARROWEST, WIDEST = 120, 40, 400
 
 
 @dataclass(frozen=True, slots=True)
-class Ignored:
+class IgnoredCode:
     """A kind of finding that is ignored, and why; `pattern` says in which files, None: in all."""
 
     code: Code
@@ -36,7 +36,7 @@ class LintSettings:
     what was found is remembered, and whether the format is looked at.
     """
 
-    ignored: tuple[Ignored, ...] = ()
+    ignored: tuple[IgnoredCode, ...] = ()
     exclude: tuple[str, ...] = ()
     fail_on: FailOn = "warning"
     further: tuple[str, ...] = ()
@@ -63,7 +63,7 @@ class TestSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class ProjectSettings:
     """A whole configuration. Paths and patterns in it are relative to the folder that it stands in."""
 
     lint: LintSettings = LintSettings()
@@ -80,7 +80,7 @@ def misconfigured(file: str, what: str, help: str = "", line: int | None = None)
     return Refusal("configuration", f"{file}{'' if line is None else f':{line}'}: {what}", help)
 
 
-def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | Refusal | None:
+def parse_settings(text: str, file: str, *, shared: bool = False) -> ProjectSettings | Refusal | None:
     """The settings in a configuration called `file`; `shared` where it is a `pyproject.toml`, in which others have
     tables too: None where that has none of ours.
     """
@@ -99,8 +99,8 @@ def parse_settings(text: str, file: str, *, shared: bool = False) -> Settings | 
             return None
         found, prefix = tool["rtshcua"], "tool.rtshcua"
     try:
-        return _settings(Table.of(found, prefix))
-    except NotSo as error:
+        return _settings(SettingsTable.of(found, prefix))
+    except SettingError as error:
         return misconfigured(file, error.message, error.help, _line(text, error.key))
 
 
@@ -115,13 +115,13 @@ def _longest_key(text: str) -> int:
     return longest
 
 
-def _settings(table: Table) -> Settings:
+def _settings(table: SettingsTable) -> ProjectSettings:
     lint, form, test = (table.table(name) for name in ("lint", "format", "test"))
     table.close()
-    return Settings(_lint(lint), _format(form), _test(test))
+    return ProjectSettings(_lint(lint), _format(form), _test(test))
 
 
-def _lint(table: Table) -> LintSettings:
+def _lint(table: SettingsTable) -> LintSettings:
     ignored = list(_ignored(table.table("ignore"), None))
     files = table.table("per-file-ignore")
     for pattern in files.names():
@@ -138,18 +138,18 @@ def _lint(table: Table) -> LintSettings:
     return settings
 
 
-def _ignored(table: Table, pattern: str | None) -> list[Ignored]:
-    return [Ignored(table.code(name), table.reason(name), pattern) for name in table.names()]
+def _ignored(table: SettingsTable, pattern: str | None) -> list[IgnoredCode]:
+    return [IgnoredCode(table.code(name), table.reason(name), pattern) for name in table.names()]
 
 
-def _format(table: Table) -> FormatSettings:
+def _format(table: SettingsTable) -> FormatSettings:
     width = table.number("width", NARROWEST, WIDEST)
     settings = FormatSettings(WIDTH if width is None else width, table.texts("exclude"))
     table.close()
     return settings
 
 
-def _test(table: Table) -> TestSettings:
+def _test(table: SettingsTable) -> TestSettings:
     settings = TestSettings(table.number("fail-under", 0, 100), table.texts("exclude"))
     table.close()
     return settings

@@ -6,7 +6,7 @@ from typing import Final
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.front.cli.linting.options import FORMATS
 from rtshcua.front.cli.table import COMMANDS
-from rtshcua.ground.agent.forms import FORMS
+from rtshcua.ground.agent.tool_forms import FORMS
 from rtshcua.ground.project.settings import LEVELS
 
 _SOURCES, _BUNDLE, _LOGS, _ROOTS = ("*.rts",), ("*.bundle",), ("*.jsonl",), ("*.trust",)

@@ -9,7 +9,7 @@ from rtshcua.adapters.store.writing import rewrite
 from rtshcua.diagnostics.codes import TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.format.attempt import attempt
+from rtshcua.ground.format.format_text import format_text
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.language.size import MAX_SIZE
 
@@ -69,7 +69,7 @@ def of_text(path: Path, data: bytes, width: int) -> Laid:
 
         source = Source(name, data.decode("utf-8", errors="replace"))
         return Laid(name, data, None, (not_text(source, data, error.start),))
-    made = attempt(text, width)
+    made = format_text(text, width)
     if isinstance(made, str):
         return Laid(name, data, made.encode())
     from rtshcua.ground.format.format import formatted  # with the parser, which says why

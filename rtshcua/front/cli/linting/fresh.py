@@ -117,8 +117,8 @@ def _layouts(program: Program, asked: Mapping[str, int | None]) -> Iterator[Diag
     for unit in program.units:
         width = asked.get(unit.file)
         if width is not None:
-            from rtshcua.ground.format.finding import not_formatted
             from rtshcua.ground.format.format import formatted
+            from rtshcua.ground.format.format_text import not_formatted
 
             source = program.sources[unit.file]
             text = formatted(source, width).text

@@ -7,7 +7,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.front.cli.linting.examined import Examined
 from rtshcua.ground.lint.filter import Linted, Suppressed, agreed, filter_findings
-from rtshcua.ground.project.settings import Ignored
+from rtshcua.ground.project.settings import IgnoredCode
 
 
 class Gathered(NamedTuple):
@@ -16,14 +16,14 @@ class Gathered(NamedTuple):
     found: tuple[Diagnostic, ...]
     ignored: tuple[Suppressed, ...]
     sources: Mapping[str, Source]
-    used: frozenset[Ignored]
+    used: frozenset[IgnoredCode]
     untold: frozenset[str]
 
 
 def gathered(
     programs: Sequence[Examined],
     sources: Callable[[Sequence[str]], dict[str, Source]],
-    configured: Mapping[str, Sequence[Ignored]],
+    configured: Mapping[str, Sequence[IgnoredCode]],
     asked: Sequence[str],
     laid: Collection[str] = (),
 ) -> Gathered:

@@ -10,11 +10,11 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.project.settings import Ignored
+from rtshcua.ground.project.settings import IgnoredCode
 
 
 def idle(
-    projects: Collection[Project], used: Collection[Ignored], asked: Collection[Path]
+    projects: Collection[Project], used: Collection[IgnoredCode], asked: Collection[Path]
 ) -> Iterator[tuple[Diagnostic, Source]]:
     """The findings, each with the text of its configuration; none of a configuration of whose folder only a part was
     asked for.
@@ -32,7 +32,7 @@ def idle(
                 yield _found(each, source), source
 
 
-def _found(ignored: Ignored, source: Source) -> Diagnostic:
+def _found(ignored: IgnoredCode, source: Source) -> Diagnostic:
     where = "" if ignored.pattern is None else f" in `{ignored.pattern}`"
     names = "|".join(map(re.escape, (ignored.code.id, ignored.code.slug)))
     match = re.search(rf"(?<![\w-])({names})(?![\w-])(?=[\"']?\s*=)", source.text)

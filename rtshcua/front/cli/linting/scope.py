@@ -14,7 +14,7 @@ from rtshcua.app.files import SOURCE, source_files
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.linting.options import Options
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.project.settings import Ignored, misconfigured
+from rtshcua.ground.project.settings import IgnoredCode, misconfigured
 
 
 class Scope(NamedTuple):
@@ -27,7 +27,7 @@ class Scope(NamedTuple):
     left_out: int
     widths: Mapping[Path, int]  # of the files whose layout is looked at
 
-    def configured(self) -> dict[str, tuple[Ignored, ...]]:
+    def configured(self) -> dict[str, tuple[IgnoredCode, ...]]:
         """What the configuration of each file ignores in it, by the file's name."""
         return {shown(str(path)): _ignored(self.projects[path], path) for path in self.files}
 
@@ -70,7 +70,7 @@ def _looks_at_layout(project: Project, path: Path) -> bool:
     return settings.lint.format and path.suffix == SOURCE and not project.excludes(path, settings.format.exclude)
 
 
-def _ignored(project: Project, path: Path) -> tuple[Ignored, ...]:
+def _ignored(project: Project, path: Path) -> tuple[IgnoredCode, ...]:
     return tuple(
         each for each in project.settings.lint.ignored if each.pattern is None or project.means(each.pattern, path)
     )

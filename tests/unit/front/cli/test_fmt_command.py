@@ -15,7 +15,7 @@ import pytest
 from rtshcua.adapters.store import writing
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
-from rtshcua.ground.format import attempt
+from rtshcua.ground.format import format_text
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 COMMAND = [sys.executable, "-m", "rtshcua", "fmt"]
@@ -234,7 +234,7 @@ def test_ctrl_c_leaves_whole_files(
 def test_a_fault_of_ours_changes_nothing(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(attempt, "lay_out", lambda before, width: before.text.replace("2 s", "3 s"))
+    monkeypatch.setattr(format_text, "lay_out", lambda before, width: before.text.replace("2 s", "3 s"))
     assert main(["fmt", "a.rts"]) == ExitCode.FAULT
     assert "error[E1502]" in said(capsys)[1]
     assert Path("a.rts").read_text() == BAD

@@ -7,7 +7,7 @@ import pytest
 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
-from rtshcua.ground.agent.schema import schema
+from rtshcua.ground.agent.specification_schema import schema
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 POLICY = str(CHECKOUT / "policies" / "bridge_inspection.rts")

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtshcua.ground.agent.forms import FORMS, strict
-from rtshcua.ground.agent.narrowed import RESERVED, narrowed
-from rtshcua.ground.agent.patterns import digits, name_but
-from rtshcua.ground.agent.schema import schema as general
+from rtshcua.ground.agent.narrowed_schema import RESERVED, narrowed
 from rtshcua.ground.agent.specification import parse_specification
+from rtshcua.ground.agent.specification_schema import schema as general
+from rtshcua.ground.agent.tool_forms import FORMS, strict
+from rtshcua.ground.agent.value_patterns import digits, name_but
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect

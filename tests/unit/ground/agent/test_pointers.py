@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.agent.json_tree import Path, Tree, read_json
-from rtshcua.ground.agent.pointers import Places, pointer
+from rtshcua.ground.agent.json_tree import JsonPlaces, JsonTree, Path, pointer, read_json
 
 VALUES = st.recursive(
     st.integers(-9, 9) | st.text(max_size=3) | st.none(),
@@ -16,7 +15,7 @@ VALUES = st.recursive(
 )
 
 
-def smallest(tree: Tree, span: Span) -> Path:
+def smallest(tree: JsonTree, span: Span) -> Path:
     """The definition, over all places."""
     holding = [
         (place.end - place.start, path)
@@ -33,7 +32,7 @@ def test_the_smallest_value_that_holds_a_span(value: object, one: int, other: in
     _, tree, _ = read_json("x", text.encode())
     assert tree is not None
     span = Span("x", *sorted((min(one, len(text)), min(other, len(text)))))
-    assert Places(tree).innermost(span) == smallest(tree, span)
+    assert JsonPlaces(tree).innermost(span) == smallest(tree, span)
 
 
 def test_a_pointer_is_escaped() -> None:

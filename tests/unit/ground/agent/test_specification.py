@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.agent.json_tree import MAX_BYTES, read_json
-from rtshcua.ground.agent.schema import schema
+from rtshcua.ground.agent.specification_schema import schema
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import Compiled, compile_program
 from rtshcua.mavlink import dialect

@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
-from rtshcua.ground.agent.schema import schema
+from rtshcua.ground.agent.specification_schema import schema
 from rtshcua.ground.pipeline.program import Compiled
 
 Compile = Callable[[str | bytes], tuple[Compiled, tuple[Diagnostic, ...]]]

@@ -6,11 +6,10 @@ import pytest
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.format import attempt
-from rtshcua.ground.format.finding import not_formatted
+from rtshcua.ground.format import format_text
 from rtshcua.ground.format.format import formatted
-from rtshcua.ground.format.read import read
-from rtshcua.ground.format.same import difference
+from rtshcua.ground.format.format_text import difference, not_formatted
+from rtshcua.ground.format.token_reader import read
 from rtshcua.ground.language.faults import MAX_SIZE
 from rtshcua.ground.language.parse import parse
 from virtual.rows import rows
@@ -71,7 +70,7 @@ CHANGES: dict[str, tuple[Callable[[str], str], str]] = {
 @pytest.mark.parametrize("name", CHANGES)
 def test_a_result_that_says_something_else_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     change, what = CHANGES[name]
-    monkeypatch.setattr(attempt, "lay_out", lambda before, width: change(before.text))
+    monkeypatch.setattr(format_text, "lay_out", lambda before, width: change(before.text))
     made = formatted(Source("x.rts", TEXT))
     assert made.text is None
     (found,) = made.diagnostics

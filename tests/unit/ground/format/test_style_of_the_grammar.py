@@ -9,8 +9,8 @@ from lark.grammar import Rule
 from fuzz.mutation.sentences import grammar, sentence
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.format import formatted
-from rtshcua.ground.format.read import SPACED
 from rtshcua.ground.format.style import CALLS, COLUMNS, ITEMS, OPERANDS
+from rtshcua.ground.format.token_reader import SPACED
 from rtshcua.ground.language.table import table
 
 #: what stands in braces, or may come again, and is part of a list

@@ -9,7 +9,7 @@ from lark import UnexpectedInput
 
 from rtshcua.diagnostics.codes import NOT_TEXT, TOO_LARGE, UNCLOSED
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.format.read import read
+from rtshcua.ground.format.token_reader import read
 from rtshcua.ground.language import generate
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.reader import Reader

@@ -7,7 +7,7 @@ from reference import ignoring
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.format.comments import gap_of
+from rtshcua.ground.format.token_sheet import gap_of
 from rtshcua.ground.lint.filter import filter_findings
 from rtshcua.ground.lint.ignores import comments, ignores
 from virtual.rows import rows

@@ -4,8 +4,8 @@ import pytest
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.project.patterns import matches
-from rtshcua.ground.project.settings import Ignored, Settings, parse_settings
+from rtshcua.ground.project.file_patterns import matches
+from rtshcua.ground.project.settings import IgnoredCode, ProjectSettings, parse_settings
 from virtual.rows import rows
 
 WHOLE = """
@@ -28,10 +28,10 @@ exclude = ["slow"]
 
 def test_all_keys() -> None:
     found = parse_settings(WHOLE, "rtshcua.toml")
-    assert isinstance(found, Settings)
+    assert isinstance(found, ProjectSettings)
     assert found.lint.ignored == (
-        Ignored(codes.REPEATED_NUMBER, "the letter says 30 m"),
-        Ignored(codes.NAMING, "names of the register", "tests/*.rts"),
+        IgnoredCode(codes.REPEATED_NUMBER, "the letter says 30 m"),
+        IgnoredCode(codes.NAMING, "names of the register", "tests/*.rts"),
     )
     assert (found.lint.exclude, found.lint.fail_on, found.lint.further) == (
         ("drafts", "old/**"),
@@ -43,11 +43,11 @@ def test_all_keys() -> None:
 
 
 def test_nothing_said_is_the_defaults() -> None:
-    assert parse_settings("", "rtshcua.toml") == Settings()
+    assert parse_settings("", "rtshcua.toml") == ProjectSettings()
     assert parse_settings("[project]\nname = 'x'\n[tool.ruff]", "pyproject.toml", shared=True) is None
-    assert parse_settings("[tool.rtshcua]", "pyproject.toml", shared=True) == Settings()
+    assert parse_settings("[tool.rtshcua]", "pyproject.toml", shared=True) == ProjectSettings()
     found = parse_settings("[tool.rtshcua.lint]\ncache = false", "pyproject.toml", shared=True)
-    assert isinstance(found, Settings)
+    assert isinstance(found, ProjectSettings)
     assert found.lint.cache is False
 
 
@@ -130,5 +130,5 @@ def test_a_key_of_very_many_parts_is_refused_unread(part: str) -> None:
 def test_many_patterns_are_no_key() -> None:
     patterns = ", ".join(f'"missions/part.{number}.rts"' for number in range(500))
     found = parse_settings(f"[test]\nexclude = [{patterns}]\n", "rtshcua.toml")
-    assert isinstance(found, Settings)
+    assert isinstance(found, ProjectSettings)
     assert len(found.test.exclude) == 500

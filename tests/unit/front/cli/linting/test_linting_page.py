@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rtshcua.diagnostics import codes
 from rtshcua.front.cli.linting.options import FORMATS
-from rtshcua.ground.project.settings import Settings, parse_settings
+from rtshcua.ground.project.settings import ProjectSettings, parse_settings
 
 
 def page(checkout: Path) -> str:
@@ -22,7 +22,7 @@ def test_the_configuration_that_it_shows_is_one(checkout: Path) -> None:
     shown = re.search(r"^```toml\n(.*?)^```$", page(checkout), re.DOTALL | re.MULTILINE)
     assert shown is not None
     found = parse_settings(shown[1], "rtshcua.toml")
-    assert isinstance(found, Settings), found
+    assert isinstance(found, ProjectSettings), found
     assert [each.pattern for each in found.lint.ignored] == [None, "missions/**"]
 
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.agent.narrowed import narrowed
-from rtshcua.ground.agent.patterns import quantities, unit_of, written
+from rtshcua.ground.agent.narrowed_schema import narrowed
+from rtshcua.ground.agent.value_patterns import quantities, unit_of, written
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.pipeline.program import examine_program

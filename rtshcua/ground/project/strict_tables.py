@@ -1,16 +1,24 @@
-"""Reads tables of a configuration strictly: each key once, of the type that it must have, and none besides."""
+"""Reads the tables of a configuration strictly: known keys, right types, and a reason for every ignore."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from rtshcua.diagnostics.codes import REGISTRY, Code, Severity, can_be_ignored, code_named
 from rtshcua.diagnostics.suggest import listed, nearest
-from rtshcua.ground.project.reasons import says_why
+
+#: a reason has at least so many letters and digits
+SHORTEST = 3
+
+
+def is_reason(reason: str) -> bool:
+    """Whether a text can be a reason: it has letters. Points and marks alone say nothing, seen or unseen."""
+    return sum(map(str.isalnum, reason)) >= SHORTEST and any(map(str.isalpha, reason))
+
 
 T = TypeVar("T", bound=str)
 
 
-class NotSo(Exception):
+class SettingError(Exception):
     """A key is not as it must be: which, what was found, and what would be accepted."""
 
     def __init__(self, key: str, message: str, help: str = "") -> None:
@@ -18,7 +26,7 @@ class NotSo(Exception):
         self.key, self.message, self.help = key, message, help
 
 
-class Table:
+class SettingsTable:
     """A table of a configuration: `close` refuses what nobody asked for. All methods raise NotSo."""
 
     def __init__(self, found: Mapping[str, Any], name: str) -> None:
@@ -27,11 +35,11 @@ class Table:
         self._asked: dict[str, None] = {}
 
     @staticmethod
-    def of(found: Any, name: str) -> "Table":
+    def of(found: Any, name: str) -> "SettingsTable":
         """What was found under a name, which must be a table."""
         if not isinstance(found, dict):
-            raise NotSo(name.rpartition(".")[2], f"`{name}` is {_kind(found)}, and must be a table")
-        return Table(found, name)
+            raise SettingError(name.rpartition(".")[2], f"`{name}` is {_kind(found)}, and must be a table")
+        return SettingsTable(found, name)
 
     @property
     def name(self) -> str:
@@ -43,17 +51,17 @@ class Table:
         self._asked |= dict.fromkeys(self._found)
         return tuple(self._found)
 
-    def table(self, key: str) -> "Table":
+    def table(self, key: str) -> "SettingsTable":
         """A table in this one; an empty one where there is none."""
         self._asked[key] = None
-        return Table.of(self._found.get(key, {}), f"{self._name}.{key}" if self._name else key)
+        return SettingsTable.of(self._found.get(key, {}), f"{self._name}.{key}" if self._name else key)
 
     def any_of(self, key: str, types: tuple[type, ...], words: str) -> Any:
         """A value of one of these types; None where there is none."""
         self._asked[key] = None
         found = self._found.get(key)
         if found is not None and type(found) not in types:
-            raise NotSo(key, f"`{key}`{self._where()} is {_kind(found)}", f"accepted: {words}")
+            raise SettingError(key, f"`{key}`{self._where()} is {_kind(found)}", f"accepted: {words}")
         return found
 
     def flag(self, key: str, *, default: bool) -> bool:
@@ -65,7 +73,9 @@ class Table:
         """A whole number of a range; None where there is none."""
         found = self.any_of(key, (int,), f"a whole number from {least} to {most}")
         if found is not None and not least <= found <= most:
-            raise NotSo(key, f"`{key}`{self._where()} is {found}", f"accepted: a whole number from {least} to {most}")
+            raise SettingError(
+                key, f"`{key}`{self._where()} is {found}", f"accepted: a whole number from {least} to {most}"
+            )
         return None if found is None else int(found)
 
     def texts(self, key: str) -> tuple[str, ...]:
@@ -74,7 +84,7 @@ class Table:
         for each in found:
             if not isinstance(each, str) or not each.strip():
                 what = "an empty text" if isinstance(each, str) else _kind(each)
-                raise NotSo(key, f"`{key}`{self._where()} has {what} in its list", "accepted: a list of texts")
+                raise SettingError(key, f"`{key}`{self._where()} has {what} in its list", "accepted: a list of texts")
         return tuple(found)
 
     def one_of(self, key: str, words: Sequence[T], default: T) -> T:
@@ -87,17 +97,17 @@ class Table:
                 return word
         near = nearest(found, words)
         help = f"accepted: {listed(words)}" if near is None else f"did you mean `{near}`?"
-        raise NotSo(key, f"`{found}` is nothing that `{key}`{self._where()} can be", help)
+        raise SettingError(key, f"`{found}` is nothing that `{key}`{self._where()} can be", help)
 
     def code(self, name: str) -> Code:
         """The kind of finding that a key of this table names, by its id or its slug; errors cannot be ignored."""
         code = code_named(name)
         if code is None:
-            raise NotSo(name, f"there is no code `{name}`", _near_code(name))
+            raise SettingError(name, f"there is no code `{name}`", _near_code(name))
         if code.severity is Severity.ERROR:
-            raise NotSo(name, f"`{name}` is an error, and errors cannot be ignored")
+            raise SettingError(name, f"`{name}` is an error, and errors cannot be ignored")
         if not can_be_ignored(code):
-            raise NotSo(name, f"`{name}` is about ignores themselves, and cannot be ignored")
+            raise SettingError(name, f"`{name}` is about ignores themselves, and cannot be ignored")
         return code
 
     def reason(self, name: str) -> str:
@@ -105,9 +115,9 @@ class Table:
         help = f'say why, as in `{name} = "the authority\'s letter says 30 m"`'
         found = self._found[name]
         if not isinstance(found, str):
-            raise NotSo(name, f"`{name}`{self._where()} is {_kind(found)}, and must be a reason", help)
-        if not says_why(found):
-            raise NotSo(name, f"`{name}`{self._where()} is ignored without a reason", help)
+            raise SettingError(name, f"`{name}`{self._where()} is {_kind(found)}, and must be a reason", help)
+        if not is_reason(found):
+            raise SettingError(name, f"`{name}`{self._where()} is ignored without a reason", help)
         return " ".join(found.split())
 
     def close(self) -> None:
@@ -116,7 +126,7 @@ class Table:
             if key not in self._asked:
                 near = nearest(key, self._asked)
                 help = f"known: {listed(self._asked)}" if near is None else f"did you mean `{near}`?"
-                raise NotSo(key, f"there is no key `{key}`{self._where()}", help)
+                raise SettingError(key, f"there is no key `{key}`{self._where()}", help)
 
     def _where(self) -> str:
         return f" in `[{self._name}]`" if self._name else ""

@@ -1,18 +1,26 @@
-"""Whether two texts say the same: the same parse tree, the same words, the same comments between the same words."""
+"""Formats a text, and checks that the result says the same.
+
+The check compares parse tree, words and comments of both texts: the same comments must stand between the same words.
+The parser itself is not imported, its table is enough: so `rtshcua fmt` starts fast. `format.formatted` adds what the
+parser says of a text that cannot be formatted.
+"""
 
 from bisect import bisect_left
 from itertools import accumulate
 from typing import NamedTuple
 
-from rtshcua.diagnostics.codes import UNSAFE_FORMAT
-from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.codes import NOT_FORMATTED, UNSAFE_FORMAT
+from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.format.comments import COMMENT, content
-from rtshcua.ground.format.read import Read
+from rtshcua.ground.format.layout import align, layout
+from rtshcua.ground.format.style import WIDTH
+from rtshcua.ground.format.token_reader import TokenizedText, read
+from rtshcua.ground.format.token_sheet import COMMENT, content, sheet
+from rtshcua.ground.language.size import MAX_SIZE, MAX_TOKENS
 from rtshcua.ground.lint.ignores import ignores_line
 
 
-class Difference(NamedTuple):
+class FormatDifference(NamedTuple):
     """What would not be the same, and the offset in the first text where it is."""
 
     what: str
@@ -29,7 +37,7 @@ class Difference(NamedTuple):
         )
 
 
-class _Said(NamedTuple):
+class _Comparable(NamedTuple):
     """What is compared: the words and where they stand, the comments with how many words are before each, and for each
     comment that ignores findings of a line how many words are before those on that line, and before what follows them.
     """
@@ -40,7 +48,7 @@ class _Said(NamedTuple):
     ignored: list[tuple[int, int]]
 
 
-def difference(before: Read, after: Read | None) -> Difference | None:
+def difference(before: TokenizedText, after: TokenizedText | None) -> FormatDifference | None:
     """The first thing that `after` does not say as `before` does; None if there is none.
 
     The parser is a function of the tokens: where both texts have the same words, and the same rules were applied to
@@ -48,18 +56,18 @@ def difference(before: Read, after: Read | None) -> Difference | None:
     and go.
     """
     if after is None:
-        return Difference("what can be read", 0)
-    one, other = _said(before), _said(after)
+        return FormatDifference("what can be read", 0)
+    one, other = _comparable(before), _comparable(after)
     if one.words != other.words:
-        return Difference("a word", _place(one, _first(one.words, other.words)))
+        return FormatDifference("a word", _offset_of(one, _first(one.words, other.words)))
     if before.rules != after.rules:
-        return Difference("the meaning", 0)
+        return FormatDifference("the meaning", 0)
     if one.comments != other.comments:
         number = _first(one.comments, other.comments)
         words = one.comments[number][0] if number < len(one.comments) else len(one.words)
-        return Difference("a comment", _place(one, words))
+        return FormatDifference("a comment", _offset_of(one, words))
     if one.ignored != other.ignored:
-        return Difference("what a comment ignores", 0)
+        return FormatDifference("what a comment ignores", 0)
     return None
 
 
@@ -69,11 +77,11 @@ def _first(one: list[str] | list[tuple[int, str]], other: list[str] | list[tuple
     return next((number for number, (a, b) in pairs if a != b), min(len(one), len(other)))
 
 
-def _place(said: _Said, word: int) -> int:
+def _offset_of(said: _Comparable, word: int) -> int:
     return said.starts[word] if word < len(said.starts) else max(said.starts, default=0)
 
 
-def _said(read: Read) -> _Said:
+def _comparable(read: TokenizedText) -> _Comparable:
     text, symbols = read.text, read.symbols
     following = [*symbols[1:], ""]
     counted = [symbol != "," or after not in (")", "}") for symbol, after in zip(symbols, following, strict=False)]
@@ -84,7 +92,7 @@ def _said(read: Read) -> _Said:
     if "//" in text or "/*" in text:
         before = 0
         counting = list(accumulate(counted, initial=0))
-        lines = _Lines(read)
+        lines = _CommentLines(read)
         for end, start, counts in zip([0, *read.ends], [*read.starts, len(text)], [*counted, True], strict=True):
             if start - end > 1 and "/" in (gap := text[end:start]):
                 for found in COMMENT.finditer(gap):
@@ -93,15 +101,15 @@ def _said(read: Read) -> _Said:
                         first, last = lines.about(end + found.start())
                         ignored.append((counting[first], counting[last]))
             before += counts
-    return _Said(words, starts, comments, ignored)
+    return _Comparable(words, starts, comments, ignored)
 
 
-class _Lines:
+class _CommentLines:
     """The lines that comments speak of, asked for in the order of the text; none is looked through twice, for one may
     have all the text, and all the comments.
     """
 
-    def __init__(self, read: Read) -> None:
+    def __init__(self, read: TokenizedText) -> None:
         self._text, self._starts = read.text, read.starts
         self._begin = self._asked = 0  # where the line begins of what was asked for last, and what that was
         self._next, self._after = -1, 0  # a token, and where its line ends
@@ -118,3 +126,59 @@ class _Lines:
                 self._next, self._after = end, after if after >= 0 else len(text)
             end = bisect_left(starts, self._after)
         return begin, end
+
+
+#: brackets within brackets; the parser gives up before (E0105), and what has more would be too deep for us to walk
+MAX_DEPTH = 100
+
+
+def format_text(text: str, width: int = WIDTH) -> str | FormatDifference | None:
+    """`text` in the one style, in lines of at most `width` characters where that can be.
+
+    None where the parser does not take the text, it is nested too deeply, or has too many words or comments. A
+    Difference where the result would not say the same, with the same comments in the same places: that is a fault of
+    ours.
+    """
+    before = read(text) if len(text) <= MAX_SIZE and "\0" not in text else None
+    if before is None or before.depth > MAX_DEPTH or len(before.words) > MAX_TOKENS or has_too_many_comments(before):
+        return None
+    made = lay_out(before, width)
+    if made == text:
+        return made
+    return difference(before, read(made)) or made
+
+
+def has_too_many_comments(read: TokenizedText) -> bool:
+    """Whether there are more comments than are laid out: each of them may be a line."""
+    text = read.text
+    if text.count("//") + text.count("/*") <= MAX_TOKENS:
+        return False
+    gaps = (text[end:start] for end, start in zip([0, *read.ends], [*read.starts, len(text)], strict=True))
+    return sum(len(COMMENT.findall(gap)) for gap in gaps if "/" in gap) > MAX_TOKENS
+
+
+def lay_out(before: TokenizedText, width: int) -> str:
+    """The text in the one style, not yet held against what was there."""
+    return align(layout(sheet(before), width), width)
+
+
+def not_formatted(source: Source, text: str) -> Diagnostic | None:
+    """The finding on `source`, of which `text` is the formatted one; None where both are the same.
+
+    It stands at the first line that differs; its fix is safe, and writes the whole text.
+    """
+    if source.text == text:
+        return None
+    old, new = source.text.split("\n"), text.split("\n")
+    same = next(
+        (at for at, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1]), min(len(old), len(new))
+    )
+    start = min(sum(len(line) + 1 for line in old[:same]), len(source.text))
+    end = start + len(old[same]) if same < len(old) else start
+    return Diagnostic(
+        NOT_FORMATTED,
+        "this is not laid out in the one style",
+        Span(source.file, start, end),
+        f"`rtshcua fmt {source.file}` lays it out",
+        fixes=(Fix(Span(source.file, 0, len(source.text)), text, "lay the file out", Applicability.SAFE),),
+    )

@@ -1,21 +1,100 @@
-"""What stands between the tokens of a text, and which of it must stay: all that laying it out needs to know."""
+"""What stands between the tokens of a text: comments, blanks and line ends, and which of these must stay.
+
+`gap_of` reads one gap; `sheet` collects everything that the layout must know of a text.
+"""
 
 import re
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import NamedTuple
 
-from rtshcua.ground.format.comments import Gap, gap_of
-from rtshcua.ground.format.read import SPACED, Read
 from rtshcua.ground.format.style import CALLS, LISTS, OPERANDS
+from rtshcua.ground.format.token_reader import SPACED, TokenizedText
+from rtshcua.ground.lint.ignores import ignores_line
 
-NO_COMMENTS = Gap((), ends_line=False, blank=False)
+COMMENT = re.compile(r"//[^\n]*+|/\*(?s:.)*?\*/")
+#: what may be taken away at the end of a line; other characters that Python calls blank are what a comment says
+BLANKS = " \t\r\f"
+
+
+class CommentRow(NamedTuple):
+    """Comments that stand on one line: whether the line begins with them, whether it ends with them, and whether a
+    blank line is before it.
+    """
+
+    text: str
+    first: bool
+    last: bool
+    blank: bool
+
+    @property
+    def inline(self) -> bool:
+        """Whether code may follow on the line: no `//`, no line end within, and no line of its own."""
+        return not self.ends_line and not (self.first and self.last)
+
+    @property
+    def ends_line(self) -> bool:
+        """Whether it cannot be followed by code on its line, or goes over several."""
+        return "\n" in self.text or bool(COMMENT.findall(self.text)[-1].startswith("//"))
+
+    @property
+    def ignores(self) -> bool:
+        """Whether it ignores findings, by the line."""
+        return any(map(ignores_line, COMMENT.findall(self.text)))
+
+
+class TokenGap(NamedTuple):
+    """What is between two tokens: the comments, whether a line ends there, and whether the next token's line has a
+    blank one before it.
+    """
+
+    comments: tuple[CommentRow, ...]
+    ends_line: bool
+    blank: bool
+
+
+def content(comment: str) -> str:
+    """A comment, without what is blank at the end of its lines."""
+    if "\n" not in comment:
+        return comment.rstrip(BLANKS)
+    return "\n".join(line.rstrip(BLANKS) for line in comment.split("\n"))
+
+
+def gap_of(text: str, *, at_start: bool, at_end: bool) -> TokenGap:
+    """What a gap holds; that of the file's start begins a line, that of its end ends one."""
+    if "/" not in text:
+        lines = text.count("\n")
+        return TokenGap((), lines > 0, lines > 1)
+    rows: list[CommentRow] = []
+    beside: list[str] = []  # the comments of the last row, put together once: there may be millions
+    before, end, ended = at_start, 0, at_start
+    blank = False
+    for found in COMMENT.finditer(text):
+        lines = text.count("\n", end, found.start())
+        ended = ended or lines > 0
+        told = content(found[0])
+        if rows and not lines:
+            beside.append(told)
+        else:
+            if rows:
+                rows[-1] = rows[-1]._replace(text=" ".join(beside), last=True)
+            blank = lines > 1
+            beside = [told]
+            rows.append(CommentRow(told, before or lines > 0, False, blank))
+        before, end = False, found.end()
+    lines = text.count("\n", end)
+    rows[-1] = rows[-1]._replace(text=" ".join(beside), last=lines > 0 or at_end)
+    return TokenGap(tuple(rows), ended or lines > 0 or any("\n" in row.text for row in rows), lines > 1)
+
+
+NO_GAP = TokenGap((), ends_line=False, blank=False)
 
 _MOMENT = re.compile('"[0-9]{4}-')
 LIST, GROUP, BLOCK = "list", "group", "block"
 
 
 @dataclass(frozen=True, slots=True)
-class Sheet:
+class TokenSheet:
     """A text's tokens by their number, and what stands before each of them, `gaps`, where it stands on one line.
 
     `written` has gap and word of each token in turn, and `places` where each of these would begin if all of it stood
@@ -25,13 +104,13 @@ class Sheet:
     ignores findings speaks of the line.
     """
 
-    read: Read
+    read: TokenizedText
     gaps: list[str]
     written: list[str]
     places: list[int]
     pairs: dict[int, int]
     kinds: dict[int, str]
-    notes: dict[int, Gap]
+    notes: dict[int, TokenGap]
     lines: list[int]
     kept: list[int]
     held: set[int]
@@ -56,12 +135,12 @@ class Sheet:
         """Whether the author ended a line just before this token."""
         return token > 0 and self.lines[token] > self.lines[token - 1]
 
-    def note(self, token: int) -> Gap:
+    def note(self, token: int) -> TokenGap:
         """What the gap before a token holds."""
-        return self.notes.get(token, NO_COMMENTS)
+        return self.notes.get(token, NO_GAP)
 
 
-def sheet(read: Read) -> Sheet:
+def sheet(read: TokenizedText) -> TokenSheet:
     """The sheet of a text."""
     text, count = read.text, len(read.words)
     raw = [text[end:start] for end, start in zip([0, *read.ends], [*read.starts, len(text)], strict=True)]
@@ -81,9 +160,9 @@ def sheet(read: Read) -> Sheet:
             kept[number] = not all(comment.inline for comment in note.comments)
         elif note.ends_line and number < count and read.symbols[number] in ("and", "or"):
             kept[number] = 1
-    held = _hold(read, notes, ended, kept)
+    held = _held_gaps(read, notes, ended, kept)
     for opening, close in pairs.items():
-        _within(read, opening, close, kinds[opening], words, gaps, notes, ended, kept, held)
+        _settle_brackets(read, opening, close, kinds[opening], words, gaps, notes, ended, kept, held)
     for number, note in notes.items():
         if 0 < number < count and note.comments and all(comment.inline for comment in note.comments):
             inside = " ".join(comment.text for comment in note.comments)
@@ -92,12 +171,12 @@ def sheet(read: Read) -> Sheet:
     gaps[:1] = [""] * min(1, count)
     written = [part for pair in zip(gaps, words, strict=True) for part in pair]
     places = list(accumulate(map(len, written), initial=0))
-    return Sheet(
+    return TokenSheet(
         read, gaps, written, places, pairs, kinds, notes, list(accumulate(ended)), list(accumulate(kept)), held
     )
 
 
-def _gaps(read: Read) -> list[str]:
+def _gaps(read: TokenizedText) -> list[str]:
     """What stands before each token if nothing is between them but what the style asks for."""
     gaps: list[str] = []
     before = last = ""
@@ -124,7 +203,7 @@ def _gaps(read: Read) -> list[str]:
     return gaps
 
 
-def _brackets(read: Read) -> tuple[dict[int, int], dict[int, str]]:
+def _brackets(read: TokenizedText) -> tuple[dict[int, int], dict[int, str]]:
     """The closing bracket of each opening one, and what they enclose; inner ones first."""
     pairs: dict[int, int] = {}
     kinds: dict[int, str] = {}
@@ -143,14 +222,14 @@ def _brackets(read: Read) -> tuple[dict[int, int], dict[int, str]]:
     return pairs, kinds
 
 
-def _within(
-    read: Read,
+def _settle_brackets(
+    read: TokenizedText,
     opening: int,
     close: int,
     kind: str,
     words: list[str],
     gaps: list[str],
-    notes: dict[int, Gap],
+    notes: dict[int, TokenGap],
     ended: list[int],
     kept: list[int],
     held: set[int],
@@ -165,18 +244,14 @@ def _within(
     elif kind is BLOCK and any(ended[opening + 1 : close + 1]):
         kept[opening + 1] |= close > opening + 1 or bool(notes[close].comments)
     last = close - 1
-    if (
-        kind is LIST
-        and read.symbols[last] == ","
-        and not any(notes.get(at, NO_COMMENTS).comments for at in (last, close))
-    ):
+    if kind is LIST and read.symbols[last] == "," and not any(notes.get(at, NO_GAP).comments for at in (last, close)):
         words[last] = gaps[last] = ""
         if kept[last]:  # it began a line that is held
             kept[close] = 1
             held.discard(close)
 
 
-def _hold(read: Read, notes: dict[int, Gap], ended: list[int], kept: list[int]) -> set[int]:
+def _held_gaps(read: TokenizedText, notes: dict[int, TokenGap], ended: list[int], kept: list[int]) -> set[int]:
     """Gaps on the lines that an ignore speaks of; such a line also begins and ends where it did."""
     count, held = len(read.words), set[int]()
     ignoring = [number for number, note in notes.items() if any(each.ignores for each in note.comments)]

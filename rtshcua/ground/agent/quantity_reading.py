@@ -1,7 +1,7 @@
-"""What a text says that is no quantity of the language, but nearly one: `25 meters`, `82 ft`, `+25 m`, `25,0 m`.
+"""Reads quantities that the language does not accept, to advise the agent: `25 meters`, `82 ft`, `+25 m`, `25,0 m`.
 
-Only for advice. Nothing is flown by what is read here: an agent is told how the language writes the same value, or why
-a text says none that can be asked for.
+Nothing is flown by what is read here: an agent is told how the language writes the same value, or why it cannot be
+told.
 """
 
 import re
@@ -9,7 +9,7 @@ import unicodedata
 from fractions import Fraction
 from typing import Final, NamedTuple
 
-from rtshcua.ground.agent.patterns import unit_of
+from rtshcua.ground.agent.value_patterns import unit_of
 from rtshcua.ground.language.build.number_findings import MEANT
 from rtshcua.model.quantity import UNITS, Dimension
 
@@ -40,7 +40,7 @@ _MINUS = "\u2010\u2011\u2012\u2013\u2212\ufe63"
 _WIDE, _WIDE_END, _FROM_ASCII = 0xFF01, 0xFF5E, 0xFEE0
 
 
-class Said(NamedTuple):
+class ReadQuantity(NamedTuple):
     """A value in the canonical unit of the dimension that is asked, None where none can be told; `why` says what is not
     as the language has it, empty where nothing is.
     """
@@ -49,36 +49,38 @@ class Said(NamedTuple):
     why: str
 
 
-def said(text: str, dimension: Dimension) -> Said:
+def read_quantity(text: str, dimension: Dimension) -> ReadQuantity:
     """What a text says where a quantity of a dimension is asked."""
     unit = unit_of(dimension)
     plain = " ".join(_ascii(text).split())
     found = _NUMBER.fullmatch(plain)
     if found is None:
-        return Said(None, f"this is no number with a unit, such as `{f'20 {unit}'.rstrip()}`")
+        return ReadQuantity(None, f"this is no number with a unit, such as `{f'20 {unit}'.rstrip()}`")
     sign, number, exponent, rest = found.groups()
     if re.fullmatch(r"[0-9_]+,[0-9]{3}", number):
-        return Said(None, f"`{number}` can be read in two ways: use a decimal point, and `_` between groups of digits")
+        return ReadQuantity(
+            None, f"`{number}` can be read in two ways: use a decimal point, and `_` between groups of digits"
+        )
     value = Fraction(number.replace(",", ".").replace("_", "")) * (-1 if sign == "-" else 1)
     value *= Fraction(10) ** int(exponent or 0)
-    written, datum = _apart(rest or "")
+    written, datum = _unit_and_datum(rest or "")
     if datum in _GROUND or datum in _SEA:
         above = "ground" if datum in _GROUND else "sea"
-        return Said(None, f"this is a height above {above}, and one above home is asked")
+        return ReadQuantity(None, f"this is a height above {above}, and one above home is asked")
     if not written:
-        why = f"`{number}` has no unit: write it so if {_named(dimension)} are meant" if unit else ""
-        return Said(value * (UNITS[unit].numerator if unit else 1), why)
+        why = f"`{number}` has no unit: write it so if {_unit_in_words(dimension)} are meant" if unit else ""
+        return ReadQuantity(value * (UNITS[unit].numerator if unit else 1), why)
     known = _unit(written)
     if known is None:
-        return Said(None, f"`{written}` is no unit known here")
+        return ReadQuantity(None, f"`{written}` is no unit known here")
     asked = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
     if known[0] is not asked:
-        return Said(None, f"`{written}` is a unit of {known[0].value}, and {dimension.value} is asked")
+        return ReadQuantity(None, f"`{written}` is a unit of {known[0].value}, and {dimension.value} is asked")
     value *= known[1]
     if written in UNITS:
         usual = plain == text.strip() and sign != "+" and exponent is None and "," not in number and not datum
-        return Said(value, "" if usual else "this is how the language writes the same value")
-    return Said(value, f"`{written}` is no unit here, and {plain} is {decimal(value, dimension)}")
+        return ReadQuantity(value, "" if usual else "this is how the language writes the same value")
+    return ReadQuantity(value, f"`{written}` is no unit here, and {plain} is {decimal(value, dimension)}")
 
 
 def _ascii(text: str) -> str:
@@ -98,7 +100,7 @@ def _plain(character: str) -> str:
     return character
 
 
-def _apart(rest: str) -> tuple[str, str]:
+def _unit_and_datum(rest: str) -> tuple[str, str]:
     """The unit, as the tables write it, and what a height counts from."""
     folded = rest.casefold()
     datum = next((each for each in (*_GROUND, *_SEA, *_HOME) if folded == each or folded.endswith(f" {each}")), "")
@@ -118,7 +120,7 @@ def _unit(written: str) -> tuple[Dimension, Fraction] | None:
     return None
 
 
-def _named(dimension: Dimension) -> str:
+def _unit_in_words(dimension: Dimension) -> str:
     """The unit that is asked, in words."""
     unit = unit_of(dimension)
     words = {"m": "metres", "m/s": "metres a second", "s": "seconds", "%": "per cent", "deg": "degrees", "V": "volts"}

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtshcua.ground.project.patterns import matches
+from rtshcua.ground.project.file_patterns import matches
 from virtual.rows import rows
 
 _PART = st.text("ab*?", min_size=1, max_size=4)

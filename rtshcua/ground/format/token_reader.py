@@ -1,7 +1,7 @@
-"""Reads a text by the parser's own table, and keeps what the parser throws away: where each token and each item is.
+"""Reads the tokens and items of a text by the parser's table, without building anything.
 
-The automaton of `language` hands the parts of a rule to the builder; here nothing is built, so that reading twice costs
-less than parsing once. The table and its lexers are the same, so both agree on what a token is.
+The table and its lexers are those of the parser, so both agree on what a token is; reading twice costs less than
+parsing once.
 """
 
 from functools import cache
@@ -14,14 +14,14 @@ from rtshcua.ground.language.table import END, table
 SPACED = frozenset({"<LOCAL_TIME>", "<_ONE_OF>", "<_ON_INADMISSIBLE>", "<_AT_CLAUSE>"})
 
 
-class Item(NamedTuple):
+class ItemRange(NamedTuple):
     """An item, as `deadline 2 s`: the action of its rule, and the number of the token after its last."""
 
     action: str
     end: int
 
 
-class Read(NamedTuple):
+class TokenizedText(NamedTuple):
     """The tokens of a text, by their number: offsets, what is written, and the symbol that the parser took each for.
 
     `items` has those of the rules in `style.ITEMS`, by their first token; of two that begin there the larger. `rules`
@@ -34,7 +34,7 @@ class Read(NamedTuple):
     ends: list[int]
     words: list[str]
     symbols: list[str]
-    items: dict[int, Item]
+    items: dict[int, ItemRange]
     rules: list[int]
 
     @property
@@ -50,7 +50,7 @@ class Read(NamedTuple):
         return deepest
 
 
-class _Step(NamedTuple):
+class _Reduction(NamedTuple):
     """What a reduction does here: `tag` stands for the rule, `item` is its action where it is an item."""
 
     origin: str
@@ -60,7 +60,7 @@ class _Step(NamedTuple):
 
 
 @cache
-def _steps() -> tuple[_Step, ...]:
+def _reductions() -> tuple[_Reduction, ...]:
     """For each rule of the table its step.
 
     Rules with one action that keep the same parts differ in an optional comma alone, and share their tag. What only
@@ -72,17 +72,17 @@ def _steps() -> tuple[_Step, ...]:
         tag = tags.setdefault((rule.origin, rule.action, rule.kept), len(tags))
         passes = rule.length == 1 and not rule.action and not rule.repeats
         made.append(
-            _Step(rule.origin, rule.length, None if passes else tag, rule.action if rule.action in ITEMS else None)
+            _Reduction(rule.origin, rule.length, None if passes else tag, rule.action if rule.action in ITEMS else None)
         )
     return tuple(made)
 
 
-def read(text: str) -> Read | None:
+def read(text: str) -> TokenizedText | None:
     """The text's tokens; None where the parser does not take it."""
     known = table()
-    rows, lexers, last, steps = known.rows, known.lexers, known.end, _steps()
+    rows, lexers, last, steps = known.rows, known.lexers, known.end, _reductions()
     starts, ends, words, symbols = list[int](), list[int](), list[str](), list[str]()
-    items: dict[int, Item] = {}
+    items: dict[int, ItemRange] = {}
     rules: list[int] = []
     states, firsts = [0], [0]  # `firsts` has the first token of what each state stands for
     start = end = group = 1 if text.startswith("\ufeff") else 0
@@ -121,14 +121,14 @@ def read(text: str) -> Read | None:
             if tag is not None:
                 rules.append(tag)
                 if item is not None:
-                    items[firsts[-1]] = Item(item, len(words))
+                    items[firsts[-1]] = ItemRange(item, len(words))
             state = rows[states[-1]][origin]
             states.append(state)
             if word is END and state == last:
-                return Read(text, starts, ends, _single(words, symbols), symbols, items, rules)
+                return TokenizedText(text, starts, ends, _with_single_spaces(words, symbols), symbols, items, rules)
 
 
-def _single(words: list[str], symbols: list[str]) -> list[str]:
+def _with_single_spaces(words: list[str], symbols: list[str]) -> list[str]:
     """The words, with single spaces in those that have any."""
     for number in [number for number, symbol in enumerate(symbols) if symbol in SPACED]:
         words[number] = " ".join(words[number].split())

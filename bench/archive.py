@@ -27,11 +27,11 @@ import duckdb
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference import generated_logs
-from rtshcua.adapters.archive.adding import Check, Done, add, verify
-from rtshcua.adapters.archive.asking import Asker, Conditions, canned
-from rtshcua.adapters.archive.entry import RECORDS, Examined
-from rtshcua.adapters.archive.examine import Processes, Task
-from rtshcua.adapters.archive.folder import Folder, Source
+from rtshcua.adapters.archive.adding import Done, VerificationOptions, add, verify
+from rtshcua.adapters.archive.asking import ArchiveReader, DecisionQuery, canned
+from rtshcua.adapters.archive.entry import RECORDS, VerifiedLog
+from rtshcua.adapters.archive.examine import Task, VerifierProcesses
+from rtshcua.adapters.archive.folder import ArchiveFolder, LogSource
 
 FLIGHTS = 20
 VEHICLES, EACH = 10, 5_000  # records of a log
@@ -91,23 +91,23 @@ def spent() -> Cost:
     return Cost(perf_counter(), others.ru_utime + others.ru_stime, own.ru_utime + own.ru_stime)
 
 
-class Timed(Processes):
+class Timed(VerifierProcesses):
     """Processes that verify, and how many seconds on the clock they were waited for."""
 
     waited = 0.0
 
-    def examine(self, tasks: Sequence[Task]) -> Iterator[Examined]:
+    def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
         start = perf_counter()
         done = list(super().examine(tasks))
         self.waited += perf_counter() - start
         return iter(done)
 
 
-def checked(work: Callable[[Check], Iterator[Done]], jobs: int) -> tuple[Cost, Cost]:
+def checked(work: Callable[[VerificationOptions], Iterator[Done]], jobs: int) -> tuple[Cost, Cost]:
     """What it costs, and what the verification in it does, by so many processes; if what comes of it is what should."""
     start = spent()
     with closing(Timed(jobs)) as workers:
-        done = list(work(Check(generated_logs.ROOT_KEY, RECORDS, 0, workers)))
+        done = list(work(VerificationOptions(generated_logs.ROOT_KEY, RECORDS, 0, workers)))
     cost = start.since()
     counts = Counter(each.entry.status for each in done)
     unclosed = (len(done) + 1) // 100
@@ -136,15 +136,15 @@ def without_index(logs: list[Path]) -> Cost:
     return start.since()
 
 
-def ask(folder: Folder, unindexed: Cost) -> bool:
+def ask(folder: ArchiveFolder, unindexed: Cost) -> bool:
     """Asks every question that ships; whether one took too long."""
     slow = False
-    questions = [(each.name, each.sql, Conditions()) for each in canned().values()]
-    some = Conditions(vehicle="quad-07", skill="goto", reason="state", policy_version=8)
+    questions = [(each.name, each.sql, DecisionQuery()) for each in canned().values()]
+    some = DecisionQuery(vehicle="quad-07", skill="goto", reason="state", policy_version=8)
     questions.append(("refused, of one vehicle, skill, reason and version", canned()["refused"].sql, some))
     for name, sql, conditions in questions:
         start = spent()
-        asker = Asker(folder, conditions)
+        asker = ArchiveReader(folder, conditions)
         rows = asker.ask(sql).rows
         asker.close()
         cost = start.since()
@@ -170,7 +170,7 @@ def main() -> int:
         took = f"generated in {start.since().clock:.0f} s"
         print(f"archive: {len(logs)} logs, {records} records, {size >> 20} MiB, {took}")
         peer = hashing(logs)
-        folder = Folder(Path(name) / "archive", make=True)
+        folder = ArchiveFolder(Path(name) / "archive", make=True)
 
         def told(what: str, cost: Cost, limit: float) -> bool:
             ratio = cost.cpu / peer.cpu
@@ -181,7 +181,7 @@ def main() -> int:
             )
             return ratio > limit
 
-        added, verified = checked(lambda check: add(folder, map(Source, logs), check), max(2, CORES))
+        added, verified = checked(lambda check: add(folder, map(LogSource, logs), check), max(2, CORES))
         failed |= told("add, verified and indexed", added, ADD_LIMIT)
         failed |= told("verification in it", verified, VERIFY_LIMIT)
         if not whole:

@@ -23,7 +23,7 @@ from rtshcua.adapters.boundary_process import BoundaryProcess
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import CONTINGENCY_LINK
 from rtshcua.wire.response import decode
@@ -42,7 +42,8 @@ Blocks = list[list[float]]
 def isolated(caller: Caller, bundle: bytes) -> Loaded:
     """The bundle in force in the process that this calls."""
     found = load(
-        bundle, root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=bytes(32), flight=bytes(16),
+        bundle, root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.PROCESS, session_key=bytes(32),
+        flight=bytes(16),
         peer_is_own_simulator=False, caller=caller,
     )  # fmt: skip
     assert isinstance(found, Loaded), found

@@ -23,7 +23,7 @@ import rtshcua.virtual.flight as flights
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.isolated import Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import BoundaryKey, Ending
 from rtshcua.wire.keys import Duty
 from virtual import case
@@ -73,7 +73,7 @@ def fly(number: int, issued_us: int, state: Path) -> Used:
         return process.call(octets)
 
     def loaded(data: bytes, **given: Any) -> Loaded | Refusal:
-        return load(data, **{**given, "mode": Mode.PROCESS, "caller": Caller(call)})
+        return load(data, **{**given, "mode": EnforcementMode.PROCESS, "caller": Caller(call)})
 
     kept = kept_file(state, VEHICLE)
     try:

@@ -34,7 +34,7 @@ from rtshcua.adapters.boundary_process import BoundaryProcess
 from rtshcua.app.fly.agents import Agents
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.wire.document import MAX_DOCUMENT
 
 LIMIT = 1.2
@@ -178,7 +178,8 @@ def in_process(folder: Path) -> Iterator[Loaded]:
     process = BoundaryProcess(ROOT.sign(ROOT_KEY), PIN, VEHICLE, folder, paced=True)
     try:
         of = load(
-            sealed_again(loaded(mission=low_mission())), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS,
+            sealed_again(loaded(mission=low_mission())), root=ROOT, vehicle=VEHICLE, now=START,
+            mode=EnforcementMode.PROCESS,
             session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False, caller=Caller(process.call),
         )  # fmt: skip
         assert isinstance(of, Loaded), of

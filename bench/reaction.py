@@ -43,7 +43,7 @@ from rtshcua.app.fly.watching import Watching
 from rtshcua.codec.frames import Codec
 from rtshcua.front.cli.live.feed import Feed
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 from virtual.flight import Flight
 from virtual.shipped import shipped, simulated
 
@@ -138,7 +138,7 @@ def under_way() -> Flight:
     while True:
         assert flight.loop.turn() is None
         view = flight.runtime.view(flight.clock.now())
-        if view.stage is Stage.RUNNING and view.step == STEP:
+        if view.stage is RunStage.RUNNING and view.step == STEP:
             return flight
 
 

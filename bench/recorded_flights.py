@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from recorded.flown import Recorded, at_home, command, shipped_policy
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import AirState, Failed, Ready, Succeeded, TakenOver
+from rtshcua.onboard.ports import AirState, CommandFailed, Ready, Succeeded, TakenOver
 
 LIMIT_S = 2.0
 
@@ -91,7 +91,7 @@ def main() -> int:
         ("landed and disarmed", 158.0, copter.of(AirState)[-1][0]),
     ])  # fmt: skip
     done = {event.token: at for at, event in px4.of(Succeeded) if isinstance(event, Succeeded)}
-    unanswered = [event.reason for _, event in px4.of(Failed) if isinstance(event, Failed)]
+    unanswered = [event.reason for _, event in px4.of(CommandFailed) if isinstance(event, CommandFailed)]
     wrong += moments(px4, [
         ("ready", 5.6, px4.first(Ready)),
         ("takeoff done, when the recorded client went on", 26.9, done[1]),

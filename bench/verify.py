@@ -23,12 +23,12 @@ from msgspec.structs import replace
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from reference import flat_case as flat
-from rtshcua.adapters.store.verification import Asked, verify_carefully, verify_quickly
+from rtshcua.adapters.store.verification import VerificationInputs, verify_carefully, verify_quickly
 from rtshcua.decision.decide import decide
 from rtshcua.decision.durability import durability_of
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Audit
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
@@ -43,7 +43,7 @@ FAST, QUICK, READ = 1.3, 6.5, 14.0  # times the digest of the file, in one proce
 DERIVED = 20_000  # records a second
 
 LOG_KEY = case.KEYS[Duty.LOG]
-ASKED = Asked(case.KEYS[Duty.ROOT].public)
+ASKED = VerificationInputs(case.KEYS[Duty.ROOT].public)
 BUNDLE = case.seal(case.mission(case.short_steps()))
 STEP_US = 700  # between two records
 
@@ -101,7 +101,7 @@ def seconds(work: Callable[[], Audit | str]) -> tuple[float, float]:
     start, clock = process_time(), perf_counter()
     done = work()
     took = process_time() - start, perf_counter() - clock
-    assert isinstance(done, str) or done.report.verdict is Verdict.VERIFIED, (
+    assert isinstance(done, str) or done.report.verdict is LogVerdict.VERIFIED, (
         done.report.failure or done.report.shortfall
     )
     return took

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference.witnessed import WITNESSES, Judge, Log
 from rtshcua.evidence.witnessing.submission import Submission, Survey, survey
-from rtshcua.evidence.witnessing.witness import Request, decode
+from rtshcua.evidence.witnessing.witness import CosignRequest, decode
 from rtshcua.wire.keys import Duty
 
 EPOCHS, RECORDS, BLOCKS = 40, 1_024, 5
@@ -62,7 +62,7 @@ def main() -> int:
         witness = Judge()
         for data in requests:
             request = decode(data)
-            assert isinstance(request, Request)
+            assert isinstance(request, CosignRequest)
             assert isinstance(witness.consider(request), str)
 
     key, data = WITNESSES[0], bytes(300)

@@ -416,7 +416,7 @@ def _answers(path: Path) -> bool:
 # -------------------------------------------------------------------------------- the end of who hands in
 
 
-class Answered(NamedTuple):
+class FlightReply(NamedTuple):
     """What the flight said: `accepted`, or why not, and a text for a person."""
 
     slug: str
@@ -440,11 +440,11 @@ _FLIGHT = re.compile(rf"[0-9a-f]{{{2 * FLIGHT_BYTES}}}")
 LONGEST_TOLD: Final = 16 << 20
 
 
-def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> Answered:
+def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> FlightReply:
     """Hand a document to the flight that listens at `path`. Raises OSError, TimeoutError without an answer."""
     line = msgspec.json.encode({"id": _NUMBER, "document": b64encode(document).decode()}) + b"\n"
     said = _asked(path, line, lambda said: said.type == "answer" and said.id in (0, _NUMBER), patience_s)
-    return Answered(said.slug, said.text)
+    return FlightReply(said.slug, said.text)
 
 
 def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
@@ -528,7 +528,7 @@ class FlightFollower:
                 return lines
         raise TimeoutError("the flight did not say which one it is")
 
-    def receive(self) -> list[bytes | Answered] | None:
+    def receive(self) -> list[bytes | FlightReply] | None:
         """What came: records as their lines, and answers; None where the flight hung up. Raises OSError for a peer that
         says what no flight says.
         """
@@ -543,10 +543,10 @@ class FlightFollower:
             if not chunk:
                 return None
             lines = self._lines.take(chunk)
-        found: list[bytes | Answered] = []
+        found: list[bytes | FlightReply] = []
         for line in lines:
             said = _told(line)
-            found.append(Answered(said.slug, said.text) if said.type == "answer" else line + b"\n")
+            found.append(FlightReply(said.slug, said.text) if said.type == "answer" else line + b"\n")
         return found
 
     def hand_in(self, document: bytes) -> None:

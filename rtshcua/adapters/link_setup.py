@@ -17,11 +17,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.transport import Transport
-from rtshcua.codec.frames import Codec, Received, is_addressed
+from rtshcua.codec.frames import Codec, ReceivedFrame, is_addressed
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, is_vehicle
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 
 _AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
 _OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
@@ -108,7 +108,7 @@ class LinkSetup:
         """`system` names one of several vehicles; `begins`: the transport may be spoken to first."""
         self.result: SetUp | Refusal | None = None
         self._key = key
-        self._link = SignedLink(key, State(0, {}), utc_us, now_us)
+        self._link = SignedLink(key, SigningState(0, {}), utc_us, now_us)
         self._wanted = system
         self._begins = begins
         self._codec = Codec(0, 0)
@@ -157,7 +157,7 @@ class LinkSetup:
 
     # ---------------------------------------------------------------- what is heard
 
-    def _hear(self, frame: Received) -> None:
+    def _hear(self, frame: ReceivedFrame) -> None:
         message = frame.message
         if _is_autopilot(frame):
             self._meet(frame)
@@ -183,7 +183,7 @@ class LinkSetup:
         """Another ground station may ask for messages, too."""
         return is_addressed(message, self._system, _OURS)
 
-    def _meet(self, frame: Received) -> None:
+    def _meet(self, frame: ReceivedFrame) -> None:
         if self._wanted is not None and frame.system != self._wanted:
             return
         if not self._system:
@@ -328,7 +328,7 @@ def _kind(heartbeat: Any) -> tuple[int, int]:
     return heartbeat.type, heartbeat.autopilot
 
 
-def _is_autopilot(frame: Received) -> bool:
+def _is_autopilot(frame: ReceivedFrame) -> bool:
     beats = frame.name == "HEARTBEAT" and frame.component == _AUTOPILOT
     return beats and is_vehicle(frame.message.type, frame.message.autopilot)
 

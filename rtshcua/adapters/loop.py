@@ -174,4 +174,4 @@ class RunLoop:
 
     def _refuse(self, command: Command, reason: str) -> None:
         self._held = None
-        self._answers.append(ports.Failed(self._clock.now().monotonic_us, command.token, reason))
+        self._answers.append(ports.CommandFailed(self._clock.now().monotonic_us, command.token, reason))

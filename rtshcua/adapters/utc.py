@@ -14,7 +14,7 @@ from rtshcua.adapters.clock import UTC_ERROR_US, LinkClock
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.isolated import OwnTime
-from rtshcua.wire.clock import AUTOPILOT_US, DRIFT_US, STAMP_US, Source
+from rtshcua.wire.clock import AUTOPILOT_US, DRIFT_US, STAMP_US, ClockSource
 
 #: the effect that says in the log where the bound came from
 CLOCK: Final = "clock"
@@ -81,7 +81,7 @@ def vehicle_counts(*, apart: bool, keyed: bool) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class TimeOfDay:
+class TimeSources:
     """What a run would take the time of day from: what this machine's is off by at most, in us, None where the kernel
     does not say; whether the vehicle's own would count; what the operator stated; whether a boundary that listens
     decides, in whose command line that stands.
@@ -138,14 +138,14 @@ class UtcWatch:
         asked whether no more is waited for. One that has no clock of its own changes nothing.
         """
         said = own(False)
-        if said is None or said.source is Source.SHARED:
+        if said is None or said.source is ClockSource.SHARED:
             return
         self._own = own
         if self.bound.source != _SIMULATED:
             self._clock.bound_utc(UTC_UNKNOWN_US)
             self.bound = UtcBound("unknown", UTC_UNKNOWN_US)
             self._follow(said)
-        elif (said := own(True)) is not None and said.source is not Source.UNKNOWN:  # as the boundary was told
+        elif (said := own(True)) is not None and said.source is not ClockSource.UNKNOWN:  # as the boundary was told
             self._take(_SIMULATED, said.now.utc_error_us, said.now.utc_us - said.now.monotonic_us)
 
     def question(self) -> int:
@@ -154,7 +154,7 @@ class UtcWatch:
         return 0 if said is None else said.number
 
     def _follow(self, said: OwnTime | None) -> bool:
-        if said is None or said.source is Source.UNKNOWN:
+        if said is None or said.source is ClockSource.UNKNOWN:
             return False
         self._take(said.source.name.lower(), said.now.utc_error_us, said.now.utc_us - said.now.monotonic_us)
         return True
@@ -172,7 +172,7 @@ class UtcWatch:
         if not (self.waits and self.vehicle_counts):
             return False
         said = None if self._own is None else self._own(False)
-        return self._own is None or (said is not None and (said.number != 0 or said.source is not Source.UNKNOWN))
+        return self._own is None or (said is not None and (said.number != 0 or said.source is not ClockSource.UNKNOWN))
 
     def look(self, told: SourceTime, flavour: str, now_us: int) -> bool:
         """Take the vehicle's own time, if it is needed and told. Whether it was taken."""

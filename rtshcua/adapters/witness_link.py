@@ -20,19 +20,19 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.store.logs import add_anchors, anchors_path
 from rtshcua.adapters.store.reading import open_regular
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.codec.tunnel import Assembler, Whole, answer_name, messages, name_of
 from rtshcua.evidence.witnessing.submission import Submission, anchor
-from rtshcua.evidence.witnessing.witness import (
+from rtshcua.evidence.witnessing.witness import (  # fmt: skip
     CONFLICT,
     MALFORMED,
     OK,
-    Answer,
+    CosignRequest,
     Declined,
-    Request,
+    WitnessResponse,
     decode,
     decode_answer,
-)  # fmt: skip
+)
 from rtshcua.onboard.enforcement.frames import OURS
 
 #: kinds of messages in the tunnel
@@ -58,9 +58,9 @@ _MOST_WORDS: Final = 200
 #: what we call ourselves on the witnesses' link
 _SYSTEM: Final = 1
 
-Consider = Callable[[Request], Answer | Declined]
+Consider = Callable[[CosignRequest], WitnessResponse | Declined]
 Address = tuple[str, int]
-_Heard = tuple[Received, Whole, Address]
+_Heard = tuple[ReceivedFrame, Whole, Address]
 
 
 class _Tunnel:
@@ -153,7 +153,7 @@ class Anchor(NamedTuple):
     note: str
 
 
-class Trouble(NamedTuple):
+class WitnessTrouble(NamedTuple):
     """What an operator should know of a witness; told once."""
 
     text: str
@@ -165,7 +165,7 @@ class _Peer:
     def __init__(self, address: Address) -> None:
         self.address = address
         self.known: int | None = None
-        self.asked: Request | None = None
+        self.asked: CosignRequest | None = None
         self.name = b""
         self.due_s = 0.0
         self.wait_s = AGAIN_S
@@ -197,17 +197,17 @@ class WitnessClient:
         self._peers = [_Peer(address) for address in addresses]
         self._submission = Submission()
         self._offset = 0
-        self._news: SimpleQueue[Anchor | Trouble] = SimpleQueue()
+        self._news: SimpleQueue[Anchor | WitnessTrouble] = SimpleQueue()
         self._over = Event()
         self._until_s = 0.0
         self._thread = Thread(target=self._run, name="witnesses", daemon=True)
         self._thread.start()
 
-    def news(self) -> list[Anchor | Trouble]:
+    def news(self) -> list[Anchor | WitnessTrouble]:
         """What came since the last call; never waits."""
         return [self._news.get_nowait() for _ in range(self._news.qsize())]  # nobody else takes from it
 
-    def finish(self, last_s: float = LAST_S) -> list[Trouble]:
+    def finish(self, last_s: float = LAST_S) -> list[WitnessTrouble]:
         """The log is closed, or nothing more comes: wait up to so long for the witnesses to cosign its end.
 
         What they cosigned and no record holds is put beside the log. Gives what went wrong.
@@ -219,16 +219,20 @@ class WitnessClient:
             self._tunnel.close()
             self._file.close()
         news = self.news()
-        troubles = [each for each in news if isinstance(each, Trouble)]
+        troubles = [each for each in news if isinstance(each, WitnessTrouble)]
         anchors = [each.note for each in news if isinstance(each, Anchor)]
         try:
             if anchors:
                 add_anchors(anchors_path(self._log), anchors)
         except OSError as error:
-            troubles.append(Trouble(f"anchors of the log's end are not kept: {(error.strerror or str(error)).lower()}"))
+            troubles.append(
+                WitnessTrouble(f"anchors of the log's end are not kept: {(error.strerror or str(error)).lower()}")
+            )
         last = self._submission.last(self._submission.records)
         short = [peer for peer in self._peers if not peer.lost and (last is None or peer.anchored < last)]
-        return troubles + [Trouble(f"witness {_shown(peer)} did not cosign the end of the log") for peer in short]
+        return troubles + [
+            WitnessTrouble(f"witness {_shown(peer)} did not cosign the end of the log") for peer in short
+        ]
 
     # -------------------------------------------------------- in the thread
 
@@ -247,7 +251,7 @@ class WitnessClient:
                         self._ask(peer, now_s)
                 self._hear()
         except Exception as error:  # noqa: BLE001  a thread that dies in silence would leave the log without witnesses
-            self._news.put(Trouble(f"witnesses are not asked any more: {error}"))
+            self._news.put(WitnessTrouble(f"witnesses are not asked any more: {error}"))
 
     def _done(self) -> bool:
         """Whether every witness cosigned the last checkpoint of the whole file."""
@@ -276,7 +280,7 @@ class WitnessClient:
         peer.heard = peer.heard and peer.wait_s < LONGEST_S
         self._tunnel.send(REQUEST, peer.name, data, peer.address)
 
-    def _wanted(self, peer: _Peer) -> Request | None:
+    def _wanted(self, peer: _Peer) -> CosignRequest | None:
         """What to ask of it, if anything: what lies ahead, and before that whether it is there, and where it stands."""
         records = min(self._synced(), self._submission.records)
         request = self._submission.request(peer.known, records)
@@ -296,7 +300,7 @@ class WitnessClient:
                     if answer is not None:
                         self._answered(peer, peer.asked, answer)
 
-    def _answered(self, peer: _Peer, asked: Request, answer: Answer) -> None:
+    def _answered(self, peer: _Peer, asked: CosignRequest, answer: WitnessResponse) -> None:
         peer.asked, peer.heard, peer.wait_s, peer.due_s = None, True, AGAIN_S, 0.0
         if answer.status == OK:
             self._cosigned(peer, asked, answer)
@@ -307,7 +311,7 @@ class WitnessClient:
             words = "".join(letter if letter.isprintable() else " " for letter in answer.body[:_MOST_WORDS])
             self._tell(peer, f"refuses to cosign: {words.strip()}")
 
-    def _cosigned(self, peer: _Peer, asked: Request, answer: Answer) -> None:
+    def _cosigned(self, peer: _Peer, asked: CosignRequest, answer: WitnessResponse) -> None:
         mark = anchor(asked.note, answer.body, self._witnesses)
         if mark is None:
             peer.due_s = time.monotonic() + LONGEST_S
@@ -318,7 +322,7 @@ class WitnessClient:
             peer.anchored = peer.known
             self._news.put(Anchor(mark))
 
-    def _conflict(self, peer: _Peer, asked: Request, size: int) -> None:
+    def _conflict(self, peer: _Peer, asked: CosignRequest, size: int) -> None:
         if size == 0 and asked.old:
             peer.known = None  # it has forgotten
         elif size != asked.old and self._submission.has(size):
@@ -330,7 +334,7 @@ class WitnessClient:
     def _tell(self, peer: _Peer, text: str) -> None:
         if text not in peer.told:
             peer.told.add(text)
-            self._news.put(Trouble(f"witness {_shown(peer)} {text}"))
+            self._news.put(WitnessTrouble(f"witness {_shown(peer)} {text}"))
 
 
 def _shown(peer: _Peer) -> str:

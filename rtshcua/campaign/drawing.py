@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode, Voice, Way
+from rtshcua.model.faults import Direction, Fault, FlightMode, Voice
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import AfterStep, AtTime, Incident, Scenario, Start, When
@@ -139,7 +139,7 @@ MESSAGES: Final = (
     "GLOBAL_POSITION_INT", "HEARTBEAT", "SYS_STATUS", "BATTERY_STATUS", "GPS_RAW_INT", "EXTENDED_SYS_STATE",
     "POSITION_TARGET_GLOBAL_INT", "DISTANCE_SENSOR", "RADIO_STATUS", "COMMAND_ACK", "TIMESYNC", "ATTITUDE",
 )  # fmt: skip
-_MODES: Final = tuple(Mode)
+_MODES: Final = tuple(FlightMode)
 _LASTS_FOR_GOOD: Final = 0.15  # how often what may last for good does
 
 
@@ -292,7 +292,7 @@ def _fault(chance: Random, kind: type[Fault], space: Space) -> Fault:
 
 def _value(chance: Random, kind: type[Fault], name: str, space: Space) -> object:
     if name == "way":
-        return chance.choice((Way.BOTH, Way.BOTH, Way.UP, Way.DOWN))
+        return chance.choice((Direction.BOTH, Direction.BOTH, Direction.UP, Direction.DOWN))
     if name == "held":
         return chance.random() < 0.25
     if name == "says":

@@ -9,7 +9,7 @@ from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Decision
+from rtshcua.evidence.records import DecisionRecord
 from rtshcua.ground.testing.clause_coverage import ReachedGoals, reached_goals
 from rtshcua.ground.testing.coverage_goals import universe_of
 from rtshcua.ground.testing.reporting import JUDGED, FlightFailure, FlightResult
@@ -93,7 +93,7 @@ def _reached(was: ScenarioFlown) -> Iterator[ReachedGoals]:
     for life in was.lives:
         for line in life.lines:
             record = read(line)
-            if isinstance(record, Flaw) or not isinstance(record, Decision) or record.kind != STEP:
+            if isinstance(record, Flaw) or not isinstance(record, DecisionRecord) or record.kind != STEP:
                 continue
             if record.step < len(invocations):
                 invocation = invocations[record.step]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 
-from rtshcua.model.faults import KINDS, Fault, Parameter, parameters
+from rtshcua.model.faults import KINDS, Fault, FaultField, parameters
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.model.scenario import AfterStep, AtTime, OnCondition, Scenario, Start, When
 
@@ -54,7 +54,7 @@ def fault_text(fault: Fault) -> str:
     return f"{_NAMES[type(fault)]}({', '.join(said)})"
 
 
-def _value(parameter: Parameter, value: object) -> str:
+def _value(parameter: FaultField, value: object) -> str:
     unit = parameter.unit
     if isinstance(value, bool):
         return "yes" if value else "no"

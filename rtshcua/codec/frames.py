@@ -1,7 +1,7 @@
 """MAVLink 2 messages to frames and back, over pymavlink's generated messages (never `mavutil`).
 
 What pymavlink's `decode` and `pack` do, prepared once for each kind of message. The message is of a class derived from
-pymavlink's own, with every field; its header is not filled in, for who sent it stands in `Received`.
+pymavlink's own, with every field; its header is not filled in, for who sent it stands in `ReceivedFrame`.
 
 Fast twin of pymavlink's codec. Goal: a flight in virtual time is at least 150 times as fast as life
 (bench/virtual_time.py); on a busy machine 52 times with it, 39 with pymavlink's two functions (docs/adr/0037).
@@ -27,7 +27,7 @@ from rtshcua.mavlink.framing import (
     message_id,
     octets_of_checksum,
 )
-from rtshcua.mavlink.signing import Verifier
+from rtshcua.mavlink.signing import FrameVerifier
 
 # pymavlink lets an environment variable switch the checksum off in its own decoder. Nobody here may use it so.
 ardupilotmega.MAVLINK_IGNORE_CRC = 0
@@ -45,7 +45,7 @@ def is_addressed(message: Message, system: int, component: int) -> bool:
     return getattr(message, "target_system", 0) in systems and getattr(message, "target_component", 0) in components
 
 
-class Kind(NamedTuple):
+class MessageKind(NamedTuple):
     """How messages of one number are decoded."""
 
     name: str
@@ -60,22 +60,22 @@ class Kind(NamedTuple):
     """The payload of a message, zeros at its end included; None where it holds texts."""
 
 
-_UNKNOWN = Kind("", b"", Struct(""), tuple, b"", None)
+_UNKNOWN = MessageKind("", b"", Struct(""), tuple, b"", None)
 """Of messages that the dialect does not have."""
 
-_met: dict[bytes, Kind] = {}  # the kinds of messages that came, by number: at most as many as the dialect has
+_met: dict[bytes, MessageKind] = {}  # the kinds of messages that came, by number: at most as many as the dialect has
 
 
 @lru_cache(maxsize=1024)  # more than the dialect has; a hostile link may name 2^24 numbers
-def kind_of(number: int) -> Kind | None:
+def kind_of(number: int) -> MessageKind | None:
     """The kind of a message; None for one that the dialect does not have."""
     of = ardupilotmega.mavlink_map.get(number)
     if of is None:
         return None
     extra, octets = bytes([of.crc_extra]), number.to_bytes(3, "little")
     if "char" in of.fieldtypes:
-        return Kind(of.msgname, extra, of.unpacker, _any(of), octets, None)
-    return Kind(of.msgname, extra, of.unpacker, _numbers(of), octets, _payload(of))
+        return MessageKind(of.msgname, extra, of.unpacker, _any(of), octets, None)
+    return MessageKind(of.msgname, extra, of.unpacker, _numbers(of), octets, _payload(of))
 
 
 def _function(text: str, **known: Any) -> Callable[..., Any]:
@@ -157,7 +157,7 @@ def _any(of: Any) -> Callable[..., Message]:
     return build
 
 
-class Received(NamedTuple):
+class ReceivedFrame(NamedTuple):
     """A good frame: its checksum is right and its message is of the dialect."""
 
     message: Message
@@ -184,7 +184,7 @@ class Codec:
     """
 
     def __init__(
-        self, system: int, component: int, only: Container[int] | None = None, verifier: Verifier | None = None
+        self, system: int, component: int, only: Container[int] | None = None, verifier: FrameVerifier | None = None
     ) -> None:
         self.damaged = 0
         self.refused = 0
@@ -213,7 +213,7 @@ class Codec:
         sender.seq = (sender.seq + 1) % 256
         return frame
 
-    def parse(self, datagram: bytes, now_us: int = 0) -> list[Received]:
+    def parse(self, datagram: bytes, now_us: int = 0) -> list[ReceivedFrame]:
         """The good frames in a datagram, in order; never raises, whatever the bytes.
 
         A frame does not span datagrams, so nothing is kept from one call to the next. The time is the verifier's.
@@ -222,7 +222,7 @@ class Codec:
         if received is not None:
             heeded = self._verifier is None and (only is None or received[2] in only)
             return [received] if heeded or self._lets_in(received, now_us) else []
-        good: list[Received] = []
+        good: list[ReceivedFrame] = []
         start, octets = 0, len(datagram)
         in_garbage = False
         while start < octets:
@@ -243,7 +243,7 @@ class Codec:
                 start, in_garbage = (next_marker if next_marker >= 0 else octets), True
         return good
 
-    def _lets_in(self, received: Received, now_us: int) -> bool:
+    def _lets_in(self, received: ReceivedFrame, now_us: int) -> bool:
         """Whether a good frame is of somebody who is listened to; counted if it is not."""
         if self._only is not None and received[2] not in self._only:
             self.foreign += 1
@@ -254,7 +254,7 @@ class Codec:
         return False
 
 
-def _decode(frame: bytes) -> Received | None:
+def _decode(frame: bytes) -> ReceivedFrame | None:
     """The good frame that these octets are, signed or not; None if they are anything else."""
     octets = len(frame)
     if octets < _LEAST or frame[0] != MARKER:
@@ -277,7 +277,7 @@ def _decode(frame: bytes) -> Received | None:
         message = build(*fields.unpack_from(frame, HEADER))
     else:
         message = build(*fields.unpack(frame[HEADER:end].ljust(size, b"\0")))  # zeros at the end are not sent
-    return _received(Received, (message, name, system, component, sequence, flags != 0, frame))
+    return _received(ReceivedFrame, (message, name, system, component, sequence, flags != 0, frame))
 
 
 def _frame_end(datagram: bytes, start: int) -> int:

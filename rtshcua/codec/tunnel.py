@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from rtshcua.codec.frames import Message, Received
+from rtshcua.codec.frames import Message, ReceivedFrame
 
 #: Ours. Numbers from 32768 on are nobody's, for use among parties that agree (MAV_TUNNEL_PAYLOAD_TYPE).
 PAYLOAD_TYPE: Final = 0xC05E
@@ -74,7 +74,7 @@ class Assembler:
         """How many messages are unfinished."""
         return len(self._open)
 
-    def take(self, sender: Hashable, received: Received) -> Whole | None:
+    def take(self, sender: Hashable, received: ReceivedFrame) -> Whole | None:
         """Take in a frame of a sender; gives the message that it completes, if it does."""
         message = received.message
         if received.name != "TUNNEL" or message.payload_type != PAYLOAD_TYPE:

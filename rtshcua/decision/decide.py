@@ -40,7 +40,7 @@ from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, TRUE, UNKNOWN, Sets,
 from rtshcua.model.decision import Decision, Decisive
 from rtshcua.model.flat.contract import Link, SourceKind, TimingClass
 from rtshcua.model.flat.policy import Rule
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 
 # an enumeration's attributes are slow to find
@@ -49,7 +49,7 @@ _ALLOW, _FALLBACK, _ADMITTED = Outcome.ALLOW, Outcome.FALLBACK, Reason.ADMITTED
 _PASSED_ALL = 8
 
 
-class Verdict(NamedTuple):
+class RuleVerdict(NamedTuple):
     """An outcome with its reason and the clause that decided."""
 
     outcome: Outcome
@@ -58,9 +58,9 @@ class Verdict(NamedTuple):
 
 
 #: Verdicts of a step in the order of the rule; `PASS`, if passing is possible, comes last.
-Found: TypeAlias = tuple[Verdict, ...]
+Found: TypeAlias = tuple[RuleVerdict, ...]
 
-PASS = Verdict(Outcome.ALLOW, Reason.ADMITTED, None)
+PASS = RuleVerdict(Outcome.ALLOW, Reason.ADMITTED, None)
 PASSED: Found = (PASS,)
 
 
@@ -125,7 +125,7 @@ def steps(
     yield 7, safety(invocation, at, exact)
 
 
-def concluded(verdicts: list[Verdict], doubt: Verdict | None, passes: bool) -> Found:
+def concluded(verdicts: list[RuleVerdict], doubt: RuleVerdict | None, passes: bool) -> Found:
     """The verdicts of a step, `doubt` after those that are certain of what they judge; it may also pass."""
     if doubt is not None:
         verdicts.append(doubt)
@@ -136,10 +136,10 @@ def concluded(verdicts: list[Verdict], doubt: Verdict | None, passes: bool) -> F
 
 # ---------------------------------------------------------------- 1: integrity
 
-_BINDING = (Verdict(Outcome.DENY, Reason.BINDING_MISMATCH, None),)
-_VEHICLE = (Verdict(Outcome.DENY, Reason.WRONG_VEHICLE, None),)
-_VERSION = (Verdict(Outcome.DENY, Reason.POLICY_VERSION, None),)
-_ARGUMENT = (Verdict(Outcome.DENY, Reason.ARGUMENT_RANGE, None),)
+_BINDING = (RuleVerdict(Outcome.DENY, Reason.BINDING_MISMATCH, None),)
+_VEHICLE = (RuleVerdict(Outcome.DENY, Reason.WRONG_VEHICLE, None),)
+_VERSION = (RuleVerdict(Outcome.DENY, Reason.POLICY_VERSION, None),)
+_ARGUMENT = (RuleVerdict(Outcome.DENY, Reason.ARGUMENT_RANGE, None),)
 
 
 def integrity(invocation: PreparedInvocation, policy: PreparedPolicy, context: Context) -> Found:
@@ -155,10 +155,10 @@ def integrity(invocation: PreparedInvocation, policy: PreparedPolicy, context: C
 
 # ---------------------------------------------------------------- 2: freshness
 
-_REPLAYED = Verdict(Outcome.DENY, Reason.REPLAYED, None)
-_FUTURE = Verdict(Outcome.DENY, Reason.ISSUED_IN_FUTURE, None)
-_EXPIRED = Verdict(Outcome.DENY, Reason.EXPIRED, None)
-_UNCERTAIN = Verdict(Outcome.DEFER, Reason.CLOCK_UNCERTAIN, None)
+_REPLAYED = RuleVerdict(Outcome.DENY, Reason.REPLAYED, None)
+_FUTURE = RuleVerdict(Outcome.DENY, Reason.ISSUED_IN_FUTURE, None)
+_EXPIRED = RuleVerdict(Outcome.DENY, Reason.EXPIRED, None)
+_UNCERTAIN = RuleVerdict(Outcome.DEFER, Reason.CLOCK_UNCERTAIN, None)
 
 
 def freshness(invocation: PreparedInvocation, context: Context, sets: Sets) -> Found:
@@ -171,7 +171,7 @@ def freshness(invocation: PreparedInvocation, context: Context, sets: Sets) -> F
         return (_REPLAYED,)
     if issued <= low - most and high + most <= end:
         return PASSED
-    verdicts: list[Verdict] = []
+    verdicts: list[RuleVerdict] = []
     if issued > low + least:
         verdicts.append(_FUTURE)
         if issued > high + most:
@@ -197,8 +197,8 @@ CLASSES: dict[int, frozenset[int]] = {
     SourceKind.REFLEX: frozenset({TimingClass.REFLEX}),
 }
 
-_CLASS = (Verdict(Outcome.DENY, Reason.CLASS_NOT_PERMITTED, None),)
-_NOT_PERMITTED = Verdict(Outcome.DENY, Reason.NOT_PERMITTED, None)
+_CLASS = (RuleVerdict(Outcome.DENY, Reason.CLASS_NOT_PERMITTED, None),)
+_NOT_PERMITTED = RuleVerdict(Outcome.DENY, Reason.NOT_PERMITTED, None)
 
 
 def authority(invocation: PreparedInvocation, at: Environment) -> Found:
@@ -206,19 +206,19 @@ def authority(invocation: PreparedInvocation, at: Environment) -> Found:
     if invocation.invocation.contract.timing_class not in CLASSES[invocation.invocation.source]:
         return _CLASS
     candidates = invocation.candidates
-    verdicts: list[Verdict] = []
-    doubt: Verdict | None = None
+    verdicts: list[RuleVerdict] = []
+    doubt: RuleVerdict | None = None
     unforbidden = True
     for rule in candidates.forbids:
         truth = rule.condition(at)
         if truth == FALSE:
             continue
         if truth & TRUE:
-            verdicts.append(Verdict(Outcome.DENY, Reason.FORBIDDEN, rule.rule))
+            verdicts.append(RuleVerdict(Outcome.DENY, Reason.FORBIDDEN, rule.rule))
             if truth == TRUE:
                 return tuple(verdicts)
         if truth & UNKNOWN and doubt is None:
-            doubt = Verdict(Outcome.DEFER, Reason.FORBID_UNKNOWN, rule.rule)
+            doubt = RuleVerdict(Outcome.DEFER, Reason.FORBID_UNKNOWN, rule.rule)
         unforbidden = unforbidden and truth & FALSE != 0
     permitted = False
     for rule in candidates.permits:
@@ -228,7 +228,7 @@ def authority(invocation: PreparedInvocation, at: Environment) -> Found:
         permitted = permitted or truth & TRUE != 0
     else:
         rules = candidates.permits  # none speaks of this skill, role and source at all, or no condition is met
-        verdicts.append(Verdict(Outcome.DENY, Reason.OUT_OF_SCOPE, rules[0].rule) if rules else _NOT_PERMITTED)
+        verdicts.append(RuleVerdict(Outcome.DENY, Reason.OUT_OF_SCOPE, rules[0].rule) if rules else _NOT_PERMITTED)
         if not permitted:
             return tuple(verdicts)
     if unforbidden and not verdicts and doubt is None:
@@ -239,7 +239,7 @@ def authority(invocation: PreparedInvocation, at: Environment) -> Found:
 # ---------------------------------------------------------------- 3b: confirmation
 
 
-class Asked(NamedTuple):
+class ConfirmState(NamedTuple):
     """What became of a `confirm` rule that may match: whether it surely does, until when an answer is waited for
     (monotonic us), whether somebody refused, and when grants that came in time were enough.
     """
@@ -251,9 +251,9 @@ class Asked(NamedTuple):
     granted_us: int | None
 
 
-def _asked(invocation: PreparedInvocation, context: Context, at: Environment) -> list[Asked]:
+def _asked(invocation: PreparedInvocation, context: Context, at: Environment) -> list[ConfirmState]:
     """The `confirm` rules that may match."""
-    asked: list[Asked] = []
+    asked: list[ConfirmState] = []
     for rule, number, condition in invocation.candidates.confirms:
         truth = condition(at)
         if truth == FALSE:
@@ -262,11 +262,11 @@ def _asked(invocation: PreparedInvocation, context: Context, at: Environment) ->
         answers = [each for each in context.approvals if each.rule == number and each.role in roles]
         refused = not all(each.granted for each in answers)
         times = [] if refused else _granted(rule, [each for each in answers if each.monotonic_us <= end_us])
-        asked.append(Asked(rule, not truth & FALSE, end_us, refused, min(times, default=None)))
+        asked.append(ConfirmState(rule, not truth & FALSE, end_us, refused, min(times, default=None)))
     return asked
 
 
-def _granted(rule: Rule, answers: Sequence[Approval]) -> list[int]:
+def _granted(rule: Rule, answers: Sequence[ConfirmAnswer]) -> list[int]:
     """When grants that came in time were enough, monotonic us: one of the role, or those of two people."""
     first = [each for each in answers if each.role == rule.approver]
     if rule.second == -1:
@@ -281,8 +281,8 @@ def _granted(rule: Rule, answers: Sequence[Approval]) -> list[int]:
 
 def confirmation(invocation: PreparedInvocation, context: Context, at: Environment, monotonic_us: Span) -> Found:
     """Denied when any rule's answer denies, else deferred when any is awaited."""
-    verdicts: list[Verdict] = []
-    doubt: Verdict | None = None
+    verdicts: list[RuleVerdict] = []
+    doubt: RuleVerdict | None = None
     passes = True
     earliest, latest = monotonic_us
     for rule, certain, end_us, refused, granted_us in _asked(invocation, context, at):
@@ -290,13 +290,13 @@ def confirmation(invocation: PreparedInvocation, context: Context, at: Environme
             continue
         awaited = not refused and earliest <= end_us
         if refused:
-            verdicts.append(Verdict(Outcome.DENY, Reason.APPROVAL_REFUSED, rule))
+            verdicts.append(RuleVerdict(Outcome.DENY, Reason.APPROVAL_REFUSED, rule))
         elif latest > end_us:
-            verdicts.append(Verdict(Outcome.DENY, Reason.APPROVAL_TIMED_OUT, rule))
+            verdicts.append(RuleVerdict(Outcome.DENY, Reason.APPROVAL_TIMED_OUT, rule))
         if not awaited and certain:
             return tuple(verdicts)
         if awaited and doubt is None:
-            doubt = Verdict(Outcome.DEFER, Reason.AWAITING_APPROVAL, rule)
+            doubt = RuleVerdict(Outcome.DEFER, Reason.AWAITING_APPROVAL, rule)
         passes = passes and not certain
     if passes and not verdicts and doubt is None:
         return PASSED
@@ -316,8 +316,8 @@ def release(invocation: PreparedInvocation, context: Context, at: Environment) -
 
 # ---------------------------------------------------------------- 4: phase
 
-_EARLY = (Verdict(Outcome.DEFER, Reason.PHASE_NOT_REACHED, None),)
-_LATE = (Verdict(Outcome.DENY, Reason.PHASE_PASSED, None),)
+_EARLY = (RuleVerdict(Outcome.DEFER, Reason.PHASE_NOT_REACHED, None),)
+_LATE = (RuleVerdict(Outcome.DENY, Reason.PHASE_PASSED, None),)
 
 
 def phase(invocation: PreparedInvocation, context: Context) -> Found:
@@ -331,7 +331,7 @@ def phase(invocation: PreparedInvocation, context: Context) -> Found:
 
 # ---------------------------------------------------------------- 5: timing
 
-_NO_SLACK = Verdict(Outcome.FALLBACK, Reason.NO_SLACK, None)
+_NO_SLACK = RuleVerdict(Outcome.FALLBACK, Reason.NO_SLACK, None)
 
 
 def timing(invocation: PreparedInvocation, context: Context, at: Environment, monotonic_us: Span) -> Found:
@@ -368,10 +368,10 @@ def valid_until(invocation: PreparedInvocation, state: State, context: Context, 
 # ---------------------------------------------------------------- 6 and 7: state and safety
 
 _STATE_UNKNOWN, _SAFETY_UNKNOWN = Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN
-_TOO_FAST = (Verdict(Outcome.FALLBACK, Reason.ENVELOPE, None),)
+_TOO_FAST = (RuleVerdict(Outcome.FALLBACK, Reason.ENVELOPE, None),)
 
 
-class Tally:
+class ConditionTally:
     """A step that passes when all its conditions are true: false falls back, else unknown defers.
 
     `exact` says that a single situation is judged, so that a mixed truth is one over the places of one volume, where
@@ -382,8 +382,8 @@ class Tally:
 
     def __init__(self, unknown: Reason, exact: bool) -> None:
         self._unknown, self._exact = unknown, exact
-        self._verdicts: list[Verdict] = []
-        self._doubt: Verdict | None = None
+        self._verdicts: list[RuleVerdict] = []
+        self._doubt: RuleVerdict | None = None
         self._passes = True
 
     def fails(self, truth: Truth, reason: Reason, clause: Decisive) -> bool:
@@ -391,9 +391,9 @@ class Tally:
         if self._exact:
             truth = EVERYWHERE[truth]
         if truth & FALSE:
-            self._verdicts.append(Verdict(Outcome.FALLBACK, reason, clause))
+            self._verdicts.append(RuleVerdict(Outcome.FALLBACK, reason, clause))
         if truth & UNKNOWN and self._doubt is None:
-            self._doubt = Verdict(Outcome.DEFER, self._unknown, clause)
+            self._doubt = RuleVerdict(Outcome.DEFER, self._unknown, clause)
         self._passes = self._passes and truth & TRUE != 0
         return truth == FALSE
 
@@ -408,7 +408,7 @@ class Tally:
 
 def state(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found:
     """Falls back on the first clause that is false, else defers on the first that is unknown."""
-    tally = Tally(_STATE_UNKNOWN, exact)
+    tally = ConditionTally(_STATE_UNKNOWN, exact)
     for guards in (invocation.require, invocation.assume):
         for clause, condition in guards:
             truth = condition(at)
@@ -419,7 +419,7 @@ def state(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found
 
 def safety(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found:
     """Falls back on the first condition that is false, else defers on the first that is unknown."""
-    tally = Tally(_SAFETY_UNKNOWN, exact)
+    tally = ConditionTally(_SAFETY_UNKNOWN, exact)
     policy, known = invocation.policy, invocation.policy.tables.known
     if invocation.invocation.plan.speed > policy.policy.vehicle.speed:
         return _TOO_FAST

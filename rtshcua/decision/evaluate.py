@@ -7,7 +7,7 @@ from typing import Final, NamedTuple, TypeAlias
 from rtshcua.decision import tree
 from rtshcua.decision.times import LocalTime, Window, daily, weekly
 from rtshcua.decision.values import ABSENT, AND, FALSE, NOT, OR, TRUE, UNKNOWN, Span, Truth, Value
-from rtshcua.decision.zones import Place, PreparedZone, WellKnown, here
+from rtshcua.decision.zones import PlaceSet, PreparedZone, WellKnown, here
 
 #: the phase of what belongs to no mission, and of a phase that the policy does not name
 NO_PHASE: Final = -1
@@ -27,7 +27,7 @@ class Environment:
         arguments: Sequence[Value],
         utc: tuple[Span, ...],
         error: Span,
-        place: Place | None = None,
+        place: PlaceSet | None = None,
         monitors: Sequence[Truth] = (),
         phase: int = NO_PHASE,
         through: int = 0,
@@ -37,7 +37,7 @@ class Environment:
         self.place = place
         self.monitors, self.phase, self.through = monitors, phase, through
 
-    def over(self, slots: Sequence[Value], place: Place | None, through: int) -> "Environment":
+    def over(self, slots: Sequence[Value], place: PlaceSet | None, through: int) -> "Environment":
         """The same, with other values in the slots, and the vehicle elsewhere, until `through` us from now."""
         return Environment(slots, self.arguments, self.utc, self.error, place, self.monitors, self.phase, through)
 
@@ -55,7 +55,7 @@ class Tables(NamedTuple):
     local: LocalTime
 
 
-def within(place: Place, zone: PreparedZone, at: Environment, through: int) -> Truth:
+def within(place: PlaceSet, zone: PreparedZone, at: Environment, through: int) -> Truth:
     """Whether a place is inside a zone, at any moment from now to `through` us from now."""
     truth = place.inside(zone)
     return truth if zone.times is None else AND[truth][zone.times.truth(at.utc, at.error, through)]
@@ -73,7 +73,7 @@ def build(node: tree.Node, tables: Tables) -> Condition:
             return _both(build(left, tables), build(right, tables))
         case tree.Either(left, right):
             return _either(build(left, tables), build(right, tables))
-        case tree.Not(operand):
+        case tree.Negation(operand):
             return _not(build(operand, tables))
         case tree.AtMost(terms, bound):
             return _at_most(terms, bound)
@@ -81,17 +81,17 @@ def build(node: tree.Node, tables: Tables) -> Condition:
             return _equal(terms, value)
         case tree.Member(argument, index, members):
             return _member(argument, index, tables.sets[members])
-        case tree.Known(index):
+        case tree.SlotKnown(index):
             return _known(index)
-        case tree.Inside(zone):
+        case tree.InsideZone(zone):
             return _inside(tables.zones[zone], tables.known)
         case tree.InsideArgument(cell, table):
             return _inside_argument(cell, tables.tables[table], tables)
         case tree.PointInside(cell, zone):
             return _point_inside(cell, tables.zones[zone])
-        case tree.InPhase(members):
+        case tree.PhaseIn(members):
             return _in_phase(tables.sets[members])
-        case tree.Monitored(monitor):
+        case tree.MonitorSays(monitor):
             return _monitored(monitor)
         case tree.InWeek(windows):
             return _in_window(weekly(windows, tables.local))
@@ -140,7 +140,7 @@ def known(truth: Truth, gap: int) -> Truth:
     return UNKNOWN if gap == ABSENT else truth | UNKNOWN
 
 
-def total(terms: tuple[tree.Term, ...], at: Environment) -> tuple[int, int, int]:
+def total(terms: tuple[tree.LinearTerm, ...], at: Environment) -> tuple[int, int, int]:
     """The least and the greatest the sum can be, and whether a part of it is missing."""
     low = high = gap = 0
     for argument, index, factor in terms:
@@ -161,7 +161,7 @@ def at_most(low: int, high: int, bound: int) -> Truth:
     return FALSE if low > bound else TRUE | FALSE
 
 
-def _at_most(terms: tuple[tree.Term, ...], bound: int) -> Condition:
+def _at_most(terms: tuple[tree.LinearTerm, ...], bound: int) -> Condition:
     if len(terms) == 1 and terms[0].factor in (1, -1):
         (argument, index, factor) = terms[0]
         return _upper(argument, index, bound) if factor == 1 else _lower(argument, index, -bound)
@@ -192,7 +192,7 @@ def _lower(argument: bool, index: int, bound: int) -> Condition:
     return run
 
 
-def _equal(terms: tuple[tree.Term, ...], value: int) -> Condition:
+def _equal(terms: tuple[tree.LinearTerm, ...], value: int) -> Condition:
     def run(at: Environment) -> Truth:
         low, high, gap = total(terms, at)
         truth = FALSE if low > value or high < value else TRUE if low == high else TRUE | FALSE

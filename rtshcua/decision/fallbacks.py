@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.contracts import longest
 from rtshcua.decision.evaluate import NO_PHASE, Environment
-from rtshcua.decision.prepare import Choice as Choice
+from rtshcua.decision.prepare import LinkChoice as LinkChoice
 from rtshcua.decision.prepare import PreparedInvocation, PreparedLink, PreparedPolicy
 from rtshcua.decision.situation import environment, remembered, situation
 from rtshcua.decision.values import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Sets, Truth
@@ -23,7 +23,7 @@ START = -2
 
 def choose_fallback(
     invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now, after: int = START
-) -> Choice | None:
+) -> LinkChoice | None:
     """The target of a matching `degrade` rule, else the first link of the chain after `after` that may fly now.
 
     Pass the index of the link that failed or whose time is over as `after`: the choice never goes backwards.
@@ -37,7 +37,7 @@ def choose_fallback(
     return choice
 
 
-def choose_contingency(state: State, policy: PreparedPolicy, now: Now, after: int = START) -> Choice | None:
+def choose_contingency(state: State, policy: PreparedPolicy, now: Now, after: int = START) -> LinkChoice | None:
     """The first link of the policy's contingency after `after` that may fly now."""
     return next(_chosen(policy.contingency, situation(state, policy, now), policy, after, True, NO_PHASE))
 
@@ -62,7 +62,7 @@ def link_admissible(link: PreparedLink, state: State, policy: PreparedPolicy, no
 
 def fallbacks(
     invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, after: int, exact: bool
-) -> Iterator[Choice | None]:
+) -> Iterator[LinkChoice | None]:
     """The links that may be the choice, in order, and None if perhaps none flies; one situation has one answer."""
     phase = invocation.phase
     if after < DEGRADE:
@@ -71,7 +71,7 @@ def fallbacks(
             matches = rule.condition(at)
             truth = AND[matches][admissible(rule.target, sets, policy, exact, phase)] if matches & TRUE else FALSE
             if truth & TRUE:
-                yield Choice(DEGRADE, rule.target.link)
+                yield LinkChoice(DEGRADE, rule.target.link)
             if truth == TRUE:
                 return
     yield from _chosen(invocation.chain, sets, policy, after, exact, phase)
@@ -79,11 +79,11 @@ def fallbacks(
 
 def _chosen(
     chain: Sequence[PreparedLink], sets: Sets, policy: PreparedPolicy, after: int, exact: bool, phase: int
-) -> Iterator[Choice | None]:
+) -> Iterator[LinkChoice | None]:
     for index in range(max(after + 1, 0), len(chain)):
         truth = admissible(chain[index], sets, policy, exact, phase)
         if truth & TRUE:
-            yield Choice(index, chain[index].link)
+            yield LinkChoice(index, chain[index].link)
         if truth == TRUE:
             return
     yield None

@@ -1,6 +1,6 @@
 """What would have passed: computed only on refusal, from the condition that decided.
 
-`Changes` finds the smallest change of values that makes a condition true, or false, read off the condition itself;
+`ChangeSearch` finds the smallest change of values that makes a condition true, or false, read off the condition itself;
 `offer` tells it to a person or an agent, by names and in its dimension; `nearest` tries what is offered.
 """
 
@@ -25,7 +25,7 @@ from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Reason
 
 
-class Change(NamedTuple):
+class NearestChange(NamedTuple):
     """An argument cell or a state slot (None: the local time) should be in `low`..`high`, or one of `choices`."""
 
     argument: bool
@@ -49,7 +49,7 @@ Subject: TypeAlias = tuple[bool, int | None]
 Made: TypeAlias = dict[Subject, int]
 
 
-class Changes:
+class ChangeSearch:
     """Looks for changes to what an environment knows. None means that no change of a value helps, or none is known.
 
     What a temporal monitor says, no value of this moment changes; and an invocation stays in its phase. With
@@ -59,12 +59,12 @@ class Changes:
     def __init__(self, at: Environment, tables: Tables, *, signals_only: bool = False) -> None:
         self._at, self._tables, self._signals_only = at, tables, signals_only
 
-    def find(self, node: tree.Node, goal: bool) -> tuple[Change, ...] | None:
+    def find(self, node: tree.Node, goal: bool) -> tuple[NearestChange, ...] | None:
         """Changes which, made together, give the condition the truth `goal`; as few as possible."""
         if build(node, self._tables)(self._at) == (TRUE if goal else FALSE):
             return ()
         match node:
-            case tree.Not(operand):
+            case tree.Negation(operand):
                 return self.find(operand, not goal)
             case tree.Both(left, right):
                 return self._all(left, right, goal) if goal else self._any(left, right, goal)
@@ -76,9 +76,9 @@ class Changes:
                 return self._within(terms, value, value)
             case tree.Member(argument, at, members):
                 chosen = self._tables.sets[members]
-                return (Change(argument, at, 0, 0, chosen),) if goal else None
+                return (NearestChange(argument, at, 0, 0, chosen),) if goal else None
             case tree.InWindow(start, end) if goal:
-                return (Change(False, None, start, min(end, DAY - 1), None),)
+                return (NearestChange(False, None, start, min(end, DAY - 1), None),)
             case tree.InWeek(windows) if goal:
                 return self._today(windows)
             case _:
@@ -102,7 +102,7 @@ class Changes:
         changed = Environment(slots, arguments, utc, error, here.place, here.monitors, here.phase, here.through)
         return build(node, self._tables)(changed) == (TRUE if goal else FALSE)
 
-    def _today(self, windows: tuple[int, ...]) -> tuple[Change, ...] | None:
+    def _today(self, windows: tuple[int, ...]) -> tuple[NearestChange, ...] | None:
         """The next window of this day of the local week, else the last; None if it has none. Other days are no help."""
         moment = self._at.utc[0][0]
         day, now = divmod(time_of_week(moment + self._tables.local.offset(moment)), DAY)
@@ -114,17 +114,19 @@ class Changes:
         if not found:
             return None
         low, high = next((each for each in found if each[1] >= now), found[-1])
-        return (Change(False, None, low, high, None),)
+        return (NearestChange(False, None, low, high, None),)
 
-    def _all(self, left: tree.Node, right: tree.Node, goal: bool) -> tuple[Change, ...] | None:
+    def _all(self, left: tree.Node, right: tree.Node, goal: bool) -> tuple[NearestChange, ...] | None:
         first, second = self.find(left, goal), self.find(right, goal)
         return None if first is None or second is None else _merged((*first, *second))
 
-    def _any(self, left: tree.Node, right: tree.Node, goal: bool) -> tuple[Change, ...] | None:
+    def _any(self, left: tree.Node, right: tree.Node, goal: bool) -> tuple[NearestChange, ...] | None:
         found = [changes for changes in (self.find(left, goal), self.find(right, goal)) if changes is not None]
         return min(found, key=len, default=None)
 
-    def _within(self, terms: tuple[tree.Term, ...], least: int | None, most: int | None) -> tuple[Change, ...] | None:
+    def _within(
+        self, terms: tuple[tree.LinearTerm, ...], least: int | None, most: int | None
+    ) -> tuple[NearestChange, ...] | None:
         """The sum is in `least`..`most` whatever the other terms are, when one is changed: an argument rather than a
         signal."""
         movable = sorted((term for term in terms if term.factor), key=lambda term: term.argument == self._signals_only)
@@ -137,12 +139,12 @@ class Changes:
             factor, ends = -factor, (None if ends[1] is None else -ends[1], None if ends[0] is None else -ends[0])
         first = -MAX_VALUE if ends[0] is None else -(-ends[0] // factor)
         last = MAX_VALUE if ends[1] is None else ends[1] // factor
-        return None if None not in ends and first > last else (Change(argument, at, first, last, None),)
+        return None if None not in ends and first > last else (NearestChange(argument, at, first, last, None),)
 
 
-def _merged(changes: Sequence[Change]) -> tuple[Change, ...] | None:
+def _merged(changes: Sequence[NearestChange]) -> tuple[NearestChange, ...] | None:
     """One change for each subject, None when two contradict."""
-    merged: dict[Subject, Change] = {}
+    merged: dict[Subject, NearestChange] = {}
     for new in changes:
         old = merged.setdefault(new.subject, new)
         if old is not new:
@@ -153,7 +155,7 @@ def _merged(changes: Sequence[Change]) -> tuple[Change, ...] | None:
     return tuple(merged.values())
 
 
-def _both(a: Change, b: Change) -> Change | None:
+def _both(a: NearestChange, b: NearestChange) -> NearestChange | None:
     if a.at is None or (a.choices is None) != (b.choices is None):
         return None
     if a.choices is not None and b.choices is not None:
@@ -163,7 +165,7 @@ def _both(a: Change, b: Change) -> Change | None:
     return a._replace(low=low, high=high) if low <= high else None
 
 
-def nearest_in(change: Change, value: Value) -> int:
+def nearest_in(change: NearestChange, value: Value) -> int:
     """The value nearest to the present one that the change allows; the nearer end of a window for a time of day."""
     low, high = change.low, change.high
     present, _, gap, _ = value
@@ -184,13 +186,13 @@ Option = tuple[int, str]
 class Offer(NamedTuple):
     """The values that a change allows its subject: the nearest quantity, or each ordinal or zone with its name."""
 
-    change: Change
+    change: NearestChange
     subject: str
     dimension: str
     options: tuple[Option, ...]
 
 
-def offer(change: Change, contract: Contract, policy: Policy, at: Environment) -> Offer:
+def offer(change: NearestChange, contract: Contract, policy: Policy, at: Environment) -> Offer:
     """What a change offers; there are no options where the subject has no such value."""
     if change.at is None:
         local = point(at.utc[0][0] + local_time(policy.vehicle).offset(at.utc[0][0]))
@@ -200,7 +202,7 @@ def offer(change: Change, contract: Contract, policy: Policy, at: Environment) -
     return _signal(change, change.at, policy, at)
 
 
-def _argument(change: Change, cell: int, contract: Contract, policy: Policy, at: Environment) -> Offer:
+def _argument(change: NearestChange, cell: int, contract: Contract, policy: Policy, at: Environment) -> Offer:
     parameter = next(parameter for parameter in contract.parameters if parameter.cell == cell)
     if parameter.kind == QUANTITY:
         low, high = max(change.low, parameter.low), min(change.high, parameter.high)
@@ -212,14 +214,14 @@ def _argument(change: Change, cell: int, contract: Contract, policy: Policy, at:
     return Offer(change, parameter.name, parameter.dimension, options)
 
 
-def _signal(change: Change, slot: int, policy: Policy, at: Environment) -> Offer:
+def _signal(change: NearestChange, slot: int, policy: Policy, at: Environment) -> Offer:
     signal = next(signal for signal in policy.signals if signal.slot == slot)
     if signal.kind == ENUMERATION:
         return Offer(change, signal.name, signal.dimension, _named(change, signal.labels))
     return Offer(change, signal.name, signal.dimension, ((nearest_in(change, at.slots[slot]), ""),))
 
 
-def _named(change: Change, labels: Iterable[Option]) -> tuple[Option, ...]:
+def _named(change: NearestChange, labels: Iterable[Option]) -> tuple[Option, ...]:
     return tuple(sorted(option for option in labels if change.allows(option[0])))
 
 
@@ -273,7 +275,7 @@ def _conditions(decision: Decision, invocation: PreparedInvocation, policy: Prep
 def _fewest(
     conditions: list[tuple[Node, bool]], invocation: PreparedInvocation, policy: PreparedPolicy, at: Environment
 ) -> tuple[Nearest, ...]:
-    changes, contract = Changes(at, policy.tables), invocation.invocation.contract
+    changes, contract = ChangeSearch(at, policy.tables), invocation.invocation.contract
     fitting: list[tuple[Nearest, ...]] = []
     for node, goal in conditions:
         offers = [offer(change, contract, policy.policy, at) for change in changes.find(node, goal) or ()]
@@ -284,7 +286,7 @@ def _fewest(
     return min(fitting, key=len, default=())
 
 
-def _tried(offers: list[Offer], changes: Changes, node: Node, goal: bool) -> tuple[Nearest, ...] | None:
+def _tried(offers: list[Offer], changes: ChangeSearch, node: Node, goal: bool) -> tuple[Nearest, ...] | None:
     """The offers that hold when tried, for a change may undo what another part of the condition was content with."""
     first: Made = {one.change.subject: one.options[0][0] for one in offers}
     kept: list[Nearest] = []

@@ -20,7 +20,7 @@ from rtshcua.decision.times import local_time
 from rtshcua.decision.tree import Node, monitored, parse, scope_of, slots_read, where
 from rtshcua.decision.values import AND, NOT, TRUE, Sets, Truth, Value, point
 from rtshcua.decision.volume import Planner, flown_at, near_home
-from rtshcua.decision.zones import Place, PreparedZone, WellKnown
+from rtshcua.decision.zones import PlaceSet, PreparedZone, WellKnown
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind, Parameter
@@ -36,7 +36,7 @@ from rtshcua.model.step_number import step_words
 Guards = tuple[tuple[Clause, Condition], ...]
 
 
-class Choice(msgspec.Struct, frozen=True):
+class LinkChoice(msgspec.Struct, frozen=True):
     """A link and its index in the chain, or DEGRADE (`links`)."""
 
     index: int
@@ -221,7 +221,7 @@ class PreparedAirspace(NamedTuple):
     inside: tuple[PreparedZone, ...]
     outside: tuple[PreparedZone, ...]
 
-    def keeps(self, place: Place, at: Environment, through: int) -> Truth:
+    def keeps(self, place: PlaceSet, at: Environment, through: int) -> Truth:
         """Whether a place is in the airspace at every moment from now to `through` us from now."""
         truth = TRUE
         for zone in self.inside:
@@ -231,7 +231,7 @@ class PreparedAirspace(NamedTuple):
         return truth
 
 
-class Limit(NamedTuple):
+class SlotLimit(NamedTuple):
     """What a state slot may hold: no older than `stale_us`, no further from 0 than `most`."""
 
     stale_us: int
@@ -246,7 +246,7 @@ class PreparedMonitor(NamedTuple):
     condition: Condition
 
 
-class Seen(NamedTuple):
+class SeenSituation(NamedTuple):
     """A single situation, as sets of values, and as conditions read it, by arguments and phase; and what was found in
     it: which links may fly, by their phase, and which would be chosen for an invocation, after the link of which index.
     """
@@ -256,7 +256,7 @@ class Seen(NamedTuple):
     sets: Sets
     environments: list[Environment]
     links: list[tuple[PreparedLink, int, Truth]]
-    choices: list[tuple["PreparedInvocation", int, Choice | None]]
+    choices: list[tuple["PreparedInvocation", int, LinkChoice | None]]
 
 
 @dataclass(slots=True, eq=False)
@@ -271,14 +271,14 @@ class PreparedPolicy:
     policy: Policy
     compiler: Compiler
     tables: Tables
-    limits: tuple[Limit, ...]
+    limits: tuple[SlotLimit, ...]
     bounds: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
     rules: RuleIndex
     airspace: PreparedAirspace | None
     contingency: tuple[PreparedLink, ...]
     still: Planner  # plans to stay: the present place with its error
     monitors: tuple[PreparedMonitor, ...]
-    seen: Seen | None = None
+    seen: SeenSituation | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -420,13 +420,13 @@ def _airspace(airspace: Airspace, compiler: Compiler) -> PreparedAirspace:
     )
 
 
-def _limits(policy: Policy) -> tuple[Limit, ...]:
-    limits = [Limit(0, 0)] * policy.slots
+def _limits(policy: Policy) -> tuple[SlotLimit, ...]:
+    limits = [SlotLimit(0, 0)] * policy.slots
     for signal in policy.signals:
         if signal.kind == POSITION:
-            limits[signal.slot] = limits[signal.slot + 1] = Limit(signal.stale_us, MAX_COORDINATE)
+            limits[signal.slot] = limits[signal.slot + 1] = SlotLimit(signal.stale_us, MAX_COORDINATE)
         else:
-            limits[signal.slot] = Limit(signal.stale_us, MAX_VALUE)
+            limits[signal.slot] = SlotLimit(signal.stale_us, MAX_VALUE)
     return tuple(limits)
 
 

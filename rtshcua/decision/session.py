@@ -17,7 +17,7 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.model.step_number import step_words
 from rtshcua.wire import names
@@ -28,7 +28,13 @@ from rtshcua.wire.document import DocumentError, check_key, check_root, kind_of
 from rtshcua.wire.permit import LINK_VALID_US
 from rtshcua.wire.recall import open_recall
 from rtshcua.wire.receipt import ACCEPTED, APPROVAL, CANCELLATION, RECALL, REPLACEMENT, UNKNOWN, Receipt
-from rtshcua.wire.replacement import MAX_REPLACEMENTS, Replacement, check_stays, fit_replacement, open_replacement
+from rtshcua.wire.replacement import (
+    MAX_REPLACEMENTS,
+    VerifiedReplacement,
+    check_stays,
+    fit_replacement,
+    open_replacement,
+)
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 from rtshcua.wire.response import Status
 from rtshcua.wire.trust import TrustRoot
@@ -47,7 +53,7 @@ class _Ahead(NamedTuple):
     of the mission whose steps it was compared with, and what is in force if it is taken then; the ids of its new steps.
     """
 
-    found: Replacement | Untrusted
+    found: VerifiedReplacement | Untrusted
     prepared: tuple[PreparedInvocation, ...]
     compared: bytes = b""
     after: Bundle | None = None
@@ -101,7 +107,7 @@ class InForce:
         """Whether no step may begin any more."""
         return self.recalled or self.cancelled
 
-    def approvals(self, invocation: Invocation, now: Now) -> tuple[Approval, ...]:
+    def approvals(self, invocation: Invocation, now: Now) -> tuple[ConfirmAnswer, ...]:
         """The verified answers that a decision on an invocation is told of."""
         return self._approvals.about(invocation, now)
 
@@ -158,7 +164,7 @@ class InForce:
         kind = UNKNOWN
         try:
             ahead = self._ahead.get(document)
-            trusted = ahead is not None and isinstance(ahead.found, Replacement)
+            trusted = ahead is not None and isinstance(ahead.found, VerifiedReplacement)
             kind = REPLACEMENT if trusted else _KINDS[kind_of(document)]
             if self.recalled:
                 raise DocumentError("recalled", "the mission was recalled")
@@ -246,7 +252,7 @@ class InForce:
             REPLACEMENT, ACCEPTED, f"the mission has {steps} steps now, new from {step_words(found.kept)}", found.kept
         )
 
-    def _opened(self, document: bytes, now: Now) -> Replacement:
+    def _opened(self, document: bytes, now: Now) -> VerifiedReplacement:
         return open_replacement(
             document, root=self._root, vehicle=self.vehicle, flight=self.flight, bundle=self.bundle, now=now
         )

@@ -6,7 +6,7 @@ from operator import le
 from typing import TypeGuard, cast
 
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.prepare import PreparedPolicy, Seen
+from rtshcua.decision.prepare import PreparedPolicy, SeenSituation
 from rtshcua.decision.values import FALSE, MAYBE, MISSING, PRESENT, TRUE, UNKNOWN, Sets, Truth, Value
 from rtshcua.decision.volume import Volume
 from rtshcua.model.flat.situation import Now, State
@@ -41,11 +41,11 @@ def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     return remembered(state, policy, now).sets
 
 
-def remembered(state: State, policy: PreparedPolicy, now: Now) -> Seen:
+def remembered(state: State, policy: PreparedPolicy, now: Now) -> SeenSituation:
     """This situation, with what was answered about it so far."""
     seen = policy.seen
     if seen is None or seen.now != now or seen.state != state:
-        seen = policy.seen = _tuple(Seen, (state, now, _situation(state, policy, now), [], [], []))
+        seen = policy.seen = _tuple(SeenSituation, (state, now, _situation(state, policy, now), [], [], []))
     return seen
 
 

@@ -222,7 +222,7 @@ def weekly(windows: tuple[int, ...], local: LocalTime) -> Window:
     return Windows(windows, WEEK, local)
 
 
-class Dates:
+class DateRange:
     """The moments from `start` to `end`, both included, UTC in us."""
 
     __slots__ = ("_end", "_start")
@@ -251,7 +251,7 @@ class Times:
     __slots__ = ("_parts",)
 
     def __init__(self, zone: Zone, local: LocalTime) -> None:
-        self._parts = (*windows_of(zone, local), *(Dates(*dates) for dates in (zone.dates,) if dates))
+        self._parts = (*windows_of(zone, local), *(DateRange(*dates) for dates in (zone.dates,) if dates))
 
     def truth(self, utc: tuple[Span, ...], error: Span, through: int) -> Truth:
         """What may be true of the zone's existing at some moment from one of `utc` to `through` us after it."""

@@ -17,7 +17,7 @@ from rtshcua.model.flat.policy import Monitor, Policy, Vehicle
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 
 
-class Scope(NamedTuple):
+class CodeScope(NamedTuple):
     """What code may name: the slots, cells, zones, tables, sets and monitors that exist, and of what kind they are.
 
     Each method answers what is wrong with naming an index, or None.
@@ -70,26 +70,26 @@ class Scope(NamedTuple):
         """A set that is windows of a week."""
         return self.entry("set", index, len(self.members)) or windows_problem(self.members[index])
 
-    def about(self, *contracts: Contract) -> "Scope":
+    def about(self, *contracts: Contract) -> "CodeScope":
         """The same, for code that may name the arguments of these contracts' skills."""
         return self._replace(cells=tuple({each.cell: each.kind for each in one.parameters} for one in contracts))
 
-    def inside_monitor(self, number: int) -> "Scope":
+    def inside_monitor(self, number: int) -> "CodeScope":
         """The same, for the code of a temporal monitor: it may read those before it, no argument and no phase."""
         return self._replace(cells=(), monitors=number, phases=None)
 
 
-def scope_of(policy: Policy) -> Scope:
+def scope_of(policy: Policy) -> CodeScope:
     """What code may name anywhere in a policy; `policy.signals` own its slots."""
     kinds = [0] * policy.slots
     for signal in policy.signals:
         for slot in signal.slots:
             kinds[slot] = signal.kind
     monitors, phases = len(policy.monitors), len(policy.phases)
-    return Scope(tuple(kinds), len(policy.zones), len(policy.tables), policy.sets, (), monitors, phases)
+    return CodeScope(tuple(kinds), len(policy.zones), len(policy.tables), policy.sets, (), monitors, phases)
 
 
-class Term(NamedTuple):
+class LinearTerm(NamedTuple):
     """`factor` times an argument cell or a state slot."""
 
     argument: bool
@@ -100,14 +100,14 @@ class Term(NamedTuple):
 class AtMost(NamedTuple):
     """The sum of the terms is at most `bound`."""
 
-    terms: tuple[Term, ...]
+    terms: tuple[LinearTerm, ...]
     bound: int
 
 
 class Equal(NamedTuple):
     """The sum of the terms is `value`."""
 
-    terms: tuple[Term, ...]
+    terms: tuple[LinearTerm, ...]
     value: int
 
 
@@ -119,13 +119,13 @@ class Member(NamedTuple):
     members: int
 
 
-class Known(NamedTuple):
+class SlotKnown(NamedTuple):
     """State slot `at` has a value; unknown while it has none."""
 
     at: int
 
 
-class Inside(NamedTuple):
+class InsideZone(NamedTuple):
     """The vehicle is inside zone `zone`."""
 
     zone: int
@@ -158,13 +158,13 @@ class InWeek(NamedTuple):
     windows: tuple[int, ...]
 
 
-class InPhase(NamedTuple):
+class PhaseIn(NamedTuple):
     """The invocation's mission phase is in set `members` of the policy."""
 
     members: int
 
 
-class Monitored(NamedTuple):
+class MonitorSays(NamedTuple):
     """What temporal monitor `monitor` says."""
 
     monitor: int
@@ -184,22 +184,32 @@ class Either(NamedTuple):
     right: "Node"
 
 
-class Not(NamedTuple):
+class Negation(NamedTuple):
     """Kleene's `not`."""
 
     operand: "Node"
 
 
 Atom: TypeAlias = (
-    AtMost | Equal | Member | Known | Inside | InsideArgument | PointInside | InWindow | InWeek | InPhase | Monitored
+    AtMost
+    | Equal
+    | Member
+    | SlotKnown
+    | InsideZone
+    | InsideArgument
+    | PointInside
+    | InWindow
+    | InWeek
+    | PhaseIn
+    | MonitorSays
 )
-Node: TypeAlias = Atom | Both | Either | Not
+Node: TypeAlias = Atom | Both | Either | Negation
 
 
 class _Sum(NamedTuple):
     """A number on the stack."""
 
-    terms: tuple[Term, ...]
+    terms: tuple[LinearTerm, ...]
     constant: int
 
     def scaled(self, factor: int) -> "_Sum":
@@ -209,7 +219,7 @@ class _Sum(NamedTuple):
         factors = {(term.argument, term.at): term.factor for term in self.terms}
         for argument, at, factor in other.terms:
             factors[argument, at] = factors.get((argument, at), 0) + factor
-        terms = tuple(Term(argument, at, factor) for (argument, at), factor in factors.items())
+        terms = tuple(LinearTerm(argument, at, factor) for (argument, at), factor in factors.items())
         return _Sum(terms, self.constant + other.constant)
 
     def magnitude(self) -> int:
@@ -217,7 +227,7 @@ class _Sum(NamedTuple):
         return abs(self.constant) + sum(abs(term.factor) for term in self.terms) * MAX_VALUE
 
 
-def parse(code: tuple[int, ...], scope: Scope) -> Node | str:
+def parse(code: tuple[int, ...], scope: CodeScope) -> Node | str:
     """The condition that `code` spells, or what is wrong with it."""
     if not code or len(code) % 3 or len(code) > 3 * MAX_INSTRUCTIONS:
         return f"{len(code)} integers are not 1 to {MAX_INSTRUCTIONS} instructions"
@@ -234,7 +244,7 @@ def parse(code: tuple[int, ...], scope: Scope) -> Node | str:
     return last
 
 
-def _step(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) -> str | None:
+def _step(stack: list[_Sum | Node], op: int, a: int, b: int, scope: CodeScope) -> str | None:
     """Do one instruction on the stack; what is wrong with it, or None."""
     match op:
         case Op.CONST | Op.SIGNAL | Op.ARGUMENT:
@@ -248,13 +258,13 @@ def _step(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) -> st
     return _push_atom(stack, op, a, b, scope)
 
 
-def _push_number(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) -> str | None:
+def _push_number(stack: list[_Sum | Node], op: int, a: int, b: int, scope: CodeScope) -> str | None:
     if op == Op.CONST:
         problem = None if -MAX_VALUE <= a <= MAX_VALUE else f"constant {a} is out of range"
         number = _Sum((), a)
     else:
         problem = scope.number(a) if op == Op.SIGNAL else scope.argument(a, (QUANTITY, CHOICE), "number")
-        number = _Sum((Term(op == Op.ARGUMENT, a, 1),), 0)
+        number = _Sum((LinearTerm(op == Op.ARGUMENT, a, 1),), 0)
     stack.append(number)
     return problem or _unused(b)
 
@@ -304,7 +314,7 @@ def _compare(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
         return "the number may exceed 64 bits"
     if op in (Op.EQ, Op.NE):
         equal = Equal(sum_.terms, -sum_.constant)
-        stack.append(equal if op == Op.EQ else Not(equal))
+        stack.append(equal if op == Op.EQ else Negation(equal))
     else:
         stack.append(AtMost(sum_.terms, -sum_.constant - (op in (Op.LT, Op.GT))))
     return _unused(a, b)
@@ -314,11 +324,11 @@ def _connect(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
     operands = _truths(stack, 1 if op == Op.NOT else 2)
     if not operands:
         return "one truth value is needed on the stack" if op == Op.NOT else "two truth values are needed on the stack"
-    stack.append(Not(*operands) if op == Op.NOT else Both(*operands) if op == Op.AND else Either(*operands))
+    stack.append(Negation(*operands) if op == Op.NOT else Both(*operands) if op == Op.AND else Either(*operands))
     return _unused(a, b)
 
 
-def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) -> str | None:
+def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: CodeScope) -> str | None:
     problem: str | None
     node: Node
     match op:
@@ -328,9 +338,9 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
             problem = scope.argument(a, (CHOICE, ZONE), "choice and no zone")
             problem, node = problem or scope.entry("set", b, len(scope.members)), Member(True, a, b)
         case Op.KNOWN:
-            problem, node = scope.entry("slot", a, len(scope.kinds)) or _unused(b), Known(a)
+            problem, node = scope.entry("slot", a, len(scope.kinds)) or _unused(b), SlotKnown(a)
         case Op.POSITION_IN:
-            problem, node = scope.entry("zone", a, scope.zones) or _unused(b), Inside(a)
+            problem, node = scope.entry("zone", a, scope.zones) or _unused(b), InsideZone(a)
         case Op.POSITION_IN_ARGUMENT:
             problem = scope.argument(a, (ZONE,), "zone") or scope.entry("table", b, scope.tables)
             node = InsideArgument(a, b)
@@ -344,10 +354,10 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: Scope) 
             problem = scope.week(a) or _unused(b)
             node = InWeek(() if problem else scope.members[a])
         case Op.PHASE_IN:
-            problem, node = scope.set_of_phases(b) or _unused(a), InPhase(b)
+            problem, node = scope.set_of_phases(b) or _unused(a), PhaseIn(b)
         case Op.MONITOR:
             known = None if 0 <= a < scope.monitors else f"there is no monitor {a} here"
-            problem, node = known or _unused(b), Monitored(a)
+            problem, node = known or _unused(b), MonitorSays(a)
         case _:
             return f"no instruction has the number {op}"
     stack.append(node)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from rtshcua.decision.outline import Box
 from rtshcua.decision.values import MISSING, Span, Value
-from rtshcua.decision.zones import NOWHERE, Part, Place, Sweep, WellKnown
+from rtshcua.decision.zones import NOWHERE, Part, PlaceSet, Sweep, WellKnown
 from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import Vehicle
 
@@ -37,7 +37,7 @@ class Volume(NamedTuple):
     (`place.located`).
     """
 
-    place: Place
+    place: PlaceSet
     height: Value
     farthest: Span
 
@@ -93,7 +93,7 @@ class Planner:
             parts = [(leg, low, high)]
         if self._sweep is not None:
             parts.append((self._sweep, low, high))
-        return Volume(Place(tuple(parts), located, gap), (low, high, gap, None), farthest)
+        return Volume(PlaceSet(tuple(parts), located, gap), (low, high, gap, None), farthest)
 
     def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Sweep, Span]:
         """The start, wherever in a box it is, the leg from there to the path, and the distance of the farthest point of

@@ -20,12 +20,12 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.situation import environment, ranging, situation
 from rtshcua.decision.values import EVERYWHERE, FALSE, NOT, PRESENT, TRUE, UNKNOWN, Truth, Value
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Volume, distance
-from rtshcua.decision.zones import Place, Sweep
+from rtshcua.decision.zones import PlaceSet, Sweep
 from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.situation import Now, State
 
 
-class Ahead(NamedTuple):
+class PredictedPath(NamedTuple):
     """A predicted path, as a volume, and how long it takes to stand still from now on, at most, in us."""
 
     volume: Volume
@@ -33,10 +33,10 @@ class Ahead(NamedTuple):
 
 
 _tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
-UNKNOWN_AHEAD = Ahead(UNKNOWN_VOLUME, 0)
+UNKNOWN_AHEAD = PredictedPath(UNKNOWN_VOLUME, 0)
 
 
-def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -> Ahead:
+def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -> PredictedPath:
     """The predicted path in one situation, and the ages of its slots. Where position or velocity is missing nothing is
     known of it; where the height is, how high it leads.
     """
@@ -47,7 +47,7 @@ def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -
     if x_gap != PRESENT or y_gap != PRESENT:
         return UNKNOWN_AHEAD
     if not vehicle.braking:
-        return Ahead(policy.still.volume(slots, known), 0)
+        return PredictedPath(policy.still.volume(slots, known), 0)
     east, _, east_gap, _ = slots[known.east]
     north, _, north_gap, _ = slots[known.north]
     down, _, down_gap, _ = slots[known.down]
@@ -67,9 +67,9 @@ def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -
     low, high = min(height, to_height), max(height, to_height)
     sweep = Sweep((x, y, to_x, to_y), (-reach, -reach, reach, reach))
     farthest = max(distance(x, y), distance(to_x, to_y))
-    place = Place(((sweep, low, high),), PRESENT, height_gap)
+    place = PlaceSet(((sweep, low, high),), PRESENT, height_gap)
     volume = _tuple(Volume, (place, (low, high, height_gap, None), (farthest, farthest)))
-    return _tuple(Ahead, (volume, goes_us - age_us - (-speed * SECOND // braking)))
+    return _tuple(PredictedPath, (volume, goes_us - age_us - (-speed * SECOND // braking)))
 
 
 def _root(square: int) -> int:

@@ -24,7 +24,7 @@ AROUND = 10_000
 _UTC = LocalTime(0)
 
 
-class Circle:
+class Disc:
     """All places nearer to a centre than a radius."""
 
     __slots__ = ("_radius", "_square", "_x", "_y")
@@ -82,7 +82,7 @@ class Circle:
         return abs(ux * vy - uy * vx) > radius * (isqrt(square) + 1)
 
 
-class Area:
+class RingArea:
     """The inside of the rings of a polygon, or of areas with holes."""
 
     __slots__ = ("clear", "compared", "contains")
@@ -109,7 +109,7 @@ class PreparedZone:
         self.number = number
         self.floor, self.ceiling = zone.floor, zone.ceiling
         self.banded = (zone.floor, zone.ceiling) != (LOWEST, HIGHEST)
-        self.shape: Circle | Area = Circle(zone.data) if zone.shape == CIRCLE else Area(zone)
+        self.shape: Disc | RingArea = Disc(zone.data) if zone.shape == CIRCLE else RingArea(zone)
         self.times = Times(zone, local) if timed(zone) else None
         self.vicinity = Vicinity(self)
 
@@ -202,7 +202,7 @@ class Sweep:
 Part: TypeAlias = tuple[Sweep, int, int]
 
 
-class Place:
+class PlaceSet:
     """A set of places, the union of its parts; there is at least one. `located` and `high` say whether it may be
     missing where they are, and how high: either may tell by itself that they are outside of a zone.
 
@@ -241,7 +241,7 @@ class Place:
 
 
 def _bounds(sweep: Sweep, low: int, high: int) -> Bounds | None:
-    """What a part lies within; None where its box is too wide for `Circle.throughout`."""
+    """What a part lies within; None where its box is too wide for `Disc.throughout`."""
     west, south, east, north = box = sweep.box
     if max(map(abs, box)) > AROUND:
         return None
@@ -249,7 +249,7 @@ def _bounds(sweep: Sweep, low: int, high: int) -> Bounds | None:
     return (min(x) + west, min(y) + south, low, max(x) + east, max(y) + north, high)
 
 
-NOWHERE = Place(((Sweep((0, 0), NO_BOX), 0, 0),), ABSENT, ABSENT)
+NOWHERE = PlaceSet(((Sweep((0, 0), NO_BOX), 0, 0),), ABSENT, ABSENT)
 
 
 class WellKnown(NamedTuple):
@@ -267,10 +267,10 @@ class WellKnown(NamedTuple):
     drain: int = -1
 
 
-def here(slots: Sequence[Value], known: WellKnown) -> Place:
+def here(slots: Sequence[Value], known: WellKnown) -> PlaceSet:
     """Where the vehicle is now, as far as the state tells."""
     west, east, x_gap, _ = slots[known.x]
     south, north, y_gap, _ = slots[known.y]
     low, high, height_gap, _ = slots[known.height]
     sweep = Sweep((west, south), (0, 0, east - west, north - south))
-    return Place(((sweep, low, high),), max(x_gap, y_gap), height_gap)
+    return PlaceSet(((sweep, low, high),), max(x_gap, y_gap), height_gap)

@@ -16,7 +16,7 @@ from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.gaps import STALLED, seconds
 from rtshcua.evidence.log_writer import BOUNDARY, BOUNDARY_LOST
 from rtshcua.evidence.note import octets
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.recovery import RECOVERED
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.model.flat.limits import MAX_MONITORS, MAX_SLOTS
@@ -24,7 +24,7 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now, State
 from rtshcua.model.outcome import WIRE_REASONS, Outcome
 from rtshcua.wire import boundary_chain, receipt, request, statement
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS, Tag
-from rtshcua.wire.clock import APART_US, DRIFT_US, Source, bears_out
+from rtshcua.wire.clock import APART_US, DRIFT_US, ClockSource, bears_out
 from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.preparation import MOST, ParameterWrite
@@ -138,7 +138,7 @@ class BoundaryEvidence:
                 found = self._vouched_for(record)
             self._gap = None
             return found.at(record.seq, offset) if isinstance(found, Flaw) else found
-        if isinstance(record, Decision | Effect):
+        if isinstance(record, DecisionRecord | Effect):
             if isinstance(record, Effect) and record.event == STALLED:
                 self._gap = record.seq, record.at_us
             return self._entered(record, offset)
@@ -161,7 +161,7 @@ class BoundaryEvidence:
 
     # -------------------------------------------------------- what the log tells of
 
-    def _entered(self, record: Decision | Effect, offset: int) -> Finding | None:
+    def _entered(self, record: DecisionRecord | Effect, offset: int) -> Finding | None:
         entry = entry_of(record)
         if entry is None:
             return None
@@ -255,7 +255,7 @@ class BoundaryEvidence:
             # where the boundary knows of none, it decides nothing by one that is named
             if claim is not None and not bears_out(own, claim.at(own, since_us)):
                 text = "it claims another time of day than the boundary has by its own clock"
-                known = self.last.source != Source.UNKNOWN
+                known = self.last.source != ClockSource.UNKNOWN
                 expected = (
                     f"{own.utc_us} us, true to {seconds(own.utc_error_us)}" if known else "none: its clock is not known"
                 )
@@ -313,7 +313,7 @@ class BoundaryEvidence:
             f"{last.stopped} were refused, {last.repeated} answers repeated one and {last.declined} documents were "
             "refused"
         )
-        proven, unproven = _of_clock(Source(last.source))
+        proven, unproven = _of_clock(ClockSource(last.source))
         proven = (Claim("boundary", text), *proven)
         ahead = (*_ahead(last.ahead), *unproven)
         if last.final and self._lost is None:
@@ -327,12 +327,12 @@ class BoundaryEvidence:
         return proven, (Claim("boundary", "what the boundary made after its last signature: it broke off"), *ahead)
 
 
-def _of_clock(source: Source) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
+def _of_clock(source: ClockSource) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
     """What is proven of the time of day, and what is not."""
-    if source is Source.SHARED:
+    if source is ClockSource.SHARED:
         text = "the time of day by a clock of the boundary's own: it had that of the run"
         return (), (Claim("clock", text),)
-    if source is Source.UNKNOWN:
+    if source is ClockSource.UNKNOWN:
         return (Claim("clock", "the boundary's own clock knew no time of day, and the records claim none"),), ()
     text = f"the time of day of the records is that of the boundary's own clock, by the {source.name.lower()}"
     return (Claim("clock", text),), ()
@@ -348,7 +348,7 @@ def _is_made(record: AnyRecord) -> bool:
     """Whether a record tells of something that only a boundary makes. Of the others, links fly without it, and what it
     did not answer counts as refused.
     """
-    if isinstance(record, Decision):
+    if isinstance(record, DecisionRecord):
         return True
     if not isinstance(record, Effect) or record.event in ("refused", "not-permitted"):
         return False
@@ -366,9 +366,9 @@ def _omitted(count: int) -> Flaw:
     return Flaw("boundary/omitted", text)
 
 
-def entry_of(record: Decision | Effect) -> Entry | Flaw | None:
+def entry_of(record: DecisionRecord | Effect) -> Entry | Flaw | None:
     """What the boundary made of what a record tells of; None where it had no part in that."""
-    if isinstance(record, Decision):
+    if isinstance(record, DecisionRecord):
         text = "no boundary makes such a decision: a field of it is none that there is"
         return _decided(record) or Flaw("boundary/record", text)
     make = _EFFECTS.get(record.event)
@@ -378,7 +378,7 @@ def entry_of(record: Decision | Effect) -> Entry | Flaw | None:
     return make(record) or Flaw("boundary/record", text, record.detail)
 
 
-def _decided(record: Decision) -> Entry | None:
+def _decided(record: DecisionRecord) -> Entry | None:
     outcome, reason = _OUTCOMES.get(record.outcome), _REASONS.get(record.reason)
     state, given = record.state, record.context
     if outcome is None or reason is None or _BINDING.fullmatch(record.binding) is None:

@@ -9,14 +9,14 @@ from typing import Final, NamedTuple
 
 from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Claim, Flaw
-from rtshcua.evidence.records import Decision, Effect, Genesis, Recover, Signed
+from rtshcua.evidence.records import DecisionRecord, Effect, Genesis, Recover, Signed
 from rtshcua.model.quantity import Dimension, display
 
 #: the effect that says how long nothing was recorded before it
 STALLED: Final = "stalled"
 
 
-class Gap(NamedTuple):
+class RecordGap(NamedTuple):
     """`us` in which nothing was recorded, before record number `record`. The signed record number `signed` signs for
     it; the boundary does in record number `boundary`. None where none does.
     """
@@ -32,7 +32,7 @@ def detail_of(silent_us: int) -> str:
     return f"{silent_us} us"
 
 
-class Term:
+class EpochTerm:
     """Takes the records of one log in their order, after their clocks were checked: each stands in an epoch that was
     not over. `gaps` are those that it found, and that a signed record signs for.
     """
@@ -40,13 +40,13 @@ class Term:
     __slots__ = ("_last_us", "_open", "_told", "_until_us", "gaps")
 
     def __init__(self) -> None:
-        self.gaps: list[Gap] = []
-        self._open: list[Gap] = []  # in this epoch
+        self.gaps: list[RecordGap] = []
+        self._open: list[RecordGap] = []  # in this epoch
         self._told = False  # one was recorded in this epoch
         self._until_us = 0  # a record that is not signed stands no later than this
         self._last_us = 0
 
-    def take(self, record: Decision | Effect, before: int) -> Flaw | None:
+    def take(self, record: DecisionRecord | Effect, before: int) -> Flaw | None:
         """What is wrong with the place of a record, `before` lines after the last signed one."""
         at_us = record.at_us
         if isinstance(record, Effect) and record.event == STALLED:
@@ -71,7 +71,7 @@ class Term:
             return Flaw("seal/gap", text, record.detail, detail_of(silent_us))
         self._told = True
         self._until_us += silent_us
-        self._open.append(Gap(record.seq, silent_us))
+        self._open.append(RecordGap(record.seq, silent_us))
         return None
 
     def sign(self, record: Signed) -> None:
@@ -79,18 +79,18 @@ class Term:
         at_us = record.at_us
         silent_us = at_us - self._last_us
         if silent_us > LONGEST_US and not isinstance(record, Genesis | Recover):  # monotonic time begins there
-            self._open.append(Gap(record.seq, silent_us))
+            self._open.append(RecordGap(record.seq, silent_us))
         self.gaps += [gap._replace(signed=record.seq) for gap in self._open]
         self._open.clear()
         self._told = False
         self._last_us, self._until_us = at_us, at_us + LONGEST_US
 
-    def all(self) -> tuple[Gap, ...]:
+    def all(self) -> tuple[RecordGap, ...]:
         """All gaps so far, those too for which nobody has signed yet."""
         return (*self.gaps, *self._open)
 
 
-def told(gap: Gap) -> Claim:
+def told(gap: RecordGap) -> Claim:
     """What is not shown, for nothing was recorded; and who vouches for that."""
     by = []
     if gap.signed is not None:

@@ -5,7 +5,7 @@ from hashlib import sha256
 
 from msgspec.structs import replace
 
-from rtshcua.evidence.merkle import LEAF, Tree, leaf_hash
+from rtshcua.evidence.merkle import LEAF, MerkleTree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, sign
 from rtshcua.evidence.records import Record, Signed, encode, next_key_of, unsigned
 
@@ -27,7 +27,7 @@ class Head:
     def __init__(self) -> None:
         self.seq = self.first = 0
         self.prev = START
-        self.tree = Tree()
+        self.tree = MerkleTree()
         self._push = self.tree.push
         self.epoch = -1
         self.after: bytes | None = None

@@ -15,7 +15,7 @@ from rtshcua.evidence.records import (
     FORMAT,
     VERSION,
     Close,
-    Decision,
+    DecisionRecord,
     Effect,
     Genesis,
     RecordedContext,
@@ -173,7 +173,7 @@ class Recorder:
         outcome, reason, rule_step, clause, clause_at, target, target_link, valid_until_us = in_words(decided)
         self._last_us = now.monotonic_us
         return head.add(
-            Decision(  # by position, in the order of definition: a third faster than by name
+            DecisionRecord(  # by position, in the order of definition: a third faster than by name
                 head.prev,
                 now.monotonic_us,
                 context.binding.hex(),

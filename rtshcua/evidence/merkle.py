@@ -23,7 +23,7 @@ def node_hash(left: bytes, right: bytes) -> bytes:
     return hasher.digest()
 
 
-class Tree:
+class MerkleTree:
     """The tree of the leaves pushed so far; it holds one hash for each set bit of `size`.
 
     Leaves are folded in when the root is asked for, and `TILE` together at the latest: who pushes one, and waits, then
@@ -83,7 +83,7 @@ class Tree:
 
 def root_of(leaves: Iterable[bytes]) -> bytes:
     """The root hash over leaf hashes."""
-    tree = Tree()
+    tree = MerkleTree()
     for leaf in leaves:
         tree.push(leaf)
     return tree.root()

@@ -7,7 +7,7 @@ the nodes, or `proof_of`, which reads all leaves once.
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from rtshcua.evidence.merkle import EMPTY, Tree, node_hash
+from rtshcua.evidence.merkle import EMPTY, MerkleTree, node_hash
 
 #: leaves from the first number up to, and without, the second
 Range = tuple[int, int]
@@ -68,7 +68,7 @@ def proof_of(ranges: Sequence[Range], leaves: Iterable[bytes]) -> list[bytes]:
     """
     pairs, found = _numbered(leaves), {}
     for start, end in sorted(ranges):
-        tree = Tree()
+        tree = MerkleTree()
         for number, leaf in pairs:
             if number >= start:
                 tree.push(leaf)

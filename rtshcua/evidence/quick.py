@@ -18,12 +18,12 @@ from typing import Final, NamedTuple
 from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Claim, Flaw
-from rtshcua.evidence.gaps import STALLED, Gap, detail_of, told
+from rtshcua.evidence.gaps import STALLED, RecordGap, detail_of, told
 from rtshcua.evidence.heads import START
-from rtshcua.evidence.merkle import EMPTY, Tree, leaf_hash, node_hash
+from rtshcua.evidence.merkle import EMPTY, MerkleTree, leaf_hash, node_hash
 from rtshcua.evidence.reading import LONGEST, read
 from rtshcua.evidence.records import Close, Effect, Genesis, Recover, Seal, Signed
-from rtshcua.evidence.report import Report, claims, unsealed, with_anchors
+from rtshcua.evidence.report import LogReport, claims, unsealed, with_anchors
 from rtshcua.evidence.seal_verification import Seals, Segment
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 
@@ -49,7 +49,7 @@ _UNTRUE: Final = Flaw("seal/gap", "a gap is recorded that the records do not hav
 _TREE = "that records are linked line by line and make up the signed tree: without `--fast`"
 
 
-class Leaves(NamedTuple):
+class SegmentLeaves(NamedTuple):
     """The lines of a segment as leaves of the tree.
 
     `number` is that of the first line. `first` is what it names as the line before it and `last` what the line after
@@ -65,14 +65,14 @@ class Leaves(NamedTuple):
     last_us: int
     nodes: tuple[tuple[int, bytes], ...]
     anchors: tuple[str, ...]
-    gap: Gap | None
+    gap: RecordGap | None
 
 
-class Part(NamedTuple):
+class SegmentPart(NamedTuple):
     """A segment's digest (SHA-256, hexadecimal), and its leaves where somebody looked."""
 
     digest: str
-    leaves: Leaves | None
+    leaves: SegmentLeaves | None
 
 
 def find(octets: Octets, size: int) -> "array[int] | None":
@@ -114,7 +114,7 @@ def signed_line(octets: Octets, offset: int, longest: int = _LONGEST_LINE) -> by
         length <<= 4
 
 
-def scan(data: bytes) -> Part | None:
+def scan(data: bytes) -> SegmentPart | None:
     """The part of a segment's octets; None where something is out of place."""
     if b"\r" in data or data.count(b"\n") > MOST_RECORDS + 1 or data.count(_CHECKPOINT) != 1:
         return None
@@ -129,8 +129,8 @@ def scan(data: bytes) -> Part | None:
         return None
     count = len(leaves)
     nodes = tuple(_nodes(leaves, signed.seq))
-    found = Leaves(signed.seq, count, lines[0][10:74], links[-64:], last_us, nodes, _anchors(data), gap)
-    return Part(sha256(data).hexdigest(), found)
+    found = SegmentLeaves(signed.seq, count, lines[0][10:74], links[-64:], last_us, nodes, _anchors(data), gap)
+    return SegmentPart(sha256(data).hexdigest(), found)
 
 
 def _at_us(line: bytes) -> int | None:
@@ -138,7 +138,7 @@ def _at_us(line: bytes) -> int | None:
     return int(digits) if line.startswith(_AT, 74) and digits.isdigit() else None
 
 
-def _gap(data: bytes, lines: list[bytes], first: int) -> Gap | Flaw | None:
+def _gap(data: bytes, lines: list[bytes], first: int) -> RecordGap | Flaw | None:
     """The gap that is recorded in a segment, if one is; a flaw where it is not what the lines say."""
     if data.find(_STALLED) < 0:
         return None
@@ -146,7 +146,7 @@ def _gap(data: bytes, lines: list[bytes], first: int) -> Gap | Flaw | None:
     before, at_us, record = _at_us(lines[number - 1]), _at_us(lines[number]), read(lines[number])
     if more or not number or before is None or at_us is None or not isinstance(record, Effect):
         return _UNTRUE
-    return Gap(first + number, at_us - before) if record.detail == detail_of(at_us - before) else _UNTRUE
+    return RecordGap(first + number, at_us - before) if record.detail == detail_of(at_us - before) else _UNTRUE
 
 
 def _anchors(data: bytes) -> tuple[str, ...]:
@@ -179,7 +179,7 @@ def _nodes(level: list[bytes], first: int) -> list[tuple[int, bytes]]:
     return left + right[::-1]
 
 
-class Outline(NamedTuple):
+class LogOutline(NamedTuple):
     """Where the signed records of a log begin, the genesis first and the close last; and the genesis."""
 
     octets: Octets
@@ -188,15 +188,15 @@ class Outline(NamedTuple):
     genesis: Genesis
 
 
-def outline(octets: Octets, size: int) -> Outline | None:
+def outline(octets: Octets, size: int) -> LogOutline | None:
     """The outline of a log of so many octets; None where it has none that is worth believing."""
     line = signed_line(octets, 0, LONGEST)
     genesis = None if line is None else read(line)
     offsets = find(octets, size) if isinstance(genesis, Genesis) else None
-    return None if offsets is None or not isinstance(genesis, Genesis) else Outline(octets, size, offsets, genesis)
+    return None if offsets is None or not isinstance(genesis, Genesis) else LogOutline(octets, size, offsets, genesis)
 
 
-def quick(log: Outline, parts: Iterable[Part | None], anchors: Anchors) -> Report | None:
+def quick(log: LogOutline, parts: Iterable[SegmentPart | None], anchors: Anchors) -> LogReport | None:
     """The report on a log that is whole and closed, or None where the careful verification must find out.
 
     `parts` are those of its segments in their order. Where nobody looked at their leaves, the report says so.
@@ -224,17 +224,17 @@ class _Walk:
         self._anchors = anchors
         self._seals = Seals()
         self._clocks = Clocks()
-        self._tree = Tree()
+        self._tree = MerkleTree()
         self._seq = self._signed_us = self._recovers = 0
         self._link = START.encode()
         self._fast = False
-        self._gaps: list[Gap] = []
+        self._gaps: list[RecordGap] = []
 
     def begin(self) -> bool:
         genesis = self._genesis
         return (genesis.seq, genesis.prev) == (0, START) and self._signed(genesis, Segment(0, 0, "", EMPTY))
 
-    def segment(self, part: Part, octets: int, record: Seal | Recover | Close) -> bool:
+    def segment(self, part: SegmentPart, octets: int, record: Seal | Recover | Close) -> bool:
         """Take a segment, and the record that closes it."""
         leaves, anew = part.leaves, isinstance(record, Recover)
         if leaves is None:
@@ -251,7 +251,7 @@ class _Walk:
         if leaves.gap is not None:
             self._gaps.append(leaves.gap._replace(signed=record.seq))
         if not anew and record.at_us - leaves.last_us > LONGEST_US:
-            self._gaps.append(Gap(record.seq, record.at_us - leaves.last_us, record.seq))
+            self._gaps.append(RecordGap(record.seq, record.at_us - leaves.last_us, record.seq))
         for height, node in leaves.nodes:
             self._tree.graft(height, node)
         self._link = leaves.last
@@ -273,7 +273,7 @@ class _Walk:
         assert record.checkpoint is not None
         return self._anchors.checkpoint(record.checkpoint) is None
 
-    def close(self, close: Close, line: bytes) -> Report | None:
+    def close(self, close: Close, line: bytes) -> LogReport | None:
         """The report, after the close."""
         records, epochs = close.seq + 1, self._seals.epochs
         anchored = self._anchors.finish(records)
@@ -292,7 +292,7 @@ class _Walk:
             self._tree.push(leaf_hash(line))
             root = self._tree.root()
         counts = {"genesis": 1, "seal": epochs - self._recovers - 1, "recover": self._recovers, "close": 1}
-        report = Report(
+        report = LogReport(
             records=records,
             counts={kind: count for kind, count in counts.items() if count},
             failure=None,

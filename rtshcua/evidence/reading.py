@@ -10,7 +10,7 @@ from rtshcua.evidence.records import (
     VERSION,
     AnyRecord,
     Close,
-    Decision,
+    DecisionRecord,
     Effect,
     Genesis,
     Recover,
@@ -65,7 +65,7 @@ _TYPE = b',"type":"'  # no text can hold it, for a quote inside a text stands be
 _VERSION = re.compile(rb',"version":(\d{1,15})[,}]')
 _DECODERS: dict[bytes, msgspec.json.Decoder[AnyRecord]] = {
     b"genesis": msgspec.json.Decoder(Genesis),
-    b"decision": msgspec.json.Decoder(Decision),
+    b"decision": msgspec.json.Decoder(DecisionRecord),
     b"effect": msgspec.json.Decoder(Effect),
     b"seal": msgspec.json.Decoder(Seal),
     b"recover": msgspec.json.Decoder(Recover),
@@ -97,14 +97,14 @@ def read(line: bytes) -> AnyRecord | Flaw:
         return Flaw("record/malformed", f"it has not the form of a record of type {name.decode()}: {_words(error)}")
     if encode(record) != line:
         return Flaw("record/not-canonical", "it is not written in the one form that this record has (RFC 8785)")
-    if isinstance(record, Decision):
+    if isinstance(record, DecisionRecord):
         return _decision(record)
     if isinstance(record, Genesis) and (record.format != FORMAT or record.version != VERSION):
         return _unknown_format(record.format, record.version)
     return record
 
 
-def _decision(record: Decision) -> Decision | Flaw:
+def _decision(record: DecisionRecord) -> DecisionRecord | Flaw:
     if record.outcome not in _OUTCOMES:
         text = "it has not the form of a record of type decision: its outcome is none that there is"
         return Flaw("record/malformed", text, record.outcome, ", ".join(sorted(_OUTCOMES)))

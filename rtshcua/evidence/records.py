@@ -120,7 +120,7 @@ def in_words(
     )
 
 
-class Decision(Record, frozen=True):
+class DecisionRecord(Record, frozen=True):
     """One answer of `enforce`, with every input that `decide` read, so that it can be derived again.
 
     `kind`, `step` and `link` are those of the request (`wire.request`). `outcome` and `reason` are slugs.
@@ -162,8 +162,7 @@ class Decision(Record, frozen=True):
 class Effect(Record, frozen=True):
     """What then happened. `event` is a stable slug; `detail` is text of the world's own making, never to be trusted.
 
-    `kind`, `step` and `link` name what it belongs to as in `Decision` (-1 where nothing does), `token` the command
-    (-1: none).
+    `kind`, `step` and `link` name what it belongs to as in `DecisionRecord` (-1: nothing), `token` the command, or -1.
     """
 
     prev: str
@@ -246,7 +245,7 @@ class Close(Record, frozen=True):
     utc_us: Count
 
 
-AnyRecord = Genesis | Decision | Effect | Seal | Recover | Close
+AnyRecord = Genesis | DecisionRecord | Effect | Seal | Recover | Close
 #: Records with a `checkpoint`: a C2SP signed note over the tree of all lines before, and over the record itself.
 Signed = Genesis | Seal | Recover | Close
 #: those that end an epoch

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.finding import Finding, Flaw
-from rtshcua.evidence.gaps import Term
+from rtshcua.evidence.gaps import EpochTerm
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.reading import behind_close, read, shown, too_long
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal, is_signed
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal, is_signed
 from rtshcua.evidence.seal_verification import Seals
 from rtshcua.model.flat.situation import Now
 
@@ -28,7 +28,7 @@ from rtshcua.model.flat.situation import Now
 RECOVERED = "recovered"
 
 
-class State(Enum):
+class LogState(Enum):
     """What a log is to recovery: `closed`: nothing to do. `whole`: ends between two records, without a close. `torn`:
     there is something behind the last record, as a crash leaves it. `unbegun`: it has not even a first record.
 
@@ -43,10 +43,10 @@ class State(Enum):
     FOREIGN = "foreign"
 
 
-RECOVERABLE = (State.WHOLE, State.TORN)
+RECOVERABLE = (LogState.WHOLE, LogState.TORN)
 
 
-class Examined(NamedTuple):
+class FoundLog(NamedTuple):
     """A log as it was found. Its first `records`, `kept` octets, verify; `head` stands behind them, to be gone on from
     once. `sealed` counts the records up to the last signed one, it included. `discarded` octets of that SHA-256 follow.
 
@@ -54,7 +54,7 @@ class Examined(NamedTuple):
     kept records leave no doubt of, in us: it is later now.
     """
 
-    state: State
+    state: LogState
     genesis: Genesis | None
     head: Head
     records: int
@@ -78,7 +78,7 @@ class Examination:
         self.genesis: Genesis | None = None
         self.reason: Finding | None = None
         self._public = None if public is None else public.hex()
-        self._clocks, self._seals, self._term = Clocks(), Seals(), Term()
+        self._clocks, self._seals, self._term = Clocks(), Seals(), EpochTerm()
         self._latest_us = 0
         self._sealed = 0
         self._closed = False
@@ -126,7 +126,7 @@ class Examination:
 
     def _check_epoch(self, record: AnyRecord, line: bytes) -> Flaw | None:
         head = self.head
-        if isinstance(record, Decision | Effect):
+        if isinstance(record, DecisionRecord | Effect):
             flaw = self._term.take(record, head.records)
             if flaw is None:
                 head.take(line)
@@ -141,9 +141,9 @@ class Examination:
             self.genesis = record
         return None
 
-    def examined(self) -> Examined:
+    def examined(self) -> FoundLog:
         """The whole, once the lines are over."""
-        return Examined(
+        return FoundLog(
             state=self._state(),
             genesis=self.genesis,
             head=self.head,
@@ -156,20 +156,20 @@ class Examination:
             latest_us=self._latest_us,
         )
 
-    def _state(self) -> State:
+    def _state(self) -> LogState:
         if self.reason is not None and (self._whole or self._more or self._closed):
-            return State.TAMPERED
+            return LogState.TAMPERED
         if self.genesis is None:
-            return State.UNBEGUN
+            return LogState.UNBEGUN
         if self._closed:
-            return State.CLOSED
+            return LogState.CLOSED
         if self._public not in (None, self.genesis.log_key):
-            return State.FOREIGN
-        return State.WHOLE if self.reason is None else State.TORN
+            return LogState.FOREIGN
+        return LogState.WHOLE if self.reason is None else LogState.TORN
 
 
 def ending(
-    examined: Examined, now: Now, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]
+    examined: FoundLog, now: Now, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]
 ) -> bytes:
     """The two lines that end a log in state `WHOLE` or `TORN` after what is kept of it: `recover` and `close`.
 

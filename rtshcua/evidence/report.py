@@ -6,16 +6,16 @@ from enum import Enum
 from typing import NamedTuple
 
 from rtshcua.evidence.finding import Claim, Finding
-from rtshcua.evidence.gaps import Gap, told
+from rtshcua.evidence.gaps import RecordGap, told
 from rtshcua.evidence.records import Close, Genesis
 from rtshcua.evidence.seal_verification import Recoveries
-from rtshcua.evidence.witnessing.anchors import Anchored
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent
 
 _LAST_S = 253_402_300_799  # the end of the year 9999
 _NONE = Recoveries()
 
 
-class Verdict(Enum):
+class LogVerdict(Enum):
     """`VERIFIED`: whole up to a signed close. `INCOMPLETE`: sound as far as it goes. `FAILED`: not to be believed."""
 
     VERIFIED = "verified"
@@ -23,7 +23,7 @@ class Verdict(Enum):
     FAILED = "failed"
 
 
-class Report(NamedTuple):
+class LogReport(NamedTuple):
     """The verification of one log.
 
     `records` is how many were sound, `counts` how many of each kind: record types, and outcomes of the decisions.
@@ -46,15 +46,15 @@ class Report(NamedTuple):
     sealed: int = 0
     epochs: int = 0
     anchored: int = 0
-    outside: Anchored | None = None
-    gaps: tuple[Gap, ...] = ()
+    outside: AnchoredExtent | None = None
+    gaps: tuple[RecordGap, ...] = ()
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> LogVerdict:
         """The whole in one word."""
         if self.failure is not None:
-            return Verdict.FAILED
-        return Verdict.VERIFIED if self.shortfall is None else Verdict.INCOMPLETE
+            return LogVerdict.FAILED
+        return LogVerdict.VERIFIED if self.shortfall is None else LogVerdict.INCOMPLETE
 
 
 def claims(
@@ -103,7 +103,7 @@ def unsealed(recoveries: Recoveries) -> tuple[Claim, ...]:
     return (Claim("recovered", text),)
 
 
-def with_anchors(report: Report, anchored: Anchored) -> Report:
+def with_anchors(report: LogReport, anchored: AnchoredExtent) -> LogReport:
     """A report without failure, with what witnesses saw of its log."""
     count = min(anchored.records, report.records)
     unproven = tuple(claim for claim in report.unproven if claim.slug != "anchor")
@@ -120,21 +120,21 @@ def with_anchors(report: Report, anchored: Anchored) -> Report:
     return report._replace(anchored=count, proven=proven, unproven=unproven, outside=anchored)
 
 
-def with_boundary(report: Report, signed: Mapping[int, int]) -> Report:
+def with_boundary(report: LogReport, signed: Mapping[int, int]) -> LogReport:
     """A report without failure, with the gaps for which the boundary signed too, by the numbers of their records."""
     gaps = tuple(gap._replace(boundary=signed.get(gap.record)) for gap in report.gaps)
     unproven = (*(claim for claim in report.unproven if claim.slug != "gap"), *map(told, gaps))
     return report._replace(gaps=gaps, unproven=unproven)
 
 
-def rejected(anchored: Anchored) -> Claim:
+def rejected(anchored: AnchoredExtent) -> Claim:
     """What notes of witnesses do not say, for they are damaged or forged."""
     many = "1 note" if anchored.rejected == 1 else f"{anchored.rejected} notes"
     text = f"what {many} of witnesses would say, damaged or forged and passed over: {anchored.first}"
     return Claim("anchor/signature", text)
 
 
-def cosigned(anchored: Anchored) -> str:
+def cosigned(anchored: AnchoredExtent) -> str:
     """By how many of how many witnesses more is cosigned than is anchored, in words; empty where by none."""
     if not anchored.ahead:
         return ""
@@ -148,7 +148,7 @@ def utc_of(time_s: int) -> str:
     return (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=time_s)).strftime("%Y-%m-%d %H:%M:%SZ")
 
 
-def unanchored(records: int, anchored: int, outside: Anchored | None = None) -> Claim:
+def unanchored(records: int, anchored: int, outside: AnchoredExtent | None = None) -> Claim:
     """What is not proven where the first `anchored` of `records` records are held by witnesses; `outside` says whether
     some of the others were cosigned, by too few.
     """

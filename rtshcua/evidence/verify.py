@@ -16,18 +16,18 @@ from collections.abc import Iterable
 
 from rtshcua.evidence.clocks import Clocks
 from rtshcua.evidence.finding import Finding, Flaw
-from rtshcua.evidence.gaps import Term, told
+from rtshcua.evidence.gaps import EpochTerm, told
 from rtshcua.evidence.heads import START, Head
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.reading import SHOWN, behind_close, may_be_torn, read, shown, too_long
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis
-from rtshcua.evidence.report import Report, claims, unsealed
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis
+from rtshcua.evidence.report import LogReport, claims, unsealed
 from rtshcua.evidence.seal_verification import Seals
 
 _LINK = slice(10, 74)  # where the value of `_prev` stands
 
 
-class Verifier:
+class LogVerifier:
     """Takes the lines of a log in order; after the first that fails it takes no more."""
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class Verifier:
         self._before = 0  # where the last line began
         self._torn: bytes | None = None
         self._doubt: tuple[bytes, Finding] | None = None  # hash of the line after a broken link, and what it then is
-        self._term = Term()
+        self._term = EpochTerm()
 
     @property
     def records(self) -> int:
@@ -73,7 +73,7 @@ class Verifier:
         self._before, self.offset = self.offset, self.offset + len(line)
         counts = self._counts
         counts[record.type] = counts.get(record.type, 0) + 1
-        if isinstance(record, Decision):
+        if isinstance(record, DecisionRecord):
             counts[record.outcome] = counts.get(record.outcome, 0) + 1
         return record
 
@@ -130,7 +130,7 @@ class Verifier:
     def _check_epoch(self, record: AnyRecord, line: bytes) -> Flaw | None:
         # 6 the epochs
         head = self._head
-        if isinstance(record, Decision | Effect):
+        if isinstance(record, DecisionRecord | Effect):
             flaw = self._term.take(record, head.seq - head.first)
             if flaw is None:
                 head.take(line)
@@ -145,7 +145,7 @@ class Verifier:
             self.close = record
         return None
 
-    def report(self) -> Report:
+    def report(self) -> LogReport:
         """The whole, once the lines are over."""
         if self._doubt is not None:
             self.failure, self._doubt = self._doubt[1], None
@@ -160,7 +160,7 @@ class Verifier:
         gaps = () if self.failure is not None else self._term.all()
         if self.failure is None:
             unproven = (*unproven, *unsealed(self.seals.recoveries), *map(told, gaps))
-        return Report(
+        return LogReport(
             records=self.records,
             counts=self._counts,
             failure=self.failure,
@@ -196,9 +196,9 @@ class Verifier:
         return None, Finding("tail/torn", number, text, offset=offset)
 
 
-def verify(lines: Iterable[bytes]) -> Report:
+def verify(lines: Iterable[bytes]) -> LogReport:
     """Verifies the lines of a log, each with its newline, as a file opened in binary mode yields them."""
-    verifier = Verifier()
+    verifier = LogVerifier()
     for line in lines:
         verifier.take(line)
         if verifier.failure is not None:

@@ -7,7 +7,7 @@ can make the link look worse, never better. It is let in only where the operator
 from typing import Any, Final
 
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
-from rtshcua.mavlink.signing import Counts, Verifier
+from rtshcua.mavlink.signing import Counts, FrameVerifier
 
 RADIO_STATUS: Final = 109
 #: who a SiK radio says that it is: `RADIO_SOURCE_SYSTEM` '3' and `RADIO_SOURCE_COMPONENT` 'D' of ArduPilot/SiK,
@@ -24,7 +24,7 @@ _NOT_KNOWN: Final = 255
 class UnsignedRadio:
     """Accepts what `link` accepts, and RADIO_STATUS without a signature, tempered."""
 
-    def __init__(self, link: Verifier) -> None:
+    def __init__(self, link: FrameVerifier) -> None:
         self._link = link
         self._now: dict[str, int] = {}  # the worst since `_since_us`,
         self._before: dict[str, int] = {}  # and in the span before it

@@ -5,7 +5,7 @@ of SHA-256 over key, header, payload, checksum, link id and timestamp (guide, "S
 
 Two things are stricter here than in pymavlink's own signing. It remembers a timestamp before it checks the signature,
 so that a forged frame can lock out a stream for ever; and it keeps nothing over a restart, so that what was sent before
-can be sent again. `State` is what has to be kept; `rtshcua.adapters.store.signing` keeps it.
+can be sent again. `SigningState` is what has to be kept; `rtshcua.adapters.store.signing` keeps it.
 """
 
 import hashlib
@@ -45,7 +45,7 @@ def timestamp_of(utc_us: int) -> int:
     return (utc_us - EPOCH_US) // UNIT_US
 
 
-class State(NamedTuple):
+class SigningState(NamedTuple):
     """What must outlive a restart: the local timestamp, and the last one of each stream that was heard."""
 
     timestamp: int
@@ -65,7 +65,7 @@ class Counts:
     unverified: int = 0  # taken in when nobody was there to verify them
 
 
-class Verifier(Protocol):
+class FrameVerifier(Protocol):
     """Says whether a frame proves where it comes from. `counts`: what became of those that came."""
 
     @property
@@ -88,7 +88,14 @@ class SignedLink:
     """
 
     def __init__(
-        self, key: bytes, stored: State, utc_us: int, monotonic_us: int, link: int = 0, *, as_library: bool = False
+        self,
+        key: bytes,
+        stored: SigningState,
+        utc_us: int,
+        monotonic_us: int,
+        link: int = 0,
+        *,
+        as_library: bool = False,
     ) -> None:
         if len(key) != KEY_OCTETS:
             raise ValueError(f"a link key has {KEY_OCTETS} octets, not {len(key)}")
@@ -116,9 +123,9 @@ class SignedLink:
         return self._counts
 
     @property
-    def state(self) -> State:
+    def state(self) -> SigningState:
         """What to keep. May be asked for by another thread than the one that signs."""
-        return State(max(self._ahead, self._promised), self._streams.copy())
+        return SigningState(max(self._ahead, self._promised), self._streams.copy())
 
     def sign(self, frame: bytes, now_us: int) -> bytes:
         """The signed frame for an unsigned one."""

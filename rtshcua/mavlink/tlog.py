@@ -11,7 +11,7 @@ STAMP = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class TlogEntry:
     """A frame and when it was received, in microseconds since the Unix epoch."""
 
     at_us: int
@@ -31,7 +31,7 @@ def encode(at_us: int, frame: bytes) -> bytes:
     return at_us.to_bytes(STAMP, "big") + frame
 
 
-def read(data: bytes) -> Iterator[Entry]:
+def read(data: bytes) -> Iterator[TlogEntry]:
     """The entries of a tlog, in order. Frames are not checked, only measured.
 
     Raises `DamagedTlog` when it comes to bytes that are no whole entry, after yielding all before them.
@@ -39,7 +39,7 @@ def read(data: bytes) -> Iterator[Entry]:
     yield from stream(BytesIO(data))
 
 
-def stream(file: BinaryIO) -> Iterator[Entry]:
+def stream(file: BinaryIO) -> Iterator[TlogEntry]:
     """As `read`, from a file that need not fit into memory."""
     offset = 0
     while head := file.read(STAMP + HEADER):
@@ -49,5 +49,5 @@ def stream(file: BinaryIO) -> Iterator[Entry]:
         frame = head[STAMP:] + file.read(length - HEADER)
         if len(frame) < length:
             raise DamagedTlog(offset)
-        yield Entry(int.from_bytes(head[:STAMP], "big"), frame)
+        yield TlogEntry(int.from_bytes(head[:STAMP], "big"), frame)
         offset += STAMP + length

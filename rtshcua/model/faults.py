@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from rtshcua.model.quantity import Dimension
 
 
-class Mode(StrEnum):
+class FlightMode(StrEnum):
     """A flight mode by what it does."""
 
     MANUAL = "manual"
@@ -154,7 +154,7 @@ class WindStep(Fault):
     gust_mm_s: int = 0
 
 
-class Way(StrEnum):
+class Direction(StrEnum):
     """A direction of the link."""
 
     BOTH = "both"
@@ -170,7 +170,7 @@ class LinkDelay(LinkFault):
 
     delay_us: int
     for_us: int | None = None
-    way: Way = Way.BOTH
+    way: Direction = Direction.BOTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,7 @@ class LinkJitter(LinkFault):
 
     jitter_us: int
     for_us: int | None = None
-    way: Way = Way.BOTH
+    way: Direction = Direction.BOTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +188,7 @@ class LinkReorder(LinkFault):
 
     part: int
     for_us: int | None = None
-    way: Way = Way.BOTH
+    way: Direction = Direction.BOTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +197,7 @@ class LinkLoss(LinkFault):
 
     loss: int
     for_us: int | None = None
-    way: Way = Way.BOTH
+    way: Direction = Direction.BOTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +205,7 @@ class LinkSilence(LinkFault):
     """Nothing gets through: it is lost, or `held` back until the silence is over and comes in one burst."""
 
     for_us: int | None = None
-    way: Way = Way.BOTH
+    way: Direction = Direction.BOTH
     held: bool = False
 
 
@@ -315,7 +315,7 @@ class Pillar(Fault):
 class PilotMode(PilotFault):
     """The pilot takes over with the mode switch."""
 
-    mode: Mode = Mode.POSITION
+    mode: FlightMode = FlightMode.POSITION
 
 
 @dataclass(frozen=True, slots=True)
@@ -500,7 +500,7 @@ KINDS: Mapping[str, type[Fault]] = {
 }
 
 
-class Unit(NamedTuple):
+class FieldUnit(NamedTuple):
     """How numbers of a field are written: on a command line with a unit, in a source as a quantity.
 
     `suffix` ends the field's name; `words` says how many of the field's unit each written one is. `dimension` None: a
@@ -514,23 +514,23 @@ class Unit(NamedTuple):
 
 
 #: the first that fits a field's name
-UNITS: tuple[Unit, ...] = (
-    Unit("_us", {"us": 1, "ms": 1000, "s": 1_000_000, "min": 60_000_000}, Dimension.DURATION),
-    Unit("_mv", {"mV": 1, "V": 1000}, None),
-    Unit("_mm_s", {"mm/s": 1, "m/s": 1000}, Dimension.SPEED),
-    Unit("_mm", {"mm": 1, "m": 1000}, Dimension.LENGTH),
-    Unit("_deg", {"deg": 1}, Dimension.ANGLE, 10_000_000),
-    Unit("", {"%": 100}, Dimension.RATIO),
+UNITS: tuple[FieldUnit, ...] = (
+    FieldUnit("_us", {"us": 1, "ms": 1000, "s": 1_000_000, "min": 60_000_000}, Dimension.DURATION),
+    FieldUnit("_mv", {"mV": 1, "V": 1000}, None),
+    FieldUnit("_mm_s", {"mm/s": 1, "m/s": 1000}, Dimension.SPEED),
+    FieldUnit("_mm", {"mm": 1, "m": 1000}, Dimension.LENGTH),
+    FieldUnit("_deg", {"deg": 1}, Dimension.ANGLE, 10_000_000),
+    FieldUnit("", {"%": 100}, Dimension.RATIO),
 )
 #: fields that are one of some words
 WORDS: Mapping[str, tuple[str, ...]] = {
-    "mode": tuple(Mode),
-    "way": tuple(Way),
+    "mode": tuple(FlightMode),
+    "way": tuple(Direction),
     "held": ("yes", "no"),
     "says": tuple(Voice),
 }
 #: and what their words are members of
-WORD_TYPES: Mapping[str, type[Mode | Way | Voice]] = {"mode": Mode, "way": Way, "says": Voice}
+WORD_TYPES: Mapping[str, type[FlightMode | Direction | Voice]] = {"mode": FlightMode, "way": Direction, "says": Voice}
 #: fields that are a plain number
 COUNTS = frozenset({"copies", "shuffle"})
 #: fields that may be below zero: south and west, down, and back in time
@@ -539,14 +539,14 @@ SIGNED = frozenset({"north", "east", "up", "by"})
 NAMES = frozenset({"message", "role"})
 
 
-class Parameter(NamedTuple):
+class FaultField(NamedTuple):
     """A field of a kind of fault. Exactly one of `unit`, `words`, `is_count`, `is_name` tells what it takes."""
 
     name: str
     """As it is written."""
     field: str
     """As the kind calls it."""
-    unit: Unit | None
+    unit: FieldUnit | None
     words: tuple[str, ...]
     is_count: bool
     is_name: bool
@@ -554,15 +554,15 @@ class Parameter(NamedTuple):
     """Whether it must be given."""
 
 
-def parameters(kind: type[Fault]) -> tuple[Parameter, ...]:
+def parameters(kind: type[Fault]) -> tuple[FaultField, ...]:
     """What may be said of a fault of this kind, but for its time."""
     return tuple(_parameter(field) for field in fields(kind) if field.name != "at_us")
 
 
-def _parameter(field: Field[Any]) -> Parameter:
+def _parameter(field: Field[Any]) -> FaultField:
     name, needed = field.name, field.default is MISSING
     words, is_count, is_name = WORDS.get(name, ()), name in COUNTS, name in NAMES
     if words or is_count or is_name:
-        return Parameter(name, name, None, words, is_count, is_name, needed)
+        return FaultField(name, name, None, words, is_count, is_name, needed)
     unit = next(each for each in UNITS if name.endswith(each.suffix))
-    return Parameter(name.removesuffix(unit.suffix), name, unit, (), False, False, needed)
+    return FaultField(name.removesuffix(unit.suffix), name, unit, (), False, False, needed)

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import AnyRecord, Decision, Effect, Genesis
+from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -24,7 +24,7 @@ from rtshcua.wire.request import DEGRADE, FALLBACK_LINK, Ref
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
 
 
-class InForce(NamedTuple):
+class CommandInForce(NamedTuple):
     """A command that the vehicle may be carrying out. Its token means nothing.
 
     `named`: where the vehicle last said that it flies to, told so by it: latitude and longitude in 1e-7 degree, mm
@@ -41,7 +41,7 @@ class Left(NamedTuple):
     `taken`: what showed that somebody took it over while that run went on; empty where nothing did.
     """
 
-    in_force: tuple[InForce, ...]
+    in_force: tuple[CommandInForce, ...]
     taken: str = ""
 
 
@@ -89,12 +89,12 @@ class _Following:
         """What is left, once the log is over."""
         if self._replaced or not self._known:
             return None
-        in_force = [InForce(command, told.named) for told in self._told for command in told.commands]
+        in_force = [CommandInForce(command, told.named) for told in self._told for command in told.commands]
         return Left(tuple(in_force), self._taken)
 
     def take(self, record: AnyRecord) -> None:
         """The next record."""
-        if isinstance(record, Decision) and record.outcome == "allow":
+        if isinstance(record, DecisionRecord) and record.outcome == "allow":
             self._add(Ref(record.kind, record.step, record.link), None, sent=False)
         elif isinstance(record, Effect):
             self._happened(record, Ref(record.kind, record.step, record.link))

@@ -48,7 +48,7 @@ class Ready(Event, frozen=True):
     others: str = ""
 
 
-class Unfit(Event, frozen=True):
+class VehicleUnfit(Event, frozen=True):
     """The vehicle will not be ready for this mission, however long it is waited for: `why`, in words."""
 
     why: str
@@ -84,11 +84,11 @@ class Succeeded(Event, frozen=True):
     token: int
 
 
-#: the reason of a `Failed` command that was not sent because its record could not be kept
+#: the reason of a `CommandFailed` command that was not sent because its record could not be kept
 WITHHELD: Final = "withheld"
 
 
-class Failed(Event, frozen=True):
+class CommandFailed(Event, frozen=True):
     """Command `token` was refused by the vehicle, or its effect did not come; or it was not sent (`late`, `withheld`).
 
     `text` is the vehicle's own, untrusted.
@@ -141,7 +141,7 @@ class LinkBack(Event, frozen=True):
     """The vehicle is heard again, and answers, after `LinkLost`. Its state is not fresh yet."""
 
 
-class Answering(Event, frozen=True):
+class VehicleAnswers(Event, frozen=True):
     """Whether the vehicle answers, each time that this changes: one that is heard, and has answered nothing for longer
     than the link's limit, seems not to hear us. It may be silent meanwhile, too.
     """
@@ -171,7 +171,7 @@ class ClockStepped(Event, frozen=True):
     by_us: int
 
 
-class Said(Event, frozen=True):
+class StatusText(Event, frozen=True):
     """The vehicle said something to people (STATUSTEXT). `text` is its own, untrusted; `severity` is MAV_SEVERITY."""
 
     severity: int
@@ -221,7 +221,7 @@ class Command(Frozen, frozen=True):
 
     `needs_record`: it is held until every `Append` before it is kept, and not sent when one cannot be written
     (`withheld`), or another command replaces it; a fallback goes out at once, and even then. Whoever sends it looks at
-    the clock again: after `not_after_us` it is not sent, and `Failed` with reason `late` says so.
+    the clock again: after `not_after_us` it is not sent, and `CommandFailed` with reason `late` says so.
     """
 
     token: int
@@ -376,7 +376,7 @@ class EvidenceSink(Protocol):
         ...
 
 
-class Opening(StrEnum):
+class MissionOpening(StrEnum):
     """What became of opening a mission on a vehicle."""
 
     OPENED = "opened"

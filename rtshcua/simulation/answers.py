@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from operator import itemgetter
 from random import Random
 
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import ReceivedFrame
 
 
 class Delays:
@@ -34,7 +34,7 @@ class Delays:
 class Lanes:
     """The parts of an autopilot that answer, each in order and at its own pace, so that one overtakes another."""
 
-    of: Callable[[Received], int]
+    of: Callable[[ReceivedFrame], int]
     """Which part a message is for."""
     delays: Sequence[Delays]
     """How long each takes."""
@@ -46,11 +46,11 @@ class Inbox:
     def __init__(self, lanes: Lanes, chance: Random) -> None:
         self._lanes = lanes
         self._chance = chance
-        self._waiting: list[deque[tuple[int, Received]]] = [deque() for _ in lanes.delays]
+        self._waiting: list[deque[tuple[int, ReceivedFrame]]] = [deque() for _ in lanes.delays]
         self.next_us: int | None = None
         """When the autopilot gets to the next one; None while nothing waits."""
 
-    def put(self, received: Received, now_us: int) -> None:
+    def put(self, received: ReceivedFrame, now_us: int) -> None:
         """A message has come."""
         number = self._lanes.of(received)
         lane = self._waiting[number]
@@ -58,11 +58,11 @@ class Inbox:
         lane.append((max(at_us, lane[-1][0]) if lane else at_us, received))
         self._look()
 
-    def due(self, now_us: int) -> Iterator[tuple[int, Received]]:
+    def due(self, now_us: int) -> Iterator[tuple[int, ReceivedFrame]]:
         """What the autopilot has got to by now, and when."""
         if self.next_us is None or self.next_us > now_us:
             return iter(())
-        ready: list[tuple[int, Received]] = []
+        ready: list[tuple[int, ReceivedFrame]] = []
         for lane in self._waiting:
             while lane and lane[0][0] <= now_us:
                 ready.append(lane.popleft())

@@ -15,25 +15,25 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink.layouts import TEXT_OCTETS
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.answers import Lanes
 from rtshcua.simulation.battery import Battery
-from rtshcua.simulation.command import Command
-from rtshcua.simulation.config import Answers, Boot, Estimate, Extra, Purpose, SimulationConfig
+from rtshcua.simulation.command import VehicleCommand
+from rtshcua.simulation.config import Answers, Boot, Equipment, Estimate, Purpose, SimulationConfig
 from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
 from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
 from rtshcua.simulation.handling import Handling
-from rtshcua.simulation.mission import Mission, MissionRules
+from rtshcua.simulation.mission import MissionProgress, MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
-from rtshcua.simulation.parameters import Parameter, Parameters
-from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plans import MISSION, Item, Plans
+from rtshcua.simulation.parameters import AutopilotParameter, Parameters
+from rtshcua.simulation.place import HomePosition, Point
+from rtshcua.simulation.plans import MISSION, PlanItem, Plans
 from rtshcua.simulation.sensors import FAST_S, BootPlan, Sensors
 from rtshcua.simulation.signing import VehicleSigning
 from rtshcua.simulation.streams import Reports, Streams
 from rtshcua.simulation.surroundings import Air, Surroundings
 from rtshcua.simulation.transfer import Transfer, TransferRules
-from rtshcua.simulation.vehicle import Event, Landed, Vehicle
+from rtshcua.simulation.vehicle import Landed, Multirotor, VehicleEvent
 
 TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
@@ -47,9 +47,9 @@ _REMIND_FIRST_US, _REMIND_US = 1_200_000, 30_000_000
 SYSTEM_PARAMETERS = ("MAV_SYS_ID", "SYSID_THISMAV")
 """The parameters that hold the vehicle's own system id."""
 
-_GUIDED = Mode.GUIDED  # an enumeration's attributes are slow to find
+_GUIDED = FlightMode.GUIDED  # an enumeration's attributes are slow to find
 
-Handler = Callable[["Autopilot", Command], tuple[int, ...]]
+Handler = Callable[["Autopilot", VehicleCommand], tuple[int, ...]]
 """Obeys a command or refuses it; the results (MAV_RESULT) to acknowledge with, usually one."""
 _FEEDS_MOTORS = frozenset({Purpose.FLIGHT, Purpose.PROPULSION})
 Builder = Callable[["Autopilot"], Message | None]
@@ -71,10 +71,10 @@ class Taker(StrEnum):
     FAILSAFE = "failsafe"
 
 
-class Status(NamedTuple):
+class AutopilotStatus(NamedTuple):
     """What an autopilot's reports tell of what it is about."""
 
-    mode: Mode
+    mode: FlightMode
     landed: Landed
     destination: Point | None
 
@@ -98,10 +98,10 @@ class Flavour(ABC):
     """The shortest interval that is delivered, whatever is asked for, where there is one."""
     handling: Handling
     """How it flies, unless the configuration or a parameter says otherwise."""
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[AutopilotParameter, ...]
     bytewise: bool
     """Whether integer parameters travel as their bytes."""
-    texts: Mapping[Event, str]
+    texts: Mapping[VehicleEvent, str]
     """`{speed}` is the one of touching down; `{amsl}` and `{up}` are the height of a return, above the sea and home."""
     boot: BootPlan
     lanes: Lanes
@@ -168,7 +168,7 @@ class Flavour(ABC):
 
     # What follows is nothing unless a flavour does something then.
 
-    def home_item(self, home: Home) -> Item | None:
+    def home_item(self, home: HomePosition) -> PlanItem | None:
         """What slot 0 of every mission is, where the flavour keeps it for home."""
         return None
 
@@ -248,7 +248,7 @@ class Autopilot:
             return_up=config.return_mm / 1000,
             land_speed=flavour.handling.land_speed if config.land_mm_s is None else config.land_mm_s / 1000,
         )  # fmt: skip
-        self.vehicle = Vehicle(handling, flavour.modes.start)
+        self.vehicle = Multirotor(handling, flavour.modes.start)
         self.vehicle.ceiling = inf if config.ceiling_mm is None else config.ceiling_mm / 1000
         self.parameters = Parameters(flavour.parameters, handling, flavour.bytewise)
         for name in SYSTEM_PARAMETERS:
@@ -272,7 +272,7 @@ class Autopilot:
         self._wind: tuple[float, float] | None = None
         self.last_target_us: int | None = None
         #: what a DO_REPOSITION named that changes no mode, and until when whoever enters Hold flies to it (PX4)
-        self.kept: tuple[int, Command] | None = None
+        self.kept: tuple[int, VehicleCommand] | None = None
         self._boot_texts = deque(() if self._fast else flavour.boot.texts)
         self.failsafes = Failsafes(
             flavour.failsafes, self.vehicle, self.sensors, self.battery, self.parameters.value, self.say,
@@ -280,17 +280,19 @@ class Autopilot:
         )  # fmt: skip
         self.streams = Streams(flavour.streams, self._phases)
         self.fence = FenceWatch(flavour.fence, self.plans, self.home, self.parameters.value, self._where, self._time)
-        self.mission = Mission(
+        self.mission = MissionProgress(
             flavour.missions, self.plans, self.vehicle, self.home, self.fence.allows, self._where, self.send, self.say
         )
         self.transfer = Transfer(flavour.transfer, self.plans, self.send, self._stored, self._may_clear)
         self.plans.listeners.append(partial(flavour.on_plan, self))
         self._mode_in_breach = self.vehicle.mode
         #: when it acts on what made it hold, and how; nothing if somebody enters another mode before
-        self.delayed: tuple[int, Mode] | None = None
+        self.delayed: tuple[int, FlightMode] | None = None
         self._told_mode = self.vehicle.mode
         self._status = self._present
-        self._published: deque[tuple[int, Status]] = deque()  # until when its reports still tell of what was so
+        self._published: deque[tuple[int, AutopilotStatus]] = (
+            deque()
+        )  # until when its reports still tell of what was so
         self._told_danger = False
         self._remind_us = _REMIND_US
         self._text_id = 0
@@ -426,7 +428,7 @@ class Autopilot:
         self._mode_in_breach = vehicle.mode if self.delayed is not None and self._acts_late() else mode
 
     def _acts_late(self) -> bool:
-        if self.vehicle.mode is not Mode.LOITER or not self.vehicle.in_air:
+        if self.vehicle.mode is not FlightMode.LOITER or not self.vehicle.in_air:
             self.delayed = None
         if self.delayed is None or self.now_us < self.delayed[0]:
             return False
@@ -437,7 +439,7 @@ class Autopilot:
     def _where(self) -> Point:
         return self.here
 
-    def _stored(self, kind: int) -> tuple[Item, ...]:
+    def _stored(self, kind: int) -> tuple[PlanItem, ...]:
         """What a download shows."""
         items = self.plans.items(kind)
         if kind == MISSION and items and self._home_item is not None:
@@ -453,7 +455,7 @@ class Autopilot:
         if timeout_us is None or not vehicle.in_air or not vehicle.armed:
             return
         if last is None or self.now_us - last > timeout_us:
-            self._fail_over(Mode.LOITER)
+            self._fail_over(FlightMode.LOITER)
 
     # ------------------------------------------------------------------------------------------- taken over
 
@@ -465,16 +467,16 @@ class Autopilot:
         if armed and self.taker is None and vehicle.orders != before:
             self.taker = taker
 
-    def _fail_over(self, mode: Mode) -> None:
+    def _fail_over(self, mode: FlightMode) -> None:
         """It enters another mode by itself."""
         self.take_over(Taker.FAILSAFE, partial(self.vehicle.set_mode, mode))
 
     # ---------------------------------------------------------------------------------------------- state
 
     @property
-    def _present(self) -> Status:
+    def _present(self) -> AutopilotStatus:
         vehicle = self.vehicle
-        return Status(vehicle.mode, vehicle.landed, vehicle.destination)
+        return AutopilotStatus(vehicle.mode, vehicle.landed, vehicle.destination)
 
     def follow_mode(self) -> None:
         """Notices another mode: what it is in shows in its reports some time after it entered it, as recorded."""
@@ -490,7 +492,7 @@ class Autopilot:
             self._status = self._present
 
     @property
-    def shown(self) -> Status:
+    def shown(self) -> AutopilotStatus:
         """What its reports tell now."""
         published, now_us = self._published, self.now_us + self.since_us
         while published and now_us >= published[0][0]:
@@ -508,9 +510,9 @@ class Autopilot:
         """Whether nothing stands against arming but the mode."""
         return not self.flavour.arming(self)
 
-    def can_enter(self, mode: Mode) -> bool:
+    def can_enter(self, mode: FlightMode) -> bool:
         """Whether the mode may be entered now, if the flavour has it."""
-        if mode not in self.flavour.modes.numbers or (mode is Mode.MISSION and not self.mission.may_enter()):
+        if mode not in self.flavour.modes.numbers or (mode is FlightMode.MISSION and not self.mission.may_enter()):
             return False
         return mode not in NEEDS_POSITION or self.sensors.has_position
 
@@ -527,7 +529,7 @@ class Autopilot:
         It is made of what the air does to the body that flies: there is none before a flight, and after one the last
         stays (section 5 of vehicles.md). An estimate is never twice the same.
         """
-        if Extra.WIND in self.extras and self.vehicle.in_air and self.sensors.locates:
+        if Equipment.WIND in self.extras and self.vehicle.in_air and self.sensors.locates:
             ripple = _RIPPLE * sin(self.now_us / 1_000_000)
             self._wind = self.air.north + ripple, self.air.east + ripple
         return self._wind

@@ -3,11 +3,11 @@
 from math import isfinite
 from typing import NamedTuple
 
-from rtshcua.codec.frames import Message, Received
+from rtshcua.codec.frames import Message, ReceivedFrame
 from rtshcua.mavlink.enums import NO_PLACE
 
 
-class Command(NamedTuple):
+class VehicleCommand(NamedTuple):
     """A command: parameters 1 to 4, the place in 1e-7 degree (None if not given), the altitude in metres (or NaN)."""
 
     number: int
@@ -23,17 +23,17 @@ class Command(NamedTuple):
     sender: tuple[int, int]
 
 
-def from_message(received: Received) -> Command:
+def from_message(received: ReceivedFrame) -> VehicleCommand:
     """The command in a COMMAND_LONG or COMMAND_INT."""
     m: Message = received.message
     sender = (received.system, received.component)
     if received.name == "COMMAND_INT":
         x = None if m.x == NO_PLACE else float(m.x)
         y = None if m.y == NO_PLACE else float(m.y)
-        return Command(m.command, m.param1, m.param2, m.param3, m.param4, x, y, m.z, m.frame, sender)
+        return VehicleCommand(m.command, m.param1, m.param2, m.param3, m.param4, x, y, m.z, m.frame, sender)
     x = m.param5 * 1e7 if isfinite(m.param5) else None
     y = m.param6 * 1e7 if isfinite(m.param6) else None
-    return Command(m.command, m.param1, m.param2, m.param3, m.param4, x, y, m.param7, None, sender)
+    return VehicleCommand(m.command, m.param1, m.param2, m.param3, m.param4, x, y, m.param7, None, sender)
 
 
 def whole(value: float) -> int:

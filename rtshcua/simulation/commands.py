@@ -4,9 +4,9 @@ from math import isnan
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Handler
-from rtshcua.simulation.command import Command, whole
+from rtshcua.simulation.command import VehicleCommand, whole
 from rtshcua.simulation.telemetry import AVAILABLE_MODES, available_modes
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
@@ -25,7 +25,7 @@ def _request_message(refused: int, needs_one: bool) -> Handler:
     `needs_one`: for one that it has nothing to tell in, too.
     """
 
-    def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
+    def handle(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
         if whole(command.p1) == AVAILABLE_MODES:
             return (ACCEPTED if available_modes(a, whole(command.p2)) else refused,)
         number = whole(command.p1)
@@ -40,7 +40,7 @@ def _request_message(refused: int, needs_one: bool) -> Handler:
 def _set_message_interval(refused: int, say_why: bool) -> Handler:
     """MAV_CMD_SET_MESSAGE_INTERVAL; `refused` answers for a stream that the vehicle does not have."""
 
-    def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
+    def handle(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
         number = whole(command.p1)
         if number not in a.flavour.builders or number in a.flavour.constant or isnan(command.p2):
             if say_why:
@@ -55,13 +55,13 @@ def _set_message_interval(refused: int, say_why: bool) -> Handler:
     return handle
 
 
-def _request_version(a: Autopilot, _: Command) -> tuple[int, ...]:
+def _request_version(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
     """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES."""
     a.send(a.flavour.builders[mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION](a))
     return (ACCEPTED,)
 
 
-def _run_checks(a: Autopilot, _: Command) -> tuple[int, ...]:
+def _run_checks(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
     """MAV_CMD_RUN_PREARM_CHECKS: refused while armed; what stands against arming comes as texts."""
     if a.vehicle.armed:
         return (TEMPORARILY_REJECTED,)
@@ -70,23 +70,23 @@ def _run_checks(a: Autopilot, _: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-def _get_home(a: Autopilot, _: Command) -> tuple[int, ...]:
+def _get_home(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
     """MAV_CMD_GET_HOME_POSITION."""
     a.send(a.flavour.builders[mavlink.MAVLINK_MSG_ID_HOME_POSITION](a))
     return (ACCEPTED,)
 
 
-def _change_speed(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _change_speed(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """MAV_CMD_DO_CHANGE_SPEED of the ground speed."""
     if command.p2 > 0:
         a.vehicle.speed = command.p2
     return (ACCEPTED,)
 
 
-def _enter(mode: Mode, refused: int) -> Handler:
+def _enter(mode: FlightMode, refused: int) -> Handler:
     """A command that changes the mode and nothing else; `refused` answers when the mode cannot be entered."""
 
-    def handle(a: Autopilot, _: Command) -> tuple[int, ...]:
+    def handle(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
         if not a.can_enter(mode):
             a.say(mavlink.MAV_SEVERITY_WARNING, f"Mode change to {a.flavour.modes.name(mode)} failed: no position")
             return (refused,)
@@ -102,7 +102,7 @@ def arm_disarm(refused: int, arming: str, mode: str, landing: str) -> Handler:
     `landing` is said when it is not to disarm in the air; nothing, if that is empty.
     """
 
-    def handle(a: Autopilot, command: Command) -> tuple[int, ...]:
+    def handle(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
         vehicle, forced, modes = a.vehicle, whole(command.p2) == FORCE, a.flavour.modes
         if whole(command.p1) == 1:
             if vehicle.armed or forced or (a.ready and vehicle.mode in modes.armable):
@@ -129,9 +129,9 @@ def shared(*, mode: int, stream: int, says_why: bool, message: int, needs_one: b
     `says_why`: a text names the stream; `needs_one`: a message without anything to tell is refused, too.
     """
     return {
-        mavlink.MAV_CMD_NAV_LAND: _enter(Mode.LAND, mode),
-        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _enter(Mode.RETURN, mode),
-        mavlink.MAV_CMD_NAV_LOITER_UNLIM: _enter(Mode.LOITER, mode),
+        mavlink.MAV_CMD_NAV_LAND: _enter(FlightMode.LAND, mode),
+        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _enter(FlightMode.RETURN, mode),
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM: _enter(FlightMode.LOITER, mode),
         mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
         mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_message_interval(stream, says_why),
         mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message(message, needs_one),

@@ -5,14 +5,14 @@ from enum import StrEnum
 
 from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.model.faults import Fault
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.place import HomePosition
 from rtshcua.simulation.surroundings import Wind
 
-HOME = Home(473_977_400, 85_455_900, 488_000)
+HOME = HomePosition(473_977_400, 85_455_900, 488_000)
 """Where PX4's simulations start: an airfield in Zurich."""
 
 
-class Kind(StrEnum):
+class AutopilotKind(StrEnum):
     """Which autopilot the vehicle behaves like."""
 
     PX4 = "px4"
@@ -46,7 +46,7 @@ class Estimate(StrEnum):
     """As with a satellite receiver: a metre off, slowly straying, and late."""
 
 
-class Extra(StrEnum):
+class Equipment(StrEnum):
     """What may be fitted beside GPS, barometer and battery, and what the vehicle then tells."""
 
     RADIO = "radio"
@@ -61,9 +61,9 @@ class Extra(StrEnum):
     """The battery's voltage is measured."""
 
 
-STOCK = frozenset({Extra.VOLTAGE})
+STOCK = frozenset({Equipment.VOLTAGE})
 """A stock vehicle: GPS, barometer and battery alone, of which SYS_STATUS carries the voltage."""
-EQUIPPED = frozenset({Extra.RADIO, Extra.RANGE, Extra.WIND, Extra.VOLTAGE})
+EQUIPPED = frozenset({Equipment.RADIO, Equipment.RANGE, Equipment.WIND, Equipment.VOLTAGE})
 
 
 class Purpose(StrEnum):
@@ -93,9 +93,9 @@ class OtherBattery:
 class SimulationConfig:
     """All that can be chosen; integers in mm, mm/s, us, 1e-7 degree and 1/10000."""
 
-    flavour: Kind = Kind.PX4
+    flavour: AutopilotKind = AutopilotKind.PX4
     system: int = 1
-    home: Home = HOME
+    home: HomePosition = HOME
     battery: int = 10_000
     other_batteries: tuple[OtherBattery, ...] = ()
     """Those with the ids from 1 on; each is reported in turn with the first."""
@@ -122,7 +122,7 @@ class SimulationConfig:
     boot: Boot = Boot.FAST
     parameters: tuple[tuple[str, float], ...] = ()
     """What its owner has set: names of parameters that the flavour has, and their values."""
-    extras: frozenset[Extra] = EQUIPPED
+    extras: frozenset[Equipment] = EQUIPPED
     """What is fitted beside GPS, barometer and battery."""
     faults: tuple[Fault, ...] = ()
     signing_key: bytes | None = None
@@ -154,7 +154,7 @@ class SimulationConfig:
             raise ValueError(f"a key for signing has {KEY_OCTETS} octets")
         if self.release is not None and not all(0 <= part <= 255 for part in self.release):
             raise ValueError("a release is two numbers from 0 to 255")
-        keyless = self.flavour is Kind.PX4 and self.release is not None and self.release < (1, 17)
+        keyless = self.flavour is AutopilotKind.PX4 and self.release is not None and self.release < (1, 17)
         if keyless and self.signing_key is not None:
             raise ValueError("PX4 takes keys from release 1.17 on")
         if self.speed <= 0:

@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Codec, Message, Received, maker
+from rtshcua.codec.frames import Codec, Message, ReceivedFrame, maker
 from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import from_message
 from rtshcua.simulation.commands import UNSUPPORTED
-from rtshcua.simulation.config import Extra
+from rtshcua.simulation.config import Equipment
 from rtshcua.simulation.telemetry import radio_status
 from rtshcua.simulation.transfer import Peer, Transfer
 
@@ -35,7 +35,7 @@ class Face:
         self._system = system
         self._codec = Codec(system, COMPONENT)
         self._radio = Codec(RADIO_SYSTEM, RADIO)
-        self.radio_due_us = 0 if Extra.RADIO in autopilot.extras else _NEVER
+        self.radio_due_us = 0 if Equipment.RADIO in autopilot.extras else _NEVER
         """When the radio sends next, by the world's time: it runs on while the autopilot's loop halts."""
 
     @property
@@ -43,15 +43,15 @@ class Face:
         """How many stretches of bytes came that were no good frame."""
         return self._codec.damaged
 
-    def parse(self, datagram: bytes) -> list[Received]:
+    def parse(self, datagram: bytes) -> list[ReceivedFrame]:
         """The good frames in a datagram, in order. Never raises, whatever the bytes."""
         return [] if self._autopilot.off_us else self._codec.parse(datagram)
 
-    def lets_in(self, received: Received) -> bool:
+    def lets_in(self, received: ReceivedFrame) -> bool:
         """Whether a frame is to be obeyed."""
         return received.name in _HANDLERS and self._is_for_me(received.message) and self._is_trusted(received)
 
-    def obey(self, received: Received) -> list[bytes]:
+    def obey(self, received: ReceivedFrame) -> list[bytes]:
         """Obeys a frame that was let in; those that answer it. Never raises, whatever it says."""
         if self._autopilot.off_us:
             return []
@@ -88,7 +88,7 @@ class Face:
         component = getattr(message, "target_component", 0)
         return system in (0, self._system) and component in (0, COMPONENT)
 
-    def _is_trusted(self, received: Received) -> bool:
+    def _is_trusted(self, received: ReceivedFrame) -> bool:
         a = self._autopilot
         return a.signing.accept(received, a.now_us) or a.flavour.obeys_unsigned(a, received.name)
 
@@ -99,84 +99,84 @@ class Face:
         return [a.signing.seal(frame, a.now_us) for frame in frames] if a.signing.on else frames
 
 
-def _heartbeat(a: Autopilot, received: Received) -> None:
+def _heartbeat(a: Autopilot, received: ReceivedFrame) -> None:
     if received.message.type == mavlink.MAV_TYPE_GCS:
         a.ground_station_seen = True
 
 
-def _command(a: Autopilot, received: Received) -> None:
+def _command(a: Autopilot, received: ReceivedFrame) -> None:
     command = from_message(received)
     handle = a.flavour.commands.get(command.number)
     results = (UNSUPPORTED,) if handle is None else handle(a, command)
     _acknowledge(a, received, command.number, results)
 
 
-def _set_mode(a: Autopilot, received: Received) -> None:
+def _set_mode(a: Autopilot, received: ReceivedFrame) -> None:
     results = a.flavour.on_set_mode(a, received.message.custom_mode)
     _acknowledge(a, received, mavlink.MAVLINK_MSG_ID_SET_MODE, results)
 
 
-def _acknowledge(a: Autopilot, received: Received, command: int, results: tuple[int, ...]) -> None:
+def _acknowledge(a: Autopilot, received: ReceivedFrame, command: int, results: tuple[int, ...]) -> None:
     for result in results:
         a.send(_COMMAND_ACK(command, result, 0, 0, received.system, received.component))
 
 
-def _position_target(a: Autopilot, received: Received) -> None:
+def _position_target(a: Autopilot, received: ReceivedFrame) -> None:
     a.flavour.on_position_target(a, received.message)
 
 
-def _local_target(a: Autopilot, received: Received) -> None:
+def _local_target(a: Autopilot, received: ReceivedFrame) -> None:
     a.flavour.on_local_target(a, received.message)
 
 
-def _data_stream(a: Autopilot, received: Received) -> None:
+def _data_stream(a: Autopilot, received: ReceivedFrame) -> None:
     m = received.message
     a.flavour.on_data_stream(a, m.req_stream_id, m.req_message_rate if m.start_stop else 0)
 
 
-def _param_read(a: Autopilot, received: Received) -> None:
+def _param_read(a: Autopilot, received: ReceivedFrame) -> None:
     a.send(a.parameters.read(received.message.param_id, received.message.param_index))
 
 
-def _param_list(a: Autopilot, _: Received) -> None:
+def _param_list(a: Autopilot, _: ReceivedFrame) -> None:
     for message in a.parameters.all():
         a.send(message)
 
 
-def _param_set(a: Autopilot, received: Received) -> None:
+def _param_set(a: Autopilot, received: ReceivedFrame) -> None:
     m = received.message
     a.send(a.parameters.write(m.param_id, m.param_value, m.param_type))
     if m.param_id.startswith(FENCE_PREFIXES):
         a.fence.settings_changed()
 
 
-def _setup_signing(a: Autopilot, received: Received) -> None:
+def _setup_signing(a: Autopilot, received: ReceivedFrame) -> None:
     a.flavour.on_setup_signing(a, received.message)
 
 
-def _timesync(a: Autopilot, received: Received) -> None:
+def _timesync(a: Autopilot, received: ReceivedFrame) -> None:
     if received.message.tc1 == 0:
         a.send(mavlink.MAVLink_timesync_message((a.now_us + a.since_us) * 1000, received.message.ts1))
 
 
-def _ping(a: Autopilot, received: Received) -> None:
+def _ping(a: Autopilot, received: ReceivedFrame) -> None:
     m = received.message
     if m.target_system == 0:
         a.send(mavlink.MAVLink_ping_message(m.time_usec, m.seq, received.system, received.component))
 
 
-def _transfers(step: Callable[[Transfer, Peer, Message, int], None]) -> Callable[[Autopilot, Received], None]:
+def _transfers(step: Callable[[Transfer, Peer, Message, int], None]) -> Callable[[Autopilot, ReceivedFrame], None]:
     """A message of the mission protocol, handed to the vehicle's end of it."""
     return lambda a, received: step(a.transfer, (received.system, received.component), received.message, a.now_us)
 
 
-def _set_current(a: Autopilot, received: Received) -> None:
+def _set_current(a: Autopilot, received: ReceivedFrame) -> None:
     """MISSION_SET_CURRENT: answered with MISSION_CURRENT, or with a text."""
     if not a.mission.select(received.message.seq):
         a.say(mavlink.MAV_SEVERITY_CRITICAL, "WPM: WP CURR CMD: Not in list")
 
 
-def _partial(a: Autopilot, received: Received) -> None:
+def _partial(a: Autopilot, received: ReceivedFrame) -> None:
     """Parts of a plan are not read or written: refused at once."""
     result, kind = mavlink.MAV_MISSION_UNSUPPORTED, received.message.mission_type
     a.send(mavlink.MAVLink_mission_ack_message(received.system, received.component, result, kind))
@@ -187,7 +187,7 @@ _NAK, _UNKNOWN_COMMAND = 129, 7
 _FTP_SIZE = 251
 
 
-def _file(a: Autopilot, received: Received) -> None:
+def _file(a: Autopilot, received: ReceivedFrame) -> None:
     """FILE_TRANSFER_PROTOCOL: there are no files."""
     m = received.message
     sequence, session, opcode = struct.unpack_from("<HBB", bytes(m.payload))
@@ -196,12 +196,12 @@ def _file(a: Autopilot, received: Received) -> None:
     a.send(mavlink.MAVLink_file_transfer_protocol_message(0, received.system, received.component, payload))
 
 
-def _logs(a: Autopilot, _: Received) -> None:
+def _logs(a: Autopilot, _: ReceivedFrame) -> None:
     """LOG_REQUEST_LIST: there are no logs."""
     a.send(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
 
 
-_HANDLERS: Mapping[str, Callable[[Autopilot, Received], None]] = {
+_HANDLERS: Mapping[str, Callable[[Autopilot, ReceivedFrame], None]] = {
     "HEARTBEAT": _heartbeat,
     "COMMAND_LONG": _command,
     "COMMAND_INT": _command,

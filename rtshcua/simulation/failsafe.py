@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.battery import Battery
 from rtshcua.simulation.modes import NEEDS_POSITION
 from rtshcua.simulation.sensors import Sensors
-from rtshcua.simulation.vehicle import Vehicle
+from rtshcua.simulation.vehicle import Multirotor
 
 LOW_TO_LAND = 0.04
 """The battery level at which the autopilot lands by itself."""
@@ -48,12 +48,12 @@ class Failsafes:
     def __init__(
         self,
         rules: FailsafeRules,
-        vehicle: Vehicle,
+        vehicle: Multirotor,
         sensors: Sensors,
         battery: Battery,
         parameter: Callable[[str], float],
         say: Callable[[int, str], None],
-        enter: Callable[[Mode], None],
+        enter: Callable[[FlightMode], None],
     ) -> None:
         self._rules = rules
         self._vehicle = vehicle
@@ -81,9 +81,9 @@ class Failsafes:
             self._without_s = 0.0
         else:
             self._watch_position(dt)
-        if battery.level <= LOW_TO_LAND and vehicle.mode is not Mode.LAND:
+        if battery.level <= LOW_TO_LAND and vehicle.mode is not FlightMode.LAND:
             self._say(*self._rules.level)
-            self._enter(Mode.LAND)
+            self._enter(FlightMode.LAND)
 
     def _watch_position(self, dt: float) -> None:
         has_position = self._sensors.has_position
@@ -92,7 +92,7 @@ class Failsafes:
         if self._without_s > self._rules.position_after_s and self._vehicle.mode in NEEDS_POSITION:
             for text in self._rules.position:
                 self._say(*text)
-            self._enter(Mode.LAND)
+            self._enter(FlightMode.LAND)
             self._vehicle.blind = True
             self._vehicle.wait(self._rules.land_pause_s)
             self._lands_blind = True
@@ -111,6 +111,6 @@ class Failsafes:
             self.low_voltage = True
             self._say(4, f"Battery 1 is low {volts:.2f}V used {self._battery.used_mah:.0f} mAh")
             self._say(4, rules.low_text)
-            mode = {1: Mode.LAND, 2: Mode.RETURN}.get(round(self._parameter(rules.low_action)))
+            mode = {1: FlightMode.LAND, 2: FlightMode.RETURN}.get(round(self._parameter(rules.low_action)))
             if mode is not None and self._vehicle.in_air:
                 self._enter(mode)

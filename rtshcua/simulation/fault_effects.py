@@ -12,13 +12,13 @@ from random import Random
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Speaker, Taker
-from rtshcua.simulation.command import Command
+from rtshcua.simulation.command import VehicleCommand
 from rtshcua.simulation.fault_syntax import message_number
-from rtshcua.simulation.link import Link
+from rtshcua.simulation.link import FaultyLink
 from rtshcua.simulation.surroundings import Cylinder, Wind
-from rtshcua.simulation.voices import SecondVoice
+from rtshcua.simulation.voices import SecondSender
 
 Effect = tuple[int, Callable[[], object]]
 """A time, and what happens then."""
@@ -38,16 +38,16 @@ class Affected:
     """What faults act on."""
 
     autopilot: Autopilot
-    up: Link
-    down: Link
+    up: FaultyLink
+    down: FaultyLink
     halt: Callable[[bool], None]
     """Halts the autopilot's loop, or lets it go on."""
     reboot: Callable[[], None]
     """Starts the autopilot again."""
 
-    def links(self, way: Way) -> tuple[Link, ...]:
+    def links(self, way: Direction) -> tuple[FaultyLink, ...]:
         """The links of a direction."""
-        return {Way.BOTH: (self.up, self.down), Way.UP: (self.up,), Way.DOWN: (self.down,)}[way]
+        return {Direction.BOTH: (self.up, self.down), Direction.UP: (self.up,), Direction.DOWN: (self.down,)}[way]
 
 
 def effects(fault: Fault, on: Affected) -> Iterator[Effect]:
@@ -124,7 +124,7 @@ def _on_link(fault: faults.LinkFault, on: Affected) -> Iterator[Effect]:
         case faults.LinkQuality(at_us, quality):
             yield at_us, partial(_set, radio, "link_quality", quality)
         case faults.SecondVoice(at_us, says, each_us, for_us):
-            voice: Speaker = SecondVoice(says, each_us, at_us)
+            voice: Speaker = SecondSender(says, each_us, at_us)
             voices = on.autopilot.voices
             yield from _for(at_us, for_us, partial(_begin, voices, voice), partial(_end, voices, voice))
         case _:
@@ -193,12 +193,12 @@ def _pilots(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
             raise _unknown(fault)
 
 
-def _choose(a: Autopilot, mode: Mode) -> None:
+def _choose(a: Autopilot, mode: FlightMode) -> None:
     """A switch of the remote control asks for a mode as a ground station does, and is refused as that is. Only PX4
     enters Altitude where it is asked for Position and has none (`UserModeIntention::change`, `allow_fallback`).
     """
-    if mode is Mode.POSITION and a.flavour.falls_back and not a.can_enter(mode):
-        mode = Mode.ALTITUDE
+    if mode is FlightMode.POSITION and a.flavour.falls_back and not a.can_enter(mode):
+        mode = FlightMode.ALTITUDE
     a.flavour.on_set_mode(a, a.flavour.modes.numbers[mode])
 
 
@@ -224,7 +224,7 @@ def _steer(a: Autopilot, north_m_s: float, east_m_s: float) -> None:
 
 def _change_speed(a: Autopilot, speed_m_s: float) -> None:
     a.flavour.commands[mavlink.MAV_CMD_DO_CHANGE_SPEED](
-        a, Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed_m_s, -1.0, 0.0, None, None, 0.0, None, _STATION)
+        a, VehicleCommand(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed_m_s, -1.0, 0.0, None, None, 0.0, None, _STATION)
     )
 
 
@@ -233,7 +233,9 @@ def _command(
 ) -> None:
     flags = float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
     frame = mavlink.MAV_FRAME_GLOBAL_INT
-    a.flavour.commands[number](a, Command(number, p1, flags, 0.0, nan, latitude, longitude, amsl, frame, _STATION))
+    a.flavour.commands[number](
+        a, VehicleCommand(number, p1, flags, 0.0, nan, latitude, longitude, amsl, frame, _STATION)
+    )
 
 
 def _begin(voices: list[Speaker], voice: Speaker) -> None:

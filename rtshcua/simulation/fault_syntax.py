@@ -7,10 +7,10 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.model.faults import KINDS, UNITS, WORD_TYPES, AgentFault, Fault, HostFault, Parameter, parameters
+from rtshcua.model.faults import KINDS, UNITS, WORD_TYPES, AgentFault, Fault, FaultField, HostFault, parameters
 
 _QUANTITY = re.compile(r"(-?\d+(?:\.\d+)?)(\D*)", re.ASCII)
-_AT = Parameter("at", "at_us", UNITS[0], (), False, False, True)
+_AT = FaultField("at", "at_us", UNITS[0], (), False, False, True)
 _COUNTED = {"shuffle": "the seed of an order"}
 #: the kinds that a simulated vehicle can have by itself
 OF_VEHICLE = {name: kind for name, kind in KINDS.items() if not issubclass(kind, HostFault | AgentFault)}
@@ -55,7 +55,7 @@ def message_number(name: str) -> int:
     return number
 
 
-def _value(parameter: Parameter, text: str) -> object:
+def _value(parameter: FaultField, text: str) -> object:
     if parameter.words:
         return _word(parameter, text)
     if parameter.is_count:
@@ -72,7 +72,7 @@ def _value(parameter: Parameter, text: str) -> object:
     return round(Decimal(match[1]) * units[match[2]])
 
 
-def _written(parameter: Parameter, value: object) -> str:
+def _written(parameter: FaultField, value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if parameter.unit is None:
@@ -82,7 +82,7 @@ def _written(parameter: Parameter, value: object) -> str:
     return f"{Decimal(value) / parts}{word}"
 
 
-def _word(parameter: Parameter, text: str) -> object:
+def _word(parameter: FaultField, text: str) -> object:
     if parameter.name == "held":
         if text not in parameter.words:
             raise ValueError(f"`held` is yes or no, not `{text}`")

@@ -9,16 +9,25 @@ from dataclasses import dataclass
 from math import hypot, inf
 from typing import Self
 
-from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plans import EXCLUDED, FENCE, INCLUDED, POLYGONS, ROUND_EXCLUDED, ROUND_INCLUDED, Item, Plans
-from rtshcua.simulation.vehicle import Vehicle
+from rtshcua.simulation.place import HomePosition, Point
+from rtshcua.simulation.plans import (
+    EXCLUDED,
+    FENCE,
+    INCLUDED,
+    POLYGONS,
+    ROUND_EXCLUDED,
+    ROUND_INCLUDED,
+    PlanItem,
+    Plans,
+)
+from rtshcua.simulation.vehicle import Multirotor
 
 Place = tuple[float, float]
 """Metres north and east of home."""
 
 
 @dataclass(frozen=True, slots=True)
-class Polygon:
+class FencePolygon:
     """A polygon by its vertices; it may be concave."""
 
     vertices: tuple[Place, ...]
@@ -49,7 +58,7 @@ class Polygon:
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class FenceCircle:
     """A circle."""
 
     centre: Place
@@ -65,11 +74,11 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True)
-class Area:
+class FenceArea:
     """Where flying is allowed: inside what is included, outside of what is excluded."""
 
-    included: tuple[Polygon | Circle, ...] = ()
-    excluded: tuple[Polygon | Circle, ...] = ()
+    included: tuple[FencePolygon | FenceCircle, ...] = ()
+    excluded: tuple[FencePolygon | FenceCircle, ...] = ()
     every: bool = False
     """Whether a place must be inside all that is included; else one is enough."""
 
@@ -89,19 +98,19 @@ class Area:
         return min(broken)
 
     @classmethod
-    def of(cls, items: Sequence[Item], home: Home, every: bool) -> Self:
+    def of(cls, items: Sequence[PlanItem], home: HomePosition, every: bool) -> Self:
         """The area that uploaded items draw; the items are well formed (`problem` found none)."""
-        included: list[Polygon | Circle] = []
-        excluded: list[Polygon | Circle] = []
+        included: list[FencePolygon | FenceCircle] = []
+        excluded: list[FencePolygon | FenceCircle] = []
         at = 0
         while at < len(items):
             item = items[at]
             count = int(item.p1) if item.command in POLYGONS else 1
-            shape: Polygon | Circle
+            shape: FencePolygon | FenceCircle
             if item.command in POLYGONS:
-                shape = Polygon(tuple(home.local(vertex.x, vertex.y) for vertex in items[at : at + count]))
+                shape = FencePolygon(tuple(home.local(vertex.x, vertex.y) for vertex in items[at : at + count]))
             else:
-                shape = Circle(home.local(item.x, item.y), item.p1)
+                shape = FenceCircle(home.local(item.x, item.y), item.p1)
             if item.command in (INCLUDED, ROUND_INCLUDED):
                 included.append(shape)
             elif item.command in (EXCLUDED, ROUND_EXCLUDED):
@@ -114,7 +123,7 @@ class Area:
 class FenceLimits:
     """A fence in force: an area, and how high flying is allowed, in metres above home."""
 
-    area: Area = Area()
+    area: FenceArea = FenceArea()
     ceiling: float = inf
     floor: float = -inf
     """For targets alone: on the ground every vehicle is below it."""
@@ -147,7 +156,7 @@ class Breach:
 class FenceRules:
     """What a flavour does its own way."""
 
-    limits: Callable[[Callable[[str], float], Area], FenceLimits | None]
+    limits: Callable[[Callable[[str], float], FenceArea], FenceLimits | None]
     """From the parameters (by name) and the uploaded area: the fence in force, if there is one."""
     name: Callable[[FenceLimits, Point], str]
     """What of the fence is violated there."""
@@ -165,7 +174,8 @@ class FenceWatch:
     """
 
     def __init__(
-        self, rules: FenceRules, plans: Plans, home: Home, value: Callable[[str], float], where: Callable[[], Point],
+        self, rules: FenceRules, plans: Plans, home: HomePosition, value: Callable[[str], float], where: Callable[[],
+            Point],
         clock: Callable[[], int],
     ) -> None:  # fmt: skip
         self._rules = rules
@@ -174,7 +184,7 @@ class FenceWatch:
         self._value = value
         self._where = where
         self._clock = clock
-        self._area = Area()
+        self._area = FenceArea()
         self._limits: FenceLimits | None = None
         self.return_under = inf
         """The height above home under which a return stays, for the fence's sake."""
@@ -189,7 +199,7 @@ class FenceWatch:
 
     def _plan_changed(self, kind: int) -> None:
         if kind == FENCE:
-            self._area = Area.of(self._plans.items(FENCE), self._home, self._rules.every)
+            self._area = FenceArea.of(self._plans.items(FENCE), self._home, self._rules.every)
             self.settings_changed()
 
     def settings_changed(self) -> None:
@@ -213,7 +223,7 @@ class FenceWatch:
         limits = self._limits
         return limits is None or (limits.floor <= point.up and limits.holds(point))
 
-    def step(self, now_us: int, vehicle: Vehicle) -> Breach | None:
+    def step(self, now_us: int, vehicle: Multirotor) -> Breach | None:
         """Lets time pass; the breach that began now, if one did."""
         if now_us < self.due_us:
             return None

@@ -48,7 +48,7 @@ _BACK_M_S, _BACK_M = 0.5, 2.5
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class Overshoot:
     """How far, in metres, and in which direction it flies past a target before it comes back to it."""
 
     north: float
@@ -74,12 +74,12 @@ def speed_back(body: Body, north: float, east: float) -> float:
     return _BACK_M_S if hypot(north - body.north, east - body.east) < _BACK_M else inf
 
 
-def past(here: Point, target: Point, speed: float, agility: Agility) -> Past | None:
+def past(here: Point, target: Point, speed: float, agility: Agility) -> Overshoot | None:
     """How it will fly past a target on its way from here at up to `speed`; None if it will not."""
     north, east = target.north - here.north, target.east - here.east
     away = hypot(north, east)
     far = agility.overshoot_s * min(speed, agility.approach.speed(away / 2))
-    return Past(north / away * far, east / away * far) if far >= _LEAST_PAST_M else None
+    return Overshoot(north / away * far, east / away * far) if far >= _LEAST_PAST_M else None
 
 
 def hardest(agility: Agility) -> float:

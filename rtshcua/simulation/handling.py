@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.kinematics import Approach, Body
 
 
@@ -108,8 +108,8 @@ class Handling:
     idle_disarm_s: float = 10.0
     landed_disarm_s: float = 2.0
     """From knowing that it has landed."""
-    after_takeoff: Mode | None = None
-    after_landing: Mode | None = None
+    after_takeoff: FlightMode | None = None
+    after_landing: FlightMode | None = None
     forgets_speed: bool = False
     """Whether another mode flies at the cruise speed again."""
     forgets_at_first_target: bool = False

@@ -11,7 +11,7 @@ OVERTAKEN_US = 60_000
 _arrival = itemgetter(0)
 
 
-class Link:
+class FaultyLink:
     """Datagrams in the order they were sent, but for what faults ask for. Chance decides, from a seeded source."""
 
     def __init__(self, chance: Random) -> None:

@@ -8,11 +8,11 @@ from math import hypot, isfinite
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message, maker
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation import plans
-from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plans import AMSL_FRAMES, FENCE, MISSION, Item, Plans
-from rtshcua.simulation.vehicle import Landed, Vehicle
+from rtshcua.simulation.place import HomePosition, Point
+from rtshcua.simulation.plans import AMSL_FRAMES, FENCE, MISSION, PlanItem, Plans
+from rtshcua.simulation.vehicle import Landed, Multirotor
 
 _MISSION_CURRENT = maker(mavlink.MAVLink_mission_current_message)
 
@@ -31,18 +31,18 @@ class MissionState(IntEnum):
     COMPLETE = 5
 
 
-_MODE, _ACTIVE = Mode.MISSION, MissionState.ACTIVE  # an enumeration's attributes are slow to find
+_MODE, _ACTIVE = FlightMode.MISSION, MissionState.ACTIVE  # an enumeration's attributes are slow to find
 
 
 @dataclass(frozen=True, slots=True)
 class MissionRules:
     """What a flavour does its own way."""
 
-    judge: Callable[[tuple[Item, ...], Vehicle, Home, Callable[[Point], bool]], bool]
+    judge: Callable[[tuple[PlanItem, ...], Multirotor, HomePosition, Callable[[Point], bool]], bool]
     """Whether a mission can be flown; the last argument says what the fence allows."""
     first: int = 0
     """The slot of the first item that is flown."""
-    may_enter: Callable[[tuple[Item, ...], Vehicle], bool] = lambda _items, _vehicle: True
+    may_enter: Callable[[tuple[PlanItem, ...], Multirotor], bool] = lambda _items, _vehicle: True
     """Whether the mode may be entered, the mission being one that can be flown."""
     judged_us: int = 0
     """How long after an upload the judgement comes; until then the one before stands."""
@@ -50,25 +50,25 @@ class MissionRules:
     """Whether on the ground only MISSION_START begins it, not the mode alone."""
     return_is_mode: bool = False
     """Whether an item that returns changes the mode."""
-    after: Mode | None = None
+    after: FlightMode | None = None
     """The mode after the last item, in the air; None keeps the mode and holds."""
     accept_m: float = 2.0
     """How near a waypoint counts as reached, if it does not say so itself."""
     tells_all: bool = False
     """Whether MISSION_ITEM_REACHED is sent for items too that take no time."""
-    text: Callable[[int, Item], str | None] = lambda _number, _item: None
+    text: Callable[[int, PlanItem], str | None] = lambda _number, _item: None
     """What is said when an item that takes time begins."""
 
 
-class Mission:
+class MissionProgress:
     """The mission of one vehicle, and how far it is. `where` tells where the vehicle believes to be."""
 
     def __init__(
         self,
         rules: MissionRules,
         stored: Plans,
-        vehicle: Vehicle,
-        home: Home,
+        vehicle: Multirotor,
+        home: HomePosition,
         allows: Callable[[Point], bool],
         where: Callable[[], Point],
         send: Callable[[Message], None],
@@ -99,14 +99,14 @@ class Mission:
     # -------------------------------------------------------------------------------------------- from outside
 
     @property
-    def items(self) -> tuple[Item, ...]:
+    def items(self) -> tuple[PlanItem, ...]:
         """All items, home in slot 0 included where the flavour has it."""
         return self._stored.items(MISSION)
 
     @property
     def running(self) -> bool:
         """Whether it is flown now."""
-        return self._vehicle.mode is Mode.MISSION and self.state is MissionState.ACTIVE
+        return self._vehicle.mode is FlightMode.MISSION and self.state is MissionState.ACTIVE
 
     def may_enter(self) -> bool:
         """Whether the mode may be entered now."""
@@ -135,7 +135,7 @@ class Mission:
     def message(self) -> Message:
         """MISSION_CURRENT. `total` counts the items that are flown, home left out; PX4 tells no `mission_mode`."""
         first = self._rules.first
-        mode = (_IN_MISSION if self._vehicle.mode is Mode.MISSION else _SUSPENDED) if first else 0
+        mode = (_IN_MISSION if self._vehicle.mode is FlightMode.MISSION else _SUSPENDED) if first else 0
         total = max(0, len(self.items) - first)
         return _MISSION_CURRENT(self.current, total, self.state, mode)
 
@@ -162,8 +162,8 @@ class Mission:
             self.state = MissionState.NO_MISSION
         else:
             self.state = MissionState.NOT_STARTED if self.valid else MissionState.UNKNOWN
-        if not self.valid and self._vehicle.mode is Mode.MISSION:
-            self._vehicle.set_mode(Mode.LOITER)
+        if not self.valid and self._vehicle.mode is FlightMode.MISSION:
+            self._vehicle.set_mode(FlightMode.LOITER)
         self._send(self.message())
 
     def _rewind(self) -> None:
@@ -206,7 +206,7 @@ class Mission:
             if not self._step_item(self.items[self.current], here):
                 return
 
-    def _step_item(self, item: Item, here: Point) -> bool:
+    def _step_item(self, item: PlanItem, here: Point) -> bool:
         """Begins the current item, or looks whether it is done; whether the next may be looked at already."""
         if not self._begun:
             self._begun, self._arrived_us = True, None
@@ -218,7 +218,7 @@ class Mission:
             self._send(mavlink.MAVLink_mission_item_reached_message(self.current))
         return self._advance(item)
 
-    def _advance(self, item: Item) -> bool:
+    def _advance(self, item: PlanItem) -> bool:
         self._begun = False
         following = self.current + 1
         if item.command == plans.JUMP:
@@ -232,7 +232,7 @@ class Mission:
             return True
         self.state = MissionState.COMPLETE
         self._started = False
-        if self._vehicle.in_air and self._vehicle.mode is Mode.MISSION:
+        if self._vehicle.in_air and self._vehicle.mode is FlightMode.MISSION:
             if self._rules.after is not None:
                 self._vehicle.set_mode(self._rules.after)
             else:
@@ -240,7 +240,7 @@ class Mission:
         self._send(self.message())
         return False
 
-    def _begin(self, item: Item, here: Point) -> None:
+    def _begin(self, item: PlanItem, here: Point) -> None:
         vehicle, command = self._vehicle, item.command
         if command == plans.TAKEOFF or (command in plans.WAYPOINTS and not vehicle.in_air):
             self._climb(self._up(item, here))
@@ -251,7 +251,7 @@ class Mission:
         elif command == plans.LAND:
             vehicle.land_here()
         elif command == plans.RETURN and self._rules.return_is_mode:
-            vehicle.set_mode(Mode.RETURN)
+            vehicle.set_mode(FlightMode.RETURN)
         elif command == plans.RETURN:
             vehicle.return_home()
         elif command == plans.SPEED and item.p2 > 0:
@@ -263,7 +263,7 @@ class Mission:
             vehicle.takeoff_up = up if up > 0 else vehicle.handling.takeoff_up
             vehicle.climb()
 
-    def _is_done(self, item: Item, here: Point) -> bool:
+    def _is_done(self, item: PlanItem, here: Point) -> bool:
         vehicle, command = self._vehicle, item.command
         climbing = not vehicle.in_air or vehicle.landed is Landed.TAKEOFF
         if command == plans.TAKEOFF:
@@ -283,7 +283,7 @@ class Mission:
             return not vehicle.in_air
         return command != plans.RETURN or self._rules.return_is_mode or not vehicle.in_air
 
-    def _has_arrived(self, item: Item, place: Point, here: Point) -> bool:
+    def _has_arrived(self, item: PlanItem, place: Point, here: Point) -> bool:
         """Whether it is there, or was: gusts may carry it off while it waits."""
         if self._arrived_us is not None:
             return True
@@ -299,14 +299,14 @@ class Mission:
             self._arrived_us = self._now_us
         return not seconds > 0 or self._now_us - self._arrived_us >= seconds * 1_000_000
 
-    def _place(self, item: Item, here: Point) -> Point:
+    def _place(self, item: PlanItem, here: Point) -> Point:
         """Where an item is; without a place it is here, over the ground."""
         up = self._up(item, here)
         if not item.has_place:
             return Point(self._vehicle.target.north, self._vehicle.target.east, up)
         return Point(*self._home.local(item.x, item.y), up)
 
-    def _up(self, item: Item, here: Point) -> float:
+    def _up(self, item: PlanItem, here: Point) -> float:
         if not isfinite(item.z):
             return here.up
         return item.z - self._home.amsl_mm / 1000 if item.frame in AMSL_FRAMES else item.z

@@ -3,10 +3,19 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 
 NEEDS_POSITION = frozenset(
-    {Mode.POSITION, Mode.LOITER, Mode.TAKEOFF, Mode.GUIDED, Mode.MISSION, Mode.ORBIT, Mode.BRAKE, Mode.RETURN},
+    {
+        FlightMode.POSITION,
+        FlightMode.LOITER,
+        FlightMode.TAKEOFF,
+        FlightMode.GUIDED,
+        FlightMode.MISSION,
+        FlightMode.ORBIT,
+        FlightMode.BRAKE,
+        FlightMode.RETURN,
+    },
 )
 """Modes that cannot be entered without a position estimate."""
 
@@ -15,13 +24,13 @@ NEEDS_POSITION = frozenset(
 class ModeTable:
     """How a flavour numbers the modes that it has."""
 
-    numbers: Mapping[Mode, int]
+    numbers: Mapping[FlightMode, int]
     """`custom_mode` of HEARTBEAT."""
-    base: Mapping[Mode, int]
+    base: Mapping[FlightMode, int]
     """`base_mode` of HEARTBEAT while disarmed."""
-    start: Mode
+    start: FlightMode
     """The mode after boot."""
-    armable: frozenset[Mode]
+    armable: frozenset[FlightMode]
     """The modes in which arming is not refused."""
     names: Mapping[int, str]
     """What the flavour calls them in its texts, by number."""
@@ -30,10 +39,10 @@ class ModeTable:
     stands_by: bool = False
     """Whether HEARTBEAT tells that it stands by until it lifts off, armed or not."""
 
-    def name(self, mode: Mode) -> str:
+    def name(self, mode: FlightMode) -> str:
         """What the flavour calls a mode that it has."""
         return self.names[self.numbers[mode]]
 
-    def mode(self, number: int) -> Mode | None:
+    def mode(self, number: int) -> FlightMode | None:
         """The mode with this `custom_mode`, if the flavour has one."""
         return next((mode for mode, own in self.numbers.items() if own == number), None)

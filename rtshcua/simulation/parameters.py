@@ -22,7 +22,7 @@ _MAY_BE_ZERO = frozenset({"return_speed", "near_m", "cone_deg", "cone_slope", "c
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class AutopilotParameter:
     """A parameter: its type, and what it sets in `Handling`, if anything, in how many parts of a metre or second."""
 
     name: str
@@ -36,7 +36,7 @@ class Parameter:
 class Parameters:
     """The parameters of one vehicle. `bytewise`: integers travel as their bytes in the float, else cast to float."""
 
-    def __init__(self, table: tuple[Parameter, ...], handling: Handling, bytewise: bool) -> None:
+    def __init__(self, table: tuple[AutopilotParameter, ...], handling: Handling, bytewise: bool) -> None:
         self._table = {parameter.name: parameter for parameter in table}
         self._names = [parameter.name for parameter in table]
         self._handling = handling
@@ -91,7 +91,7 @@ class Parameters:
             raise ValueError(f"this vehicle has no parameter `{name}`")
         self._store(self._table[name], value)
 
-    def _store(self, parameter: Parameter, value: float) -> None:
+    def _store(self, parameter: AutopilotParameter, value: float) -> None:
         stored = self._values[parameter.name] = value if parameter.type == REAL32 else float(round(value))
         if parameter.attribute is not None:
             least = 0.0 if parameter.attribute in _MAY_BE_ZERO else _LEAST

@@ -19,7 +19,7 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True)
-class Home:
+class HomePosition:
     """Where the vehicle starts: degrees times 1e7, and millimetres above mean sea level."""
 
     latitude: int

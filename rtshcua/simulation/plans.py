@@ -71,7 +71,7 @@ _FEWEST_VERTICES = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class PlanItem:
     """One item; the place in 1e-7 degree, the altitude `z` in metres above what `frame` (MAV_FRAME) says."""
 
     command: int
@@ -91,7 +91,7 @@ class Item:
         return self.frame != PLACELESS_FRAME and (self.x, self.y) != (0, 0)
 
 
-def from_message(message: Message) -> Item | None:
+def from_message(message: Message) -> PlanItem | None:
     """The item in a MISSION_ITEM_INT, or in a MISSION_ITEM with its degrees; None if its place is no place."""
     m = message
     if m.get_type() == "MISSION_ITEM":
@@ -105,10 +105,10 @@ def from_message(message: Message) -> Item | None:
         return None
     if not -(2**31) <= x < 2**31 or not -(2**31) <= y < 2**31:
         return None
-    return Item(m.command, m.frame, m.param1, m.param2, m.param3, m.param4, x, y, m.z, m.autocontinue)
+    return PlanItem(m.command, m.frame, m.param1, m.param2, m.param3, m.param4, x, y, m.z, m.autocontinue)
 
 
-def to_message(item: Item, sequence: int, kind: int, to: tuple[int, int], whole: bool) -> Message:
+def to_message(item: PlanItem, sequence: int, kind: int, to: tuple[int, int], whole: bool) -> Message:
     """The item as MISSION_ITEM_INT if `whole`, else as the older MISSION_ITEM; `to` is (system, component)."""
     parts = (item.p1, item.p2, item.p3, item.p4)
     head = (*to, sequence, item.frame, item.command, 0, item.autocontinue, *parts)
@@ -118,7 +118,7 @@ def to_message(item: Item, sequence: int, kind: int, to: tuple[int, int], whole:
     return mavlink.MAVLink_mission_item_message(*head, item.x * scale, item.y * scale, item.z, kind)
 
 
-def draws_no_fence(items: Sequence[Item]) -> bool:
+def draws_no_fence(items: Sequence[PlanItem]) -> bool:
     """Whether the items draw no fence: vertices too few or of mixed count, a circle without a radius."""
     at = 0
     while at < len(items):
@@ -145,15 +145,15 @@ class Plans:
     """What is stored of each kind. Whoever wants to know of changes adds itself to `listeners`."""
 
     def __init__(self) -> None:
-        self._items: dict[int, tuple[Item, ...]] = dict.fromkeys(KINDS, ())
+        self._items: dict[int, tuple[PlanItem, ...]] = dict.fromkeys(KINDS, ())
         self.listeners: list[Callable[[int], None]] = []
         """Called with the kind after each change."""
 
-    def items(self, kind: int) -> tuple[Item, ...]:
+    def items(self, kind: int) -> tuple[PlanItem, ...]:
         """The items of a kind, in order."""
         return self._items[kind]
 
-    def replace(self, kind: int, items: Sequence[Item]) -> None:
+    def replace(self, kind: int, items: Sequence[PlanItem]) -> None:
         """Stores other items in place of all of that kind."""
         self._items[kind] = tuple(items)
         self._tell(kind)

@@ -28,16 +28,16 @@ from rtshcua.simulation.config import (
     HOME,
     STOCK,
     Answers,
+    AutopilotKind,
     Boot,
+    Equipment,
     Estimate,
-    Extra,
-    Kind,
     OtherBattery,
     Purpose,
     SimulationConfig,
 )
 from rtshcua.simulation.fault_syntax import parse_fault
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.place import HomePosition
 from rtshcua.simulation.simulated_mark import hundredths
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
@@ -49,7 +49,7 @@ def parser() -> argparse.ArgumentParser:
     add = options.add_argument
     add("--port", type=_number(int, 1, 65_535), required=True, help="UDP port on loopback that is sent to, and heard")
     add("--bind", type=_number(int, 0, 65_535), default=0, help="own UDP port; 0 (default) takes a free one")
-    add("--flavour", choices=list(Kind), default=Kind.PX4)
+    add("--flavour", choices=list(AutopilotKind), default=AutopilotKind.PX4)
     add("--system", type=_number(int, 1, 255), default=1, help="MAVLink system id")
     add("--speed", type=_number(float, 0.01, 200), default=1.0, help="seconds of flight in a second")
     add("--seed", type=int, default=1)
@@ -76,7 +76,9 @@ def parser() -> argparse.ArgumentParser:
     add("--answers", choices=list(Answers), default=Answers.RECORDED, help="how long each takes: none, or as recorded")
     add("--boot", choices=list(Boot), default=Boot.FAST, help="how sensors come up: in a second, or as recorded")
     add("--stock", action="store_true", help="GPS, barometer and battery alone: nothing else is fitted")
-    add("--extra", choices=list(Extra), action="append", help="what is fitted instead of the usual; may be repeated")
+    add(
+        "--extra", choices=list(Equipment), action="append", help="what is fitted instead of the usual; may be repeated"
+    )
     add("--signing-key", type=_key, metavar="FILE", help="the link's key: 32 octets, or as many in hexadecimal")
     add("--parameter", type=_parameter, action="append", default=[], metavar="NAME=VALUE", help="as its owner set it")
     add("--usb", action="store_true", help="the vehicle takes the link for USB")
@@ -91,9 +93,9 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
     home = HOME
     if options.home is not None:
         latitude, longitude, amsl = options.home
-        home = Home(round(latitude * 10_000_000), round(longitude * 10_000_000), round(amsl * 1000))
+        home = HomePosition(round(latitude * 10_000_000), round(longitude * 10_000_000), round(amsl * 1000))
     return SimulationConfig(
-        flavour=Kind(options.flavour),
+        flavour=AutopilotKind(options.flavour),
         system=options.system,
         home=home,
         battery=round(options.battery * 100),
@@ -107,7 +109,11 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         estimate=Estimate(options.estimate),
         answers=Answers(options.answers),
         boot=Boot(options.boot),
-        extras=STOCK if options.stock else EQUIPPED if options.extra is None else frozenset(map(Extra, options.extra)),
+        extras=STOCK
+        if options.stock
+        else EQUIPPED
+        if options.extra is None
+        else frozenset(map(Equipment, options.extra)),
         parameters=tuple(options.parameter),
         faults=tuple(options.fault),
         signing_key=options.signing_key,

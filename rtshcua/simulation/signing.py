@@ -7,8 +7,8 @@ is the flavour's (`obeys_unsigned`), and so is whether it takes a key at all (`o
 
 from typing import Final
 
-from rtshcua.codec.frames import Message, Received
-from rtshcua.mavlink.signing import EPOCH_US, UNIT_US, SignedLink, State
+from rtshcua.codec.frames import Message, ReceivedFrame
+from rtshcua.mavlink.signing import EPOCH_US, UNIT_US, SignedLink, SigningState
 
 _FULL_SPEED: Final = 100
 _LATEST: Final = 1 << 47
@@ -26,14 +26,14 @@ class VehicleSigning:
         self._before_us = 0  # how long it ran before it was started again
         self._link: SignedLink | None = None
         if key is not None:
-            self._link = SignedLink(key, State(0, {}), max(utc_us, EPOCH_US) + ahead_us, 0, as_library=True)
+            self._link = SignedLink(key, SigningState(0, {}), max(utc_us, EPOCH_US) + ahead_us, 0, as_library=True)
 
     @property
     def on(self) -> bool:
         """Whether there is a key."""
         return self._link is not None
 
-    def accept(self, received: Received, now_us: int) -> bool:
+    def accept(self, received: ReceivedFrame, now_us: int) -> bool:
         """Whether a frame is rightly signed; without a key every frame is as good."""
         return self._link is None or self._link.accept(received.frame, self._clock(now_us))
 
@@ -42,7 +42,7 @@ class VehicleSigning:
         key = bytes(message.secret_key)
         if any(key):
             first = min(message.initial_timestamp + self._ahead_us // UNIT_US, _LATEST)
-            self._link = SignedLink(key, State(first, {}), EPOCH_US, self._clock(now_us), as_library=True)
+            self._link = SignedLink(key, SigningState(first, {}), EPOCH_US, self._clock(now_us), as_library=True)
         else:
             self._link = None
 

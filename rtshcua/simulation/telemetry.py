@@ -7,10 +7,10 @@ from math import atan2, degrees, hypot
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message, maker
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.battery import Battery
-from rtshcua.simulation.config import Extra, Purpose
+from rtshcua.simulation.config import Equipment, Purpose
 from rtshcua.simulation.failsafe import LOW_TO_LAND
 from rtshcua.simulation.simulated_mark import marked
 from rtshcua.simulation.surroundings import RANGE_MAX_M, RANGE_MIN_M, SECTORS
@@ -56,7 +56,7 @@ def heartbeat(a: Autopilot) -> Message:
     """HEARTBEAT: mode, armed or not, and state."""
     vehicle, modes, mode = a.vehicle, a.flavour.modes, a.shown.mode
     base = modes.base[mode] | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0)
-    if vehicle.blind and mode is Mode.LAND:
+    if vehicle.blind and mode is FlightMode.LAND:
         base &= ~modes.blind
     active = vehicle.armed and (vehicle.in_air or not modes.stands_by)
     booting = a.sensors.booting
@@ -97,7 +97,7 @@ def sys_status(a: Autopilot) -> Message | None:
 
 
 def _millivolts(a: Autopilot, battery: Battery) -> int:
-    return battery.millivolts if Extra.VOLTAGE in a.extras else _NO_VOLTAGE
+    return battery.millivolts if Equipment.VOLTAGE in a.extras else _NO_VOLTAGE
 
 
 def gps_raw_int(a: Autopilot) -> Message:
@@ -214,7 +214,7 @@ def home_position(a: Autopilot) -> Message | None:
 
 def distance_sensor(a: Autopilot) -> Message | None:
     """DISTANCE_SENSOR of what looks ahead or down, of both in turn; its greatest distance if nothing is there."""
-    ahead, down = Extra.RANGE in a.extras, Extra.ALTIMETER in a.extras
+    ahead, down = Equipment.RANGE in a.extras, Equipment.ALTIMETER in a.extras
     a.looked_down = down and not (ahead and a.looked_down)
     if a.looked_down:
         return _looks_down(a)
@@ -237,7 +237,7 @@ def _looks_ahead(a: Autopilot) -> Message:
         int(RANGE_MAX_M * 100),
         int((RANGE_MAX_M if seen is None else seen) * 100),
         mavlink.MAV_DISTANCE_SENSOR_LASER,
-        1 if Extra.ALTIMETER in a.extras else 0,
+        1 if Equipment.ALTIMETER in a.extras else 0,
         mavlink.MAV_SENSOR_ROTATION_NONE,
         255,
     )
@@ -245,7 +245,7 @@ def _looks_ahead(a: Autopilot) -> Message:
 
 def obstacle_distance(a: Autopilot) -> Message | None:
     """OBSTACLE_DISTANCE all around, from ahead clockwise; a centimetre more than its greatest distance is nothing."""
-    if Extra.RANGE not in a.extras:
+    if Equipment.RANGE not in a.extras:
         return None
     furthest = int(RANGE_MAX_M * 100)
     seen = a.surroundings.around(a.vehicle.body)
@@ -301,8 +301,9 @@ CURRENT_MODE = 436
 """Neither is this one: https://mavlink.io/en/messages/common.html#CURRENT_MODE."""
 _CURRENT_MODE_LAYOUT = struct.Struct("<IIB")
 
-_STANDARD: Mapping[Mode, int] = {
-    Mode.POSITION: 1, Mode.ALTITUDE: 4, Mode.RETURN: 5, Mode.MISSION: 6, Mode.LAND: 7, Mode.TAKEOFF: 8
+_STANDARD: Mapping[FlightMode, int] = {
+    FlightMode.POSITION: 1, FlightMode.ALTITUDE: 4, FlightMode.RETURN: 5, FlightMode.MISSION: 6, FlightMode.LAND: 7,
+    FlightMode.TAKEOFF: 8
 }  # fmt: skip
 """MAV_STANDARD_MODE; others have none (0)."""
 

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message
 from rtshcua.simulation import plans
-from rtshcua.simulation.plans import FENCE, KINDS, MISSION, PLACELESS_FRAME, Item, Plans, draws_no_fence
+from rtshcua.simulation.plans import FENCE, KINDS, MISSION, PLACELESS_FRAME, PlanItem, Plans, draws_no_fence
 
 ACCEPTED: int = mavlink.MAV_MISSION_ACCEPTED
 ERROR: int = mavlink.MAV_MISSION_ERROR
@@ -46,7 +46,7 @@ class TransferRules:
     keeps_home: bool = False
     """Whether slot 0 of a mission is home, and not looked at."""
 
-    def check(self, kind: int, number: int, item: Item) -> int:
+    def check(self, kind: int, number: int, item: PlanItem) -> int:
         """MAV_MISSION_RESULT: what it says to an item."""
         if item.frame not in _FRAMES:
             return UNSUPPORTED_FRAME
@@ -65,7 +65,7 @@ class _Upload:
     count: int
     heard_us: int
     asked_us: int
-    items: list[Item] = field(default_factory=list)
+    items: list[PlanItem] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -86,7 +86,7 @@ class Transfer:
         rules: TransferRules,
         kept: Plans,
         send: Callable[[Message], None],
-        stored: Callable[[int], tuple[Item, ...]],
+        stored: Callable[[int], tuple[PlanItem, ...]],
         may_clear: Callable[[int], bool],
     ) -> None:
         self._rules = rules
@@ -139,7 +139,7 @@ class Transfer:
             self._upload = None
             self._store(peer, kind, tuple(upload.items))
 
-    def _store(self, peer: Peer, kind: int, items: tuple[Item, ...]) -> None:
+    def _store(self, peer: Peer, kind: int, items: tuple[PlanItem, ...]) -> None:
         result = ERROR if kind == FENCE and draws_no_fence(items) else ACCEPTED
         self._ack(peer, result, kind)
         if result == ACCEPTED:

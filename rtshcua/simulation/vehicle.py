@@ -8,7 +8,7 @@ from enum import Enum, IntEnum, auto
 from math import copysign, hypot, inf
 
 from rtshcua.mavlink import enums
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation import battery, guidance
 from rtshcua.simulation.handling import Handling
 from rtshcua.simulation.kinematics import Body, heading, within
@@ -24,7 +24,7 @@ class Landed(IntEnum):
     LANDING = enums.MAV_LANDED_STATE_LANDING
 
 
-class Event(Enum):
+class VehicleEvent(Enum):
     """What happened that the autopilot has a text for."""
 
     ARMED = auto()
@@ -63,7 +63,7 @@ class Activity(Enum):
 _REST, _CLIMB, _TRACK, _RETURN_CLIMB, _RETURN_CROSS, _RETURN_WAIT = tuple(Activity)[:6]
 _CIRCLE, _DESCEND, _TOUCHED, _FALL, _WRECK, _CRUISE = tuple(Activity)[6:]
 
-_RETURN = Mode.RETURN
+_RETURN = FlightMode.RETURN
 
 _FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
 
@@ -76,10 +76,10 @@ _HARD_M_S = 4.0
 """Who comes down faster than this breaks."""
 
 
-class Vehicle:
+class Multirotor:
     """A multirotor, at first on the ground at home and disarmed; what it was told, and how it goes on from that."""
 
-    def __init__(self, handling: Handling, mode: Mode) -> None:
+    def __init__(self, handling: Handling, mode: FlightMode) -> None:
         self.handling = handling
         self.return_under = inf
         """The height above home that a return does not climb over, for the fence's sake."""
@@ -96,7 +96,7 @@ class Vehicle:
         """The height that the takeoff climbs to; kept while disarmed, for arming in TAKEOFF starts it, until that mode
         is left (PX4: `Takeoff::set_takeoff_position` takes what NAV_TAKEOFF named once).
         """
-        self.events: list[Event] = []
+        self.events: list[VehicleEvent] = []
         self.blind = False  # flies level, for it has no position to hold
         self.crashed = False
         self.touched_m_s = 0.0  # how fast it last came down on the ground
@@ -114,7 +114,7 @@ class Vehicle:
         self._nose: float | None = None
         self._radius = 0.0
         self._velocity = (0.0, 0.0, 0.0)
-        self._past: guidance.Past | None = None
+        self._past: guidance.Overshoot | None = None
         self._comes_back = False  # from behind its target
         self._steer_to_target()
 
@@ -165,11 +165,11 @@ class Vehicle:
             return
         self.armed = True
         self._stood_s, self._lifting_s, self._has_flown = 0.0, None, False
-        self.events.append(Event.ARMED)
-        if self.mode is Mode.TAKEOFF:
+        self.events.append(VehicleEvent.ARMED)
+        if self.mode is FlightMode.TAKEOFF:
             self.climb()
 
-    def disarm(self, event: Event = Event.DISARMED) -> None:
+    def disarm(self, event: VehicleEvent = VehicleEvent.DISARMED) -> None:
         """Stops the motors, wherever it is: in the air it falls."""
         if not self.armed:
             return
@@ -187,7 +187,7 @@ class Vehicle:
         if self.handling.after_landing is not None and not self.in_air:
             self.mode = self.handling.after_landing
 
-    def restart(self, mode: Mode) -> None:
+    def restart(self, mode: FlightMode) -> None:
         """The autopilot starts again, and comes up in this mode: the motors stop, and all that it was told is gone."""
         self.disarm()
         self.events.clear()
@@ -202,7 +202,7 @@ class Vehicle:
             self._activity = _FALL
             self.body.crash()
 
-    def set_mode(self, mode: Mode) -> None:
+    def set_mode(self, mode: FlightMode) -> None:
         """Enters a mode and begins what it does; every mode but TAKEOFF, RETURN and LAND holds the place.
 
         The mode that it is in already changes nothing: neither autopilot enters it again, and PX4 in Hold flies on to
@@ -213,24 +213,24 @@ class Vehicle:
             return
         if self.handling.forgets_speed:
             self._speed = None
-        if self.mode is Mode.TAKEOFF:
+        if self.mode is FlightMode.TAKEOFF:
             self.takeoff_up = None
         self.mode = mode
         self._nose = None
         self.blind = self.sent = self.paused = False
         self.destination = None
-        if mode is Mode.TAKEOFF:
+        if mode is FlightMode.TAKEOFF:
             self.climb()
         else:
             self._lifting_s = None
         if not self.flies:
             return
-        if mode is Mode.LAND:
+        if mode is FlightMode.LAND:
             self.land_here()
-        elif mode is Mode.RETURN:
+        elif mode is FlightMode.RETURN:
             self.return_home()
-            self.events += [Event.RETURN, Event.RETURN_CLIMB]
-        elif mode is not Mode.TAKEOFF:
+            self.events += [VehicleEvent.RETURN, VehicleEvent.RETURN_CLIMB]
+        elif mode is not FlightMode.TAKEOFF:
             self.hold()
 
     def climb(self) -> None:
@@ -308,7 +308,7 @@ class Vehicle:
         `past`: whether it may fly past it, and come back.
         """
         if self.flies:
-            if self.handling.forgets_at_first_target and self.mode is Mode.GUIDED and not self.sent:
+            if self.handling.forgets_at_first_target and self.mode is FlightMode.GUIDED and not self.sent:
                 self._speed = None
             self.destination, self.sent = target, True
             if self.paused:
@@ -386,8 +386,8 @@ class Vehicle:
     def _hold(self, activity: Activity = _TRACK, up: float | None = None) -> None:
         """Stops where it can, at the height `up`, or where it can stop climbing as well."""
         body, agility = self.body, self.handling.agility
-        stop = agility.brake if self.mode is Mode.BRAKE else agility.stop
-        if self.mode is Mode.LAND:
+        stop = agility.brake if self.mode is FlightMode.BRAKE else agility.stop
+        if self.mode is FlightMode.LAND:
             stop = agility.land
         self._approach, self._hardest = stop.approach, stop.hardest
         if up is None:
@@ -457,7 +457,7 @@ class Vehicle:
                 self._activity = _TRACK
                 self.landed = Landed.IN_AIR
                 self.takeoff_up = None
-                if self.mode is Mode.TAKEOFF and self.handling.after_takeoff is not None:
+                if self.mode is FlightMode.TAKEOFF and self.handling.after_takeoff is not None:
                     self.mode = self.handling.after_takeoff
         elif activity is _RETURN_CLIMB:
             if away < guidance.ARRIVED_M and abs(body.v_up) < guidance.ARRIVED_M_S:
@@ -474,7 +474,7 @@ class Vehicle:
             self._activity = _DESCEND
             self.destination = Point(self.target.north, self.target.east, 0.0)
             self.landed = Landed.LANDING
-            self.events.append(Event.HOME)
+            self.events.append(VehicleEvent.HOME)
 
     def _climb_rate(self, north: float, east: float) -> float:
         """Upwards, as far as it can; (north, east) is the target as it is steered to."""
@@ -500,22 +500,22 @@ class Vehicle:
                 self._stood_s = 0.0
                 self._activity = _REST
                 self.landed = Landed.ON_GROUND
-                self.events.append(Event.LANDED)
+                self.events.append(VehicleEvent.LANDED)
         elif self._activity is _WRECK:
             if self.armed and handling.crash_disarm_s is not None and self._stood_s >= handling.crash_disarm_s:
-                self.disarm(Event.CRASHED)
+                self.disarm(VehicleEvent.CRASHED)
         elif self._lifting_s is not None:
             self._lifting_s -= dt
             if self._lifting_s <= 0:
                 self._lift_off()
         elif self.armed:
-            landed = self._has_flown or self.mode in (Mode.RETURN, Mode.LAND)
+            landed = self._has_flown or self.mode in (FlightMode.RETURN, FlightMode.LAND)
             if self._stood_s >= (handling.landed_disarm_s if landed else handling.idle_disarm_s):
-                self.disarm(Event.AUTO_DISARMED)
+                self.disarm(VehicleEvent.AUTO_DISARMED)
 
     def _lift_off(self) -> None:
         self._lifting_s, self._has_flown = None, True
-        self.events.append(Event.TAKEOFF)
+        self.events.append(VehicleEvent.TAKEOFF)
         self._steer_to_target()
         climbs = self.takeoff_up is not None
         self._activity = _CLIMB if climbs else _TRACK
@@ -526,7 +526,9 @@ class Vehicle:
         self._past = None
         self.crashed = self.crashed or self.touched_m_s > _HARD_M_S
         self.body.stop(upright=not self.crashed)
-        self.events += [Event.TOUCHED, Event.TIPPED] if self.crashed and self.armed else [Event.TOUCHED]
+        self.events += (
+            [VehicleEvent.TOUCHED, VehicleEvent.TIPPED] if self.crashed and self.armed else [VehicleEvent.TOUCHED]
+        )
         if not self.armed:
             self._activity = _REST
         else:

@@ -7,7 +7,7 @@ from typing import Final
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec, Message
-from rtshcua.model.faults import Mode, Voice
+from rtshcua.model.faults import FlightMode, Voice
 from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.telemetry import heartbeat
 
@@ -19,7 +19,7 @@ _ANSWERED: Final = (
 )  # fmt: skip
 
 
-class SecondVoice:
+class SecondSender:
     """One of them: says the same each `each_us`, from a time on, and counts its own frames."""
 
     def __init__(self, says: Voice, each_us: int, at_us: int) -> None:
@@ -47,7 +47,7 @@ class SecondVoice:
                 beat.base_mode &= ~mavlink.MAV_MODE_FLAG_SAFETY_ARMED
                 return [beat]
             case Voice.STRAYED:
-                beat.custom_mode = autopilot.flavour.modes.numbers[Mode.LAND]
+                beat.custom_mode = autopilot.flavour.modes.numbers[FlightMode.LAND]
                 return [beat]
             case Voice.ANSWERS:
                 denied, refused = mavlink.MAV_RESULT_DENIED, mavlink.MAV_MISSION_DENIED

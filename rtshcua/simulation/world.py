@@ -11,18 +11,18 @@ from math import hypot
 from random import Random
 from typing import NamedTuple
 
-from rtshcua.codec.frames import Received
-from rtshcua.model.faults import Fault, Mode
+from rtshcua.codec.frames import ReceivedFrame
+from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.simulation.answers import Inbox
 from rtshcua.simulation.ardupilot.flavour import ArduCopter
 from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour, Taker
-from rtshcua.simulation.config import Answers, Kind, SimulationConfig
+from rtshcua.simulation.config import Answers, AutopilotKind, SimulationConfig
 from rtshcua.simulation.face import Face
 from rtshcua.simulation.fault_effects import Affected, effects
-from rtshcua.simulation.link import Link
+from rtshcua.simulation.link import FaultyLink
 from rtshcua.simulation.px4.flavour import Px4
 
-FLAVOURS: Mapping[Kind, Flavour] = {Kind.PX4: Px4(), Kind.ARDUPILOT: ArduCopter()}
+FLAVOURS: Mapping[AutopilotKind, Flavour] = {AutopilotKind.PX4: Px4(), AutopilotKind.ARDUPILOT: ArduCopter()}
 
 
 class Truth(NamedTuple):
@@ -37,7 +37,7 @@ class Truth(NamedTuple):
     longitude: int
     armed: bool
     in_air: bool
-    mode: Mode
+    mode: FlightMode
     battery: int
     crashed: bool
     """Whether it flew into something, or came down too hard."""
@@ -59,8 +59,8 @@ class Simulation:
         self._autopilot = Autopilot(flavour, config)
         self._face = Face(self._autopilot, config.system)
         self._system = config.system
-        self._up = Link(Random(f"{config.seed} uplink"))
-        self._down = Link(Random(f"{config.seed} downlink"))
+        self._up = FaultyLink(Random(f"{config.seed} uplink"))
+        self._down = FaultyLink(Random(f"{config.seed} downlink"))
         self._now_us = self._ticked_us = 0
         self._halted = False
         self._taken_over_us: int | None = None
@@ -200,7 +200,7 @@ class Simulation:
             for at_us, received in inbox.due(until_us):
                 self._answer(received, max(at_us, self._ticked_us))  # what waited while it was halted comes after
 
-    def _answer(self, received: Received, now_us: int) -> None:
+    def _answer(self, received: ReceivedFrame, now_us: int) -> None:
         if self.obeyed is not None:
             self.obeyed(now_us, received.frame)
         self._autopilot.since_us = now_us - self._ticked_us

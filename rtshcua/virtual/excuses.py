@@ -30,7 +30,7 @@ import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.virtual.flown import Happened, Sample, ScenarioFlown
 
@@ -228,7 +228,7 @@ class Excuses:
         again (`ModeLand::init`).
         """
         from_us = min(back_us, at_us)
-        lands = [sample.mode is Mode.LAND for sample in self._flown.samples if from_us <= sample.at_us <= at_us]
+        lands = [sample.mode is FlightMode.LAND for sample in self._flown.samples if from_us <= sample.at_us <= at_us]
         return self._flown.flavour == "ardupilot" and all(lands)
 
     def _misled(self, failure: Failure) -> str | None:
@@ -282,7 +282,7 @@ class Excuses:
             return None
         for fault in self._before(failure.at_us, faults.PilotPause):
             sample = self._sample(fault.at_us)
-            climbs = sample is not None and sample.mode is Mode.TAKEOFF
+            climbs = sample is not None and sample.mode is FlightMode.TAKEOFF
             if sample is not None and climbs and any(abs(up - sample.up_mm) <= _SAME_MM for up in self._climbs()):
                 return "unseen"
         return None
@@ -359,7 +359,7 @@ class Excuses:
         from_us = failure.at_us - 5_000_000
         for fault in self._during(from_us, failure.at_us):
             match fault:
-                case faults.LinkSilence(way=way) if failure.slug != "late" or way is not Way.UP:
+                case faults.LinkSilence(way=way) if failure.slug != "late" or way is not Direction.UP:
                     return "link"
                 case faults.LinkLoss(loss=loss) if loss >= 3_000 or failure.slug == "late":
                     return "link"

@@ -9,20 +9,20 @@ from rtshcua.adapters.vehicle.bounds import narrower, reach_of
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.simulation.ardupilot.parameters import PARAMETERS
-from rtshcua.simulation.config import HOME, STOCK, Extra, Kind, SimulationConfig
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.config import HOME, STOCK, AutopilotKind, Equipment, SimulationConfig
+from rtshcua.simulation.place import HomePosition
 
 _CRUISE_MM_S = 5_000
 #: what a simulated vehicle flies at most, if nothing is chosen, and at all
 _MOST_MM_S = 12_000
 _FASTEST_MM_S = 15_000
 _TOLD_IN = {
-    "RADIO_STATUS": Extra.RADIO, "DISTANCE_SENSOR": Extra.RANGE, "OBSTACLE_DISTANCE": Extra.RANGE,
-    "WIND": Extra.WIND, "WIND_COV": Extra.WIND,
+    "RADIO_STATUS": Equipment.RADIO, "DISTANCE_SENSOR": Equipment.RANGE, "OBSTACLE_DISTANCE": Equipment.RANGE,
+    "WIND": Equipment.WIND, "WIND_COV": Equipment.WIND,
 }  # fmt: skip
 
 
-def _extras(policy: Policy) -> frozenset[Extra]:
+def _extras(policy: Policy) -> frozenset[Equipment]:
     """What has to be fitted for the signals of a policy to come."""
     messages = {source.message for signal in policy.signals for source in signal.sources}
     return STOCK | {extra for message, extra in _TOLD_IN.items() if message in messages}
@@ -36,7 +36,7 @@ def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:
     kept = _CRUISE_MM_S if vehicle.speeds is None else max(vehicle.speeds.cruise, vehicle.speeds.homeward)
     cruise = min(kept, vehicle.speed or kept, _FASTEST_MM_S)
     fits: dict[str, Any] = {
-        "home": Home(projection.latitude, projection.longitude, HOME.amsl_mm),
+        "home": HomePosition(projection.latitude, projection.longitude, HOME.amsl_mm),
         "hover_us": vehicle.endurance_us,
         "extras": _extras(policy),
         "cruise_mm_s": cruise,
@@ -51,7 +51,7 @@ def with_room(config: SimulationConfig, policy: Policy, steps: Sequence[Invocati
     """The same vehicle, with a fence of its own that is as wide and high as a mission goes: so its owner would have set
     FENCE_RADIUS and FENCE_ALT_MAX, without which no real one is ready for it. A PX4 comes without such bounds.
     """
-    if config.flavour is not Kind.ARDUPILOT:
+    if config.flavour is not AutopilotKind.ARDUPILOT:
         return config
     own = ARDUPILOT.own_fence
     values = {each.name: each.value for each in PARAMETERS if each.name in own.names} | dict(config.parameters)

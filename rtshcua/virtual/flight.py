@@ -21,7 +21,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, EnforcementMode, Loaded, load
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import Action, BoundaryKey, Ending, Event, EvidenceSink, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
@@ -155,7 +155,8 @@ class VirtualFlight:
 
     def __init__(
         self, bundle: bytes, simulated: SimulationConfig | Callable[[Policy], SimulationConfig] = fitting,
-        *, root: bytes, log_key: SigningKey = NOBODY, mode: Mode = Mode.SOFTWARE, utc_us: int | None = None,
+        *, root: bytes, log_key: SigningKey = NOBODY, mode: EnforcementMode = EnforcementMode.SOFTWARE,
+        utc_us: int | None = None,
         wait_us: int = 100_000, resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
         sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
         settings: Mapping[str, int] = MappingProxyType({}), owed: dict[str, Owed] | None = None,
@@ -173,7 +174,7 @@ class VirtualFlight:
         loaded = load(
             bundle, root=trusted, vehicle=policy.vehicle.identity, now=now, mode=mode,
             session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=True,
-            settings=settings, owed=owed or {}, caller=Caller(self.served) if mode is Mode.PROCESS else None,
+            settings=settings, owed=owed or {}, caller=Caller(self.served) if mode is EnforcementMode.PROCESS else None,
         )  # fmt: skip
         if isinstance(loaded, Refusal):
             raise ValueError(f"{loaded.slug}: {loaded.text}")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from rtshcua.model.faults import Fault, Mode
+from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario
@@ -26,7 +26,7 @@ class Sample(NamedTuple):
     armed: bool
     in_air: bool
     crashed: bool
-    mode: Mode
+    mode: FlightMode
     battery: int
     obstacle_mm: int | None
     """How far it is to the nearest thing that stands around; None: nothing does."""

@@ -31,9 +31,9 @@ from typing import Any, Final, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Auditor
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.step_number import step_words
 from rtshcua.virtual.conduct import Conduct
@@ -227,9 +227,9 @@ _ASKS: Final = frozenset({401, 511, _REQUEST_MESSAGE})  # RUN_PREARM_CHECKS, SET
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
 _SET_MODE: Final = 176
 #: the modes of `_MODES` in which no target is reported
-_NO_TARGET: Final[Mapping[str, Mapping[tuple[int, int], Mode]]] = {
-    "px4": {(4, 5): Mode.RETURN, (4, 6): Mode.LAND},
-    "ardupilot": {(17, 0): Mode.BRAKE, (6, 0): Mode.RETURN, (9, 0): Mode.LAND},
+_NO_TARGET: Final[Mapping[str, Mapping[tuple[int, int], FlightMode]]] = {
+    "px4": {(4, 5): FlightMode.RETURN, (4, 6): FlightMode.LAND},
+    "ardupilot": {(17, 0): FlightMode.BRAKE, (6, 0): FlightMode.RETURN, (9, 0): FlightMode.LAND},
 }
 #: what DO_SET_MODE is a part of, by its parameters 2 and 3
 _MODES: Final[Mapping[str, Mapping[tuple[int, int], frozenset[MotionKind]]]] = {
@@ -398,7 +398,7 @@ def _flies_as_lost(flown: ScenarioFlown, motion: Motion, times: Sequence[int], f
     return True
 
 
-def _lost_mode(frame: Frame, flavour: str) -> Mode | None:
+def _lost_mode(frame: Frame, flavour: str) -> FlightMode | None:
     """The mode that a lost frame asked for, where that mode reports no target, which would tell who chose it."""
     if frame.heard_us is not None:
         return None
@@ -510,7 +510,7 @@ def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
         for line in life.lines:
             auditor.take(line)
         report = auditor.audit().report
-        if report.verdict is Verdict.VERIFIED:
+        if report.verdict is LogVerdict.VERIFIED:
             continue
         at_us = max(0, report.last_us - flown.start_us)
         if report.failure is None:

@@ -25,10 +25,10 @@ from rtshcua.model.faults import AgentFault, Fault, HostFault
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.scenario import Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.onboard.left import left_by
 from rtshcua.onboard.ports import Action, BoundaryKey, Command, Ending, Event, Presented, Readings
-from rtshcua.simulation.config import Answers, Estimate, Kind, SimulationConfig
+from rtshcua.simulation.config import Answers, AutopilotKind, Estimate, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 from rtshcua.virtual.fitting import fitting, with_room
@@ -204,7 +204,7 @@ class _Flight:
         self._drawn = 0
 
         apart = any(isinstance(each.fault, faults.BoundaryKilled) for each in scenario.incidents)
-        self._mode = Mode.PROCESS if apart else Mode.SOFTWARE
+        self._mode = EnforcementMode.PROCESS if apart else EnforcementMode.SOFTWARE
 
         def vehicle(policy: Any) -> SimulationConfig:
             config = self._config(chosen, policy)
@@ -226,7 +226,8 @@ class _Flight:
     def _config(self, chosen: Callable[..., SimulationConfig], policy: object) -> SimulationConfig:
         start = self._scenario.start
         asked: dict[str, object] = {
-            "flavour": Kind(self._flavour), "seed": self._seed, "answers": Answers.RECORDED, "estimate": Estimate.REAL,
+            "flavour": AutopilotKind(self._flavour), "seed": self._seed, "answers": Answers.RECORDED,
+            "estimate": Estimate.REAL,
         }  # fmt: skip
         if start.battery is not None:
             asked["battery"] = start.battery

@@ -15,10 +15,10 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement import isolated as calls
 from rtshcua.onboard.enforcement.executor import UNSENT, Executor
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, EnforcementMode, Loaded, load
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import BoundaryKey, Command
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.permit import SIZE, open_permit
@@ -76,7 +76,7 @@ class Served:
             case calls.SEAL:
                 return self.gate.seal(rest[_TIME.size :], *_TIME.unpack_from(rest))
             case calls.TIME:  # its time is told to it
-                return _TOLD.pack(Source.SHARED, 0, 0, UTC_UNKNOWN_US, 0)
+                return _TOLD.pack(ClockSource.SHARED, 0, 0, UTC_UNKNOWN_US, 0)
             case calls.FLIGHT:
                 return bytes(FLIGHT_BYTES)
             case calls.STANDS:
@@ -118,7 +118,8 @@ class Served:
     def _open(self, rest: bytes) -> bytes | Refusal:
         *now, _ = _LOADED.unpack(rest)
         loaded = load(
-            self._staged[calls.LOAD], root=self._root, vehicle=self._vehicle, now=Now(*now), mode=Mode.PROCESS,
+            self._staged[calls.LOAD], root=self._root, vehicle=self._vehicle, now=Now(*now),
+            mode=EnforcementMode.PROCESS,
             session_key=_SESSION, flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=True,
             settings=self._settings, owed=self._owed,
         )  # fmt: skip

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import Stages
-from rtshcua.mavlink.signing import Verifier
+from rtshcua.mavlink.signing import FrameVerifier
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
@@ -58,7 +58,7 @@ class VirtualVehicle:
 
     def __init__(
         self, policy: Policy, config: SimulationConfig, clock: VirtualClock | None = None,
-        frames: FrameSession | IsolatedGate | None = None, verifier: Verifier | None = None, *, fence: bool = True,
+        frames: FrameSession | IsolatedGate | None = None, verifier: FrameVerifier | None = None, *, fence: bool = True,
         manoeuvres: Mapping[str, Stages] | None = None, tick_us: int = TICK_US, steps: Sequence[Invocation] = (),
     ) -> None:  # fmt: skip
         self.simulation = Simulation(config)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rtshcua.model.flat.limits import MAX_ANSWERS
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
-from rtshcua.model.flat.situation import Approval, Now
+from rtshcua.model.flat.situation import ConfirmAnswer, Now
 from rtshcua.model.flat.struct import Flat
 from rtshcua.model.step_number import step_words
 from rtshcua.wire import names
@@ -165,12 +165,12 @@ class Approvals:
             if not answered.granted or answered.about.invocation_id in ids
         }
 
-    def about(self, invocation: Invocation, now: Now) -> tuple[Approval, ...]:
+    def about(self, invocation: Invocation, now: Now) -> tuple[ConfirmAnswer, ...]:
         """What `decide` reads of them: one entry for each answer that counts and each rule that it answers."""
         if not self._answers:
             return ()
         return tuple(
-            Approval(rule, answered.role, answered.granted, answered.monotonic_us, answered.person)
+            ConfirmAnswer(rule, answered.role, answered.granted, answered.monotonic_us, answered.person)
             for key, answered in self._answers.items()
             if key == _subject(invocation, answered) and _counts(answered, now)
             for rule in confirms(self._policy, invocation, answered.role)

@@ -20,7 +20,7 @@ STAMP_US: Final = 1_000
 UNIX_US: Final = 10**15
 
 
-class Source(IntEnum):
+class ClockSource(IntEnum):
     """Where a boundary has the time of day from."""
 
     UNKNOWN = 0

@@ -39,7 +39,7 @@ class ReplacementDocument(Flat, frozen=True):
     mission: Mission
 
 
-class Replacement(NamedTuple):
+class VerifiedReplacement(NamedTuple):
     """A verified replacement of the mission of digest `supersedes`; `digest` names the mission from now on."""
 
     supersedes: bytes
@@ -74,7 +74,7 @@ def sign_replacement(mission: Mission, *, over: Bundle, flight: bytes, kept: int
 
 def open_replacement(
     document: bytes, *, root: TrustRoot, vehicle: str, flight: bytes | None, bundle: Bundle, now: Now
-) -> Replacement:
+) -> VerifiedReplacement:
     """A replacement that is to be trusted here and now, for a flight (None: whichever it names) under the policy of
     `bundle`.
 
@@ -85,7 +85,7 @@ def open_replacement(
     said, opened = open_document(document, names.REPLACEMENT, ReplacementDocument, Duty.MISSION, root, now)
     if flight is not None:
         check_flight(said.flight, flight)
-    found = Replacement(said.supersedes, said.kept, said.mission, digest(MISSION, opened.payload), opened.key)
+    found = VerifiedReplacement(said.supersedes, said.kept, said.mission, digest(MISSION, opened.payload), opened.key)
     candidate = with_fields(bundle, mission=found.mission, mission_digest=found.digest, mission_key=opened.key)
     check_bundle(
         candidate, vehicle, now.utc_us + now.utc_error_us, after=_after(said.flight, said.supersedes, said.kept)
@@ -97,7 +97,7 @@ def open_replacement(
     return found
 
 
-def fit_replacement(found: Replacement, bundle: Bundle, released: int, *, compared: bytes = b"") -> Bundle:
+def fit_replacement(found: VerifiedReplacement, bundle: Bundle, released: int, *, compared: bytes = b"") -> Bundle:
     """What is in force after a replacement of the mission in `bundle`, of which `released` steps were released.
     `compared` is the digest of the mission that `check_stays` was asked about before.
 
@@ -114,7 +114,7 @@ def fit_replacement(found: Replacement, bundle: Bundle, released: int, *, compar
     return found.over(bundle)
 
 
-def check_stays(found: Replacement, bundle: Bundle) -> None:
+def check_stays(found: VerifiedReplacement, bundle: Bundle) -> None:
     """Whether the steps of `bundle` that are to stay are the same, and the key may set the others aside. It takes as
     long as there are steps. Raises `DocumentError` and `BundleError`.
     """

@@ -11,7 +11,7 @@ import msgspec
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
@@ -93,6 +93,6 @@ def _read(payload: bytes) -> Statement:
     fits = len(said.marks) % MARK_BYTES == 0 and len(said.marks) <= MARK_BYTES * MOST_MARKS
     if len(said.flight) != FLIGHT_BYTES or digests != {DIGEST_BYTES} or not fits:
         raise StatementError("malformed", "a flight, a digest or a mark of it is not as long as they are")
-    if min(numbers) < 0 or not 0 <= said.source <= max(Source):
+    if min(numbers) < 0 or not 0 <= said.source <= max(ClockSource):
         raise StatementError("malformed", "a number of it is out of range")
     return said

@@ -11,16 +11,16 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 819,
-    "code lines": 83_849,
-    "shared class names": 127,
-    "of them across packages": 110,
+    "modules": 821,
+    "code lines": 84_417,
+    "shared class names": 67,
+    "of them across packages": 45,
     "shared file names": 95,
     "import cycles": 0,
     "modules below 80 lines with one importer": 49,
     "functions of more than 60 lines": 21,
-    "functions of a complexity over 15": 165,
-    "functions of a complexity over 25": 14,
+    "functions of a complexity over 15": 155,
+    "functions of a complexity over 25": 12,
 }
 
 

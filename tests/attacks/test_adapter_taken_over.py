@@ -9,7 +9,7 @@ from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle import px4 as px4
 from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.onboard.ports import Command, Ending
 from virtual import case
 from virtual.flight import Flight
@@ -54,4 +54,4 @@ def test_what_it_changed_does_not_leave_and_it_comes_home(change: Change, reason
     assert "return_home" in flown.dispatched()
     assert flown.vehicle.simulation.truth().armed is False
     assert highest < 20_000, "a return climbs to 16 m, and nothing climbs higher"
-    assert flown.audit().report.verdict is Verdict.VERIFIED
+    assert flown.audit().report.verdict is LogVerdict.VERIFIED

@@ -23,7 +23,7 @@ from rtshcua.front.cli import app
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.load import Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, load
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import envelopes
 from rtshcua.wire.keys import ANY, Duty
@@ -141,7 +141,7 @@ def rooted(**bound: tuple[str, ...]) -> TrustRoot:
 def opened(root: TrustRoot, mission: Mission = MISSION) -> str:
     """What the boundary says to a mission that the attacker signed: a slug, or nothing."""
     found = load(
-        sealed(POLICY, mission), root=root, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE,
+        sealed(POLICY, mission), root=root, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE,
         session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=True,
     )  # fmt: skip
     return found.slug if isinstance(found, Refusal) else ""

@@ -29,7 +29,7 @@ from rtshcua.decision.session import InForce
 from rtshcua.ground.audit.audit import audit
 from rtshcua.model.decision import Decision
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load, session
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load, session
 
 OF = low()
 OTHER = bytes([7]) * 16
@@ -100,7 +100,7 @@ def test_a_recall_for_a_policy_is_for_all_its_flights() -> None:
 def test_a_flight_is_named_by_16_octets() -> None:
     with pytest.raises(ValueError, match="16 bytes"):
         load(
-            sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY,
+            sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE, session_key=SESSION_KEY,
             flight=b"short", peer_is_own_simulator=False,
         )  # fmt: skip
 

@@ -23,15 +23,15 @@ from rtshcua.adapters.boundary_process import BoundaryProcess, program
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.signing import SignedLink
-from rtshcua.mavlink.signing import State as LinkState
+from rtshcua.mavlink.signing import SigningState as LinkState
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.isolated import OBSERVE, Caller, OwnTime
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire.approval import ApprovalDocument, sign_approval
-from rtshcua.wire.clock import APART_US, Source
+from rtshcua.wire.clock import APART_US, ClockSource
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.receipt import Receipt, decode
 from rtshcua.wire.request import STEP, Request, encode
@@ -74,7 +74,7 @@ class Held:
 
     def load(self, now: Now | None = None) -> Loaded | Refusal:
         made = load(
-            self.bundle, root=self.root, vehicle=VEHICLE, now=now or machine(), mode=Mode.PROCESS,
+            self.bundle, root=self.root, vehicle=VEHICLE, now=now or machine(), mode=EnforcementMode.PROCESS,
             session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False, caller=self.caller,
         )  # fmt: skip
         if isinstance(made, Loaded):
@@ -178,9 +178,9 @@ def test_keys_that_have_expired_open_nothing_by_naming_the_time_before(tmp_path:
 
 def test_where_the_boundary_knows_no_time_of_day_none_may_be_claimed(tmp_path: Path) -> None:
     held = Held(tmp_path)
-    if held.own().source is not Source.UNKNOWN:
+    if held.own().source is not ClockSource.UNKNOWN:
         pytest.skip("this machine's clock is synchronised")
-    assert held.own(settle=True).source is Source.UNKNOWN, "nobody stated how far it is off"
+    assert held.own(settle=True).source is ClockSource.UNKNOWN, "nobody stated how far it is off"
     assert isinstance(held.load(), Loaded)
     assert held.ask(machine()) is Status.CLOCK_UNKNOWN
     assert held.show(machine()) == "clock-unknown"
@@ -201,7 +201,7 @@ class Keyed(Held):
         super().__init__(state, link_key=key, **more)
         at_us = machine().monotonic_us
         self.vehicle = SignedLink(KEY, LinkState(0, {}), machine().utc_us, at_us, link=1)
-        if self.own().source is not Source.UNKNOWN:
+        if self.own().source is not ClockSource.UNKNOWN:
             pytest.skip("this machine's clock is synchronised")
 
     def said(self, message: Any, codec: Codec = AUTOPILOT) -> bytes:
@@ -235,7 +235,7 @@ def test_the_vehicles_time_is_taken_from_frames_that_the_boundary_verified(keyed
     utc_us = machine().utc_us + 20 * S_US
     keyed.hear(keyed.answers(), keyed.tells(utc_us))
     own = keyed.own()
-    assert own.source is Source.VEHICLE
+    assert own.source is ClockSource.VEHICLE
     assert abs(own.now.utc_us - utc_us) < 5 * S_US
     assert keyed.own().number == 0
     assert keyed.ask(machine()) is Status.CLOCK_APART
@@ -260,10 +260,10 @@ def test_frames_that_were_held_back_tell_no_time(keyed: Keyed) -> None:
     """The hour that is past was signed before the boundary drew its number, or the answer to another."""
     past = keyed.tells(machine().utc_us - 5 * HOUR_US)
     keyed.hear(past, keyed.answers())
-    assert keyed.own().source is Source.UNKNOWN
+    assert keyed.own().source is ClockSource.UNKNOWN
     late = keyed.tells(machine().utc_us)
     keyed.hear(late)
-    assert keyed.own().source is Source.VEHICLE
+    assert keyed.own().source is ClockSource.VEHICLE
 
 
 def test_an_answer_to_another_boundary_is_none_to_this_one(keyed: Keyed, tmp_path: Path) -> None:
@@ -274,7 +274,7 @@ def test_an_answer_to_another_boundary_is_none_to_this_one(keyed: Keyed, tmp_pat
     before.process.close()
     assert keyed.own().number > 0
     keyed.hear(held_back, keyed.tells(machine().utc_us - 5 * HOUR_US))
-    assert keyed.own().source is Source.UNKNOWN
+    assert keyed.own().source is ClockSource.UNKNOWN
 
 
 def test_neither_another_component_nor_an_unsigned_frame_tells_the_time(keyed: Keyed) -> None:
@@ -282,7 +282,7 @@ def test_neither_another_component_nor_an_unsigned_frame_tells_the_time(keyed: K
     bare = AUTOPILOT.pack(m.MAVLink_system_time_message(machine().utc_us, 5))
     assert keyed.caller(OBSERVE, machine().monotonic_us.to_bytes(8), bare) != b"\0"
     keyed.hear(keyed.tells(machine().utc_us, Codec(1, 154)), keyed.tells(5 * S_US))
-    assert keyed.own().source is Source.UNKNOWN, "and one that knows no UTC does not either"
+    assert keyed.own().source is ClockSource.UNKNOWN, "and one that knows no UTC does not either"
 
 
 def test_keys_are_looked_at_again_once_the_time_is_known(tmp_path: Path) -> None:
@@ -290,7 +290,7 @@ def test_keys_are_looked_at_again_once_the_time_is_known(tmp_path: Path) -> None
     keyed = Keyed(tmp_path, expires_us=machine().utc_us + HOUR_US)
     assert isinstance(keyed.load(), Loaded)
     keyed.hear(keyed.answers(), keyed.tells(machine().utc_us + 2 * HOUR_US))
-    assert keyed.own().source is Source.VEHICLE
+    assert keyed.own().source is ClockSource.VEHICLE
     assert keyed.ask(keyed.own().now) is Status.NOT_CURRENT
     keyed.process.close()
 
@@ -304,12 +304,12 @@ def test_each_statement_says_the_boundarys_own_time(held: Held) -> None:
     data = held.loaded.attestation.statement(Now(1, 1, 0))
     assert data is not None
     said = open_statement(data, KEYS)
-    assert said.source == Source.OPERATOR
+    assert said.source == ClockSource.OPERATOR
     assert abs(said.utc_us - machine().utc_us) < APART_US
     assert abs(said.at_us - machine().monotonic_us) < APART_US
 
 
-def of_own_clock(number: int, source: Source, ahead_us: int, error_us: int = 1_000) -> bytes:
+def of_own_clock(number: int, source: ClockSource, ahead_us: int, error_us: int = 1_000) -> bytes:
     """The line of a statement, as a boundary signs it whose clock is so far ahead of what the record claims."""
     record = read(LINES[number])
     said = replace(
@@ -326,7 +326,7 @@ def open_statement_of(detail: str) -> Any:
 @pytest.mark.parametrize("ahead_us", [5 * HOUR_US, -5 * HOUR_US, 4 * S_US, -4 * S_US])
 def test_a_log_that_claims_another_time_than_the_boundarys_is_found_out(ahead_us: int) -> None:
     for number in STATEMENTS:
-        lines = signed([*LINES[:number], of_own_clock(number, Source.KERNEL, ahead_us), *LINES[number + 1 :]])
+        lines = signed([*LINES[:number], of_own_clock(number, ClockSource.KERNEL, ahead_us), *LINES[number + 1 :]])
         slug, record = expect(lines)
         assert slug == "boundary/clock"
         assert record <= number
@@ -334,5 +334,5 @@ def test_a_log_that_claims_another_time_than_the_boundarys_is_found_out(ahead_us
 
 def test_a_log_that_claims_a_time_that_the_boundary_did_not_know_is_found_out() -> None:
     number = STATEMENTS[1]
-    line = of_own_clock(number, Source.UNKNOWN, 0, UTC_UNKNOWN_US)
+    line = of_own_clock(number, ClockSource.UNKNOWN, 0, UTC_UNKNOWN_US)
     assert expect(signed([*LINES[:number], line, *LINES[number + 1 :]]))[0] == "boundary/clock"

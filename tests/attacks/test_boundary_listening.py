@@ -27,7 +27,7 @@ from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import ENFORCE, LOAD, LOST, SEAL, Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.wire.keys import Duty
 from virtual import case
 from virtual.listening import ROOT, RUN_USER, VEHICLE, Listening, listening
@@ -65,7 +65,7 @@ class Provisioned:
 
     def load(self, process: ListeningBoundary, caller: Caller | None = None) -> Loaded | Refusal:
         return load(
-            shipped("short", self.issued), root=self.root, vehicle=VEHICLE, now=now(), mode=Mode.PROCESS,
+            shipped("short", self.issued), root=self.root, vehicle=VEHICLE, now=now(), mode=EnforcementMode.PROCESS,
             session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False,
             caller=caller or Caller(process.call, signs=True),
         )  # fmt: skip

@@ -44,7 +44,7 @@ from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.ahead import NO_COPY
 from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, LOAD, LOST, OBSERVE, PART, SEAL, Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS
 from rtshcua.wire.keys import Duty
@@ -84,7 +84,8 @@ class Held:
 
     def load(self) -> Loaded:
         loaded = load(
-            self.bundle, root=self.root, vehicle=VEHICLE, now=now(), mode=Mode.PROCESS, session_key=bytes(32),
+            self.bundle, root=self.root, vehicle=VEHICLE, now=now(), mode=EnforcementMode.PROCESS,
+            session_key=bytes(32),
             flight=bytes(16), peer_is_own_simulator=False, caller=self.caller,
         )  # fmt: skip
         assert isinstance(loaded, Loaded), loaded

@@ -45,7 +45,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement.executor import FORGED, OUT_OF_TURN, USED
 from rtshcua.onboard.enforcement.isolated import BEGIN, ENFORCE, LOAD, MAX_PART, PART, PRESENT, STATEMENT, Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.response import Status
 
@@ -69,7 +69,8 @@ class Held:
 
     def load(self, bundle: bytes | None = None) -> Loaded | Refusal:
         return load(
-            bundle or sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=bytes(32),
+            bundle or sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.PROCESS,
+            session_key=bytes(32),
             flight=bytes(16), peer_is_own_simulator=False, caller=self.caller,
         )  # fmt: skip
 

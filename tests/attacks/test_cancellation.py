@@ -32,7 +32,7 @@ from reference.world import (
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.enforcement.executor import MISSION_OVER
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Command, Ending, LinkBack, LinkLost
 from rtshcua.wire import binding, bundle, cose, names
 from rtshcua.wire.keys import Duty, SigningKey
@@ -60,7 +60,8 @@ def with_agent(mission: Mission, **rights: object) -> Loaded:
     bound = binding.bind(mission, bundle.policy_digest(payload))
     data = bundle.seal(payload, bundle.mission_payload(bound), policy_key=POLICY_KEY, mission_key=MISSION_KEY)
     found = load(
-        data, root=root, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY, flight=FLIGHT,
+        data, root=root, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE, session_key=SESSION_KEY,
+        flight=FLIGHT,
         peer_is_own_simulator=True,
     )  # fmt: skip
     assert isinstance(found, Loaded), found

@@ -27,7 +27,7 @@ from rtshcua.front.cli.showing import words
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.enforcement.isolated import PART, PRESENT, Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Event, Presented
 from rtshcua.onboard.runtime import runtime
 from rtshcua.virtual.served import Served
@@ -140,7 +140,8 @@ def elsewhere() -> tuple[Loaded, list[int]]:
         return served(octets)
 
     of = load(
-        sealed_again(loaded(mission=low_mission())), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS,
+        sealed_again(loaded(mission=low_mission())), root=ROOT, vehicle=VEHICLE, now=START,
+        mode=EnforcementMode.PROCESS,
         session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=False, caller=Caller(call),
     )  # fmt: skip
     assert isinstance(of, Loaded), of
@@ -148,17 +149,17 @@ def elsewhere() -> tuple[Loaded, list[int]]:
 
 
 @pytest.mark.parametrize("operators", [False, True], ids=["agents", "operators"])
-@pytest.mark.parametrize("mode", [Mode.SOFTWARE, Mode.PROCESS])
+@pytest.mark.parametrize("mode", [EnforcementMode.SOFTWARE, EnforcementMode.PROCESS])
 def test_what_a_replacement_needs_is_made_in_another_thread(
-    mode: Mode, operators: bool, monkeypatch: pytest.MonkeyPatch
+    mode: EnforcementMode, operators: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All that takes as long as it has steps; what is left is to put it in force, and to record it."""
-    of = low() if mode is Mode.SOFTWARE else elsewhere()[0]
+    of = low() if mode is EnforcementMode.SOFTWARE else elsewhere()[0]
     with flooded(of, monkeypatch, operators=operators) as run:
         document = large(of)
         assert len(document) > SHORT
         assert run.hand(document) == "accepted"
-        if mode is Mode.SOFTWARE:  # elsewhere it is the boundary that verifies it, in the call
+        if mode is EnforcementMode.SOFTWARE:  # elsewhere it is the boundary that verifies it, in the call
             assert run.most <= ITEMS
             assert not +run.busy, "in the flight's thread"
         else:

@@ -23,8 +23,8 @@ from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import FLAG_SIGNED, SIGNATURE, with_flags
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
-from rtshcua.mavlink.signing import EPOCH_US, LEAD, MOST_AHEAD, UNIT_US, SignedLink, State, timestamp_in
-from rtshcua.model.faults import Mode
+from rtshcua.mavlink.signing import EPOCH_US, LEAD, MOST_AHEAD, UNIT_US, SignedLink, SigningState, timestamp_in
+from rtshcua.model.faults import FlightMode
 from rtshcua.onboard.enforcement.ahead import MOST
 from rtshcua.onboard.enforcement.isolated import AHEAD, DISPATCH, SEAL, STATEMENT
 from rtshcua.onboard.ports import Ending
@@ -88,7 +88,7 @@ class Thief:
         self.of.vehicle.simulation.receive(frame, self.of.flight.clock.elapsed_us)
 
     @property
-    def mode(self) -> Mode:
+    def mode(self) -> FlightMode:
         """The vehicle's, as it really is."""
         return self.of.vehicle.simulation.truth().mode
 
@@ -163,7 +163,7 @@ def test_a_frame_that_is_held_back_is_void_half_a_minute_later(thief: Thief) -> 
     thief.until(7)
     assert thief.of.flight.clock.elapsed_us - since_us > 31 * S
     mode = thief.mode
-    assert mode is not Mode.RETURN
+    assert mode is not FlightMode.RETURN
     thief.send(kept)
     assert thief.mode is mode
 
@@ -177,9 +177,9 @@ def test_a_frame_may_be_sent_while_the_boundary_lives_and_then_nothing_that_was_
         thief.signed(permit, FALLBACK_LINK, 1, pack(RETURN)),
     )
     thief.send(home)
-    assert thief.mode is Mode.RETURN
+    assert thief.mode is FlightMode.RETURN
     thief.send(hold)
-    assert thief.mode is Mode.RETURN, "a later link voids an earlier one"
+    assert thief.mode is FlightMode.RETURN, "a later link voids an earlier one"
     thief.send(home)
     normal = thief.of._answer(
         bytes([SEAL]) + struct.pack(">q", thief.of.flight.clock.monotonic_us) + pack(messages.heartbeat())
@@ -194,7 +194,7 @@ def test_links_that_are_flown_while_the_boundary_lives_leave_no_trace_but_a_coun
     before = thief.stated()
     for link, frame in enumerate(frames, 1):
         thief.send(thief.signed(permit, CONTINGENCY_LINK, link, frame))
-    assert thief.mode is Mode.LAND
+    assert thief.mode is FlightMode.LAND
     after, expected = thief.stated(), BoundaryChain()
     expected.aside = before.aside
     for frame in frames:
@@ -267,7 +267,7 @@ def test_nothing_leaves_that_was_not_signed_ahead(flavour: str, modes: Any, key:
 def told(of: Apart, message: Any, link: int = 0, timestamp: int | None = None, key: bytes = bytes(32)) -> bytes:
     """What somebody without the key sends as the vehicle: signed in form."""
     stamp = timestamp if timestamp is not None else max(last for last, _ in of.gate._heard.values()) + 50
-    signer = SignedLink(key, State(stamp - 1, {}), EPOCH_US, 0, link)
+    signer = SignedLink(key, SigningState(stamp - 1, {}), EPOCH_US, 0, link)
     return signer.sign(Codec(1, 1).pack(message), 0)
 
 

@@ -5,7 +5,7 @@ import pytest
 from hostile.attacker import Attacker
 from rtshcua.mavlink.framing import message_id
 from rtshcua.mavlink.radio import RADIO_STATUS
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Ending
@@ -20,14 +20,14 @@ EVERY = 15  # datagrams of the vehicle
 
 def fly(flavour: str, *, hostile: bool, theirs: bytes = KEY, most_s: int = 600) -> Flown:
     """Up, one leg, home; with a key at both ends."""
-    link = SignedLink(KEY, State(0, {}), UTC_US, START.monotonic_us)
+    link = SignedLink(KEY, SigningState(0, {}), UTC_US, START.monotonic_us)
     frames = FrameSession()
     frames.sign_with(link)
     config = case.simulated(flavour, signing_key=theirs, utc_us=UTC_US)
     clock = VirtualClock(Now(START.monotonic_us, UTC_US, 1_000))
     vehicle = VirtualVehicle(case.policy(), config, clock, frames, link)
     overheard: list[bytes] = []
-    radio = SignedLink(theirs, State(0, {}), UTC_US, START.monotonic_us, link=2)
+    radio = SignedLink(theirs, SigningState(0, {}), UTC_US, START.monotonic_us, link=2)
 
     def through_the_air(datagram: bytes) -> list[bytes]:
         if message_id(datagram, 0) == RADIO_STATUS:  # this one's radio has the key, too

@@ -8,7 +8,7 @@ from reference import independent_verifier
 from reference.forgery import edit, expect, read, signed
 from reference.log_vectors import WITNESSES, anchor, close, effect, genesis, log, seal
 from reference.verifiers import ROOT_KEY, WORDS
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.evidence.witnessing.anchors import notes
 from rtshcua.ground.audit.audit import Auditor
 from virtual.rows import rows
@@ -18,7 +18,7 @@ LINES = log(genesis(), effect(10), seal(20, 1), effect(30), seal(40, 2), effect(
 SEEN = 4  # the signed record that the witnesses saw, and so its size
 
 
-def judged(lines: list[bytes], *anchors: str) -> Report:
+def judged(lines: list[bytes], *anchors: str) -> LogReport:
     """The report of the audit, with which the independent verifier agrees."""
     auditor = Auditor(ROOT_KEY, derive=False, anchors=anchors)
     for line in lines:
@@ -39,7 +39,7 @@ def found(lines: list[bytes], *anchors: str) -> str:
 
 def test_an_honest_log() -> None:
     report = judged(LINES, anchor(LINES[SEEN], [ONE, TWO]))
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert report.anchored == SEEN + 1
     assert judged(LINES, anchor(LINES[SEEN], [ONE])).anchored == 0, "two witnesses must have seen it"
 
@@ -47,7 +47,7 @@ def test_an_honest_log() -> None:
 @pytest.mark.parametrize("number", [1, 3])
 def test_rewritten_by_who_holds_every_key(number: int) -> None:
     forged = signed([*LINES[:number], edit(LINES[number], detail="rewritten"), *LINES[number + 1 :]])
-    assert judged(forged).verdict is Verdict.VERIFIED, "without a witness nobody can tell"
+    assert judged(forged).verdict is LogVerdict.VERIFIED, "without a witness nobody can tell"
     assert found(forged, anchor(LINES[SEEN], [ONE, TWO])) == "anchor/root"
     assert found(forged, anchor(LINES[SEEN], [ONE])) == "anchor/root", "one that saw it is enough to contradict"
 
@@ -55,20 +55,20 @@ def test_rewritten_by_who_holds_every_key(number: int) -> None:
 def test_what_comes_after_may_be_rewritten_and_is_not_called_anchored() -> None:
     forged = signed([*LINES[:5], edit(LINES[5], detail="rewritten"), *LINES[6:]])
     report = judged(forged, anchor(LINES[SEEN], [ONE, TWO]))
-    assert (report.verdict, report.anchored) == (Verdict.VERIFIED, SEEN + 1)
+    assert (report.verdict, report.anchored) == (LogVerdict.VERIFIED, SEEN + 1)
     assert any("unanchored tail: 2 records" in claim.text for claim in report.unproven)
 
 
 def test_cut_off_by_who_holds_every_key() -> None:
     short = log(genesis(), effect(10), close(20))
-    assert judged(short).verdict is Verdict.VERIFIED
+    assert judged(short).verdict is LogVerdict.VERIFIED
     assert found(short, anchor(LINES[SEEN], [ONE, TWO])) in ("anchor/beyond", "anchor/root")
 
 
 def test_cut_off_without_any_key() -> None:
-    assert judged(LINES[:3]).verdict is Verdict.INCOMPLETE
+    assert judged(LINES[:3]).verdict is LogVerdict.INCOMPLETE
     assert found(LINES[:3], anchor(LINES[SEEN], [ONE, TWO])) == "anchor/beyond"
-    assert judged(LINES[:6], anchor(LINES[SEEN], [ONE, TWO])).verdict is Verdict.INCOMPLETE
+    assert judged(LINES[:6], anchor(LINES[SEEN], [ONE, TWO])).verdict is LogVerdict.INCOMPLETE
 
 
 def test_cut_off_right_before_what_was_seen() -> None:
@@ -103,7 +103,7 @@ def test_an_anchor_of_another_log() -> None:
     """Another flight of the same vehicle has another origin, and says nothing about this one."""
     other = log(genesis(boot="22" * 16), effect(11), seal(20, 1), close(30))
     report = judged(LINES, anchor(other[2], [ONE, TWO]))
-    assert (report.verdict, report.anchored) == (Verdict.VERIFIED, 0)
+    assert (report.verdict, report.anchored) == (LogVerdict.VERIFIED, 0)
 
 
 @rows("at", [0, 4, 11, 12, 40, 75])

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from reference.attested_flight import attested, second
 from reference.forgery import LOG_KEY, edit, expect, prove, read, signed, sound
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.front.cli.outcome import exit_code_of
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import Duty, SigningKey
@@ -294,7 +294,7 @@ def test_a_loss_is_claimed_to_leave_out_what_follows(number: int) -> None:
     assert expect(signed(lost_at(number))) == ("boundary/lost", number)
     report = prove(signed(lost_at(number))).report
     assert report.failure is None
-    assert report.verdict is Verdict.INCOMPLETE
+    assert report.verdict is LogVerdict.INCOMPLETE
     assert any("says the runtime alone" in text for slug, text in report.unproven if slug == "boundary")
 
 

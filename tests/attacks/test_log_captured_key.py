@@ -17,7 +17,7 @@ from reference.forgery import (
     write,
 )
 from reference.resealing import resealed
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from virtual.rows import rows
 
 LINES = flight()
@@ -51,7 +51,7 @@ def closed_at(number: int) -> bytes:
 def test_the_thief_signs_what_a_verifier_takes() -> None:
     """Else these attacks would fail for the wrong reason."""
     assert by_the_thief(list(LINES))[: TAKEN + 1] == list(LINES[: TAKEN + 1])
-    assert prove(by_the_thief(list(LINES))).report.verdict is Verdict.VERIFIED
+    assert prove(by_the_thief(list(LINES))).report.verdict is LogVerdict.VERIFIED
 
 
 @rows("number", BEFORE)
@@ -78,7 +78,7 @@ def test_the_seals_of_earlier_epochs_cannot_be_moved() -> None:
 def test_the_present_epoch_can_be_rewritten_and_the_report_says_so(number: int) -> None:
     """This is what the key is worth: what comes after the last seal. Only a witness outside tells."""
     audit = prove(by_the_thief(edited(number)))
-    assert audit.report.verdict is Verdict.VERIFIED
+    assert audit.report.verdict is LogVerdict.VERIFIED
     assert any("unanchored tail" in claim.text for claim in audit.report.unproven)
 
 
@@ -86,7 +86,7 @@ def test_the_end_cut_off_and_closed_by_the_thief() -> None:
     """The thief may end the log early, where it was taken. Only a witness that saw more can tell."""
     forged = by_the_thief([*LINES[: TAKEN + 1], closed_at(TAKEN)])
     report = prove(forged).report
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert any("unanchored tail" in claim.text for claim in report.unproven)
 
 
@@ -122,7 +122,7 @@ def test_the_log_key_alone_writes_all_of_it_anew() -> None:
     named = [edit(line, next_key=own) if "next_key" in read(line) else line for line in edited(1)]
     forged = captured(named, secret, STRANGER)
     report = prove(forged).report
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert any(f"unanchored tail: {len(LINES)} records" in claim.text for claim in report.unproven)
 
 
@@ -135,6 +135,6 @@ def test_the_log_key_alone_cuts_the_log_anywhere_and_calls_it_a_crash(number: in
     forged = captured([*LINES[:number], write(recover), closed_at(number - 1)], secret, STRANGER)
     assert forged[:number] == list(LINES[:number])
     report = prove(forged).report
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert "recovered" in [claim.slug for claim in report.unproven]
     assert any("unanchored tail" in claim.text for claim in report.unproven)

@@ -16,7 +16,7 @@ from reference.forgery import (
     signers,
 )
 from reference.resealing import resealed
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from virtual.rows import rows
 
 LINES = flight()
@@ -135,4 +135,4 @@ def test_a_used_id_that_is_said_to_be_unused() -> None:
 
 def test_the_log_itself_is_sound() -> None:
     for lines in (LINES, other_flight()):
-        assert prove(lines).report.verdict is Verdict.VERIFIED
+        assert prove(lines).report.verdict is LogVerdict.VERIFIED

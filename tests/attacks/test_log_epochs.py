@@ -24,7 +24,7 @@ from reference.forgery import (
 from reference.log_vectors import close, effect, genesis, line_of, log, seal
 from reference.resealing import note_of, resealed
 from reference.verifiers import careful
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
 from virtual.rows import rows
@@ -79,7 +79,7 @@ def test_the_most_records_of_an_epoch(count: int, whole: bool) -> None:
 def test_the_longest_time_of_an_epoch(ms: int, whole: bool) -> None:
     lines = log(genesis(), effect(ms), close(99_000))
     report = careful(b"".join(lines)).report
-    assert (report.verdict is Verdict.VERIFIED) is whole
+    assert (report.verdict is LogVerdict.VERIFIED) is whole
     assert whole or expect(lines) == ("seal/missing", 1)
 
 
@@ -108,7 +108,9 @@ def test_another_key_named_for_what_follows() -> None:
     assert expect(swapped) == ("seal/self", FIRST)
     keys: Callable[[str], bytes] = lambda public: b"\x66" * 32 if public == thief else seed_of(public)  # noqa: E731
     resigned = resealed(swapped, keys)
-    assert prove(resigned).report.verdict is Verdict.VERIFIED, "the holder of the epoch's key may choose the next one"
+    assert prove(resigned).report.verdict is LogVerdict.VERIFIED, (
+        "the holder of the epoch's key may choose the next one"
+    )
     named = read(LINES[FIRST])["checkpoint"].split("\n")[4]
     lying = resealed(
         swapped, keys, text=lambda n, text: text.replace(text.split("\n")[4], named) if n == FIRST else text
@@ -184,6 +186,6 @@ def test_a_key_of_another_duty() -> None:
 
 def test_seals_alone() -> None:
     lines = log(genesis(), seal(10, 1), seal(20, 2), seal(20, 3), close(30))
-    assert careful(b"".join(lines)).report.verdict is Verdict.VERIFIED
+    assert careful(b"".join(lines)).report.verdict is LogVerdict.VERIFIED
     assert [read(line)["records"] for line in lines[1:]] == [1, 1, 1, 1]
     assert line_of(read(lines[1])) == lines[1]

@@ -5,14 +5,14 @@ import random
 import pytest
 
 from reference.forgery import edit, expect, flight, prove, read, rewritten, signed, signers
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.evidence.verify import verify
 
 
 def noticed(data: bytes, at: int, bit: int) -> bool:
     """By the chain alone, without any key but the one that the log names."""
     changed = data[:at] + bytes([data[at] ^ 1 << bit]) + data[at + 1 :]
-    return verify(_lines(changed)).verdict is not Verdict.VERIFIED
+    return verify(_lines(changed)).verdict is not LogVerdict.VERIFIED
 
 
 def _lines(data: bytes) -> list[bytes]:
@@ -31,8 +31,8 @@ def test_the_forger_writes_what_the_recorder_writes() -> None:
     """Else the attacks in these files would fail for the wrong reason."""
     assert tuple(signed(flight())) == flight()
     assert rewritten(flight()) == list(flight())
-    assert prove(flight()).report.verdict is Verdict.VERIFIED
-    assert verify(_lines(short())).verdict is Verdict.VERIFIED
+    assert prove(flight()).report.verdict is LogVerdict.VERIFIED
+    assert verify(_lines(short())).verdict is LogVerdict.VERIFIED
 
 
 def test_one_bit_of_each_line() -> None:
@@ -78,7 +78,7 @@ def test_every_byte_of_a_whole_flight_under_audit() -> None:
     data = b"".join(flight())
     for at in range(len(data)):
         changed = _lines(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
-        assert prove(changed).report.verdict is not Verdict.VERIFIED, at
+        assert prove(changed).report.verdict is not LogVerdict.VERIFIED, at
 
 
 def test_what_the_flip_did_is_named() -> None:

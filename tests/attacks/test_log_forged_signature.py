@@ -3,7 +3,7 @@
 from base64 import b64decode, b64encode
 
 from reference.forgery import LOG_KEY, as_log_key, edit, expect, flight, prove, read, rewritten, signed, signers
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.evidence.verify import verify
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
@@ -30,7 +30,7 @@ def test_signed_by_another_key() -> None:
 def test_another_key_named_in_the_genesis() -> None:
     """The chain alone is then sound in itself; only the root under the pinned key tells."""
     forged = signed(as_log_key(LINES, STRANGER), STRANGER)
-    assert verify(forged).verdict is Verdict.VERIFIED
+    assert verify(forged).verdict is LogVerdict.VERIFIED
     assert expect(forged) == ("trust/log-key", 0)
 
 
@@ -58,7 +58,7 @@ def test_a_root_of_the_forgers_own() -> None:
         keys=(*(key for key in real.keys if key.duty is not Duty.ROOT), root_key.verification()),
     ).sign(root_key)
     forged = signed([edit(LINES[0], root=b64encode(own).decode()), *LINES[1:]])
-    assert verify(forged).verdict is Verdict.VERIFIED
+    assert verify(forged).verdict is LogVerdict.VERIFIED
     assert expect(forged) == ("trust/root-unknown-key", 0)
 
 
@@ -82,7 +82,7 @@ def test_the_key_holder_may_rewrite_and_the_report_says_so() -> None:
     number = next(n for n, line in enumerate(LINES) if read(line).get("event") == "succeeded")
     forged = signed([*LINES[:number], edit(LINES[number], detail="rewritten"), *LINES[number + 1 :]])
     report = prove(forged).report
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert "anchor" in [claim.slug for claim in report.unproven]
     assert LOG_KEY.kid.hex() in next(claim.text for claim in report.proven if claim.slug == "signed-close")
 

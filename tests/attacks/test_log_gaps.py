@@ -24,7 +24,7 @@ from reference.forgery import (
 )
 from reference.log_vectors import close, effect, genesis, log, seal
 from reference.resealing import Fields, line_of
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from virtual import case
 from virtual.rows import rows
 from virtual.stalling import StallingFlight
@@ -60,7 +60,7 @@ def later(lines: list[bytes], by_us: int) -> list[bytes]:
 
 def test_a_gap_that_is_true_is_told_and_accuses_nobody() -> None:
     report = prove(stalled()).report
-    assert (report.verdict, report.failure) == (Verdict.VERIFIED, None)
+    assert (report.verdict, report.failure) == (LogVerdict.VERIFIED, None)
     assert [claim.slug for claim in report.unproven].count("gap") == 1
 
 
@@ -96,7 +96,7 @@ def test_the_thief_of_an_epochs_key_calls_what_it_leaves_out_a_gap_and_that_is_t
     end = edit(LINES[-1], **{key: read(gap)[key] for key in ("at_us", "utc_us")})
     forged = captured([*LINES[: taken + 1], gap, end], seed_of(read(LINES[taken])["next_key"]))
     report = prove(forged).report
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert [(each.record, each.us) for each in report.gaps] == [(taken + 1, 40 * S)]
     slugs = [claim.slug for claim in report.unproven]
     assert "gap" in slugs
@@ -163,12 +163,12 @@ def test_a_gap_that_is_none(records: list[Fields], found: tuple[str, int]) -> No
 def test_an_epoch_may_end_late_by_a_gap_and_by_no_more() -> None:
     gap = effect(40_000, event="stalled", detail=f"{30 * S} us")
     good = prove(log(genesis(), effect(10_000), gap, effect(50_000), seal(50_000, 1), close(50_001))).report
-    assert (good.verdict, [each.us for each in good.gaps]) == (Verdict.VERIFIED, [30 * S])
+    assert (good.verdict, [each.us for each in good.gaps]) == (LogVerdict.VERIFIED, [30 * S])
     assert expect(log(genesis(), effect(10_000), gap, effect(50_001), close(50_002))) == ("seal/missing", 3)
 
 
 def test_a_log_cut_behind_a_gap_is_incomplete_and_nobody_vouches_for_it() -> None:
     lines, number = stalled(), gap_in(stalled())
     report = prove(lines[: number + 1]).report
-    assert report.verdict is Verdict.INCOMPLETE
+    assert report.verdict is LogVerdict.INCOMPLETE
     assert any("nobody has signed for that yet" in claim.text for claim in report.unproven)

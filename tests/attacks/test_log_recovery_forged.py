@@ -6,7 +6,7 @@ from reference.forgery import STRANGER, by_one_key, expect, flight, prove, read,
 from reference.log_vectors import MONOTONIC_US, close, effect, genesis, line_of, log, recovered, seal
 from reference.resealing import resealed
 from reference.verifiers import agree, careful
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 
 LINES = recovered()[0]
 AT = next(number for number, line in enumerate(LINES) if read(line)["type"] == "recover")
@@ -17,7 +17,7 @@ def changed(number: int, **fields: object) -> list[bytes]:
 
 
 def test_an_honest_one() -> None:
-    assert prove(LINES).report.verdict is Verdict.VERIFIED
+    assert prove(LINES).report.verdict is LogVerdict.VERIFIED
     assert read(LINES[AT])["at_us"] < read(LINES[AT - 1])["at_us"], "monotonic time began anew"
 
 

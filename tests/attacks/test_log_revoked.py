@@ -31,7 +31,7 @@ from reference.world import (
     renewed,
 )
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.front.cli.app import main
 from rtshcua.ground.audit.audit import Auditor
 from rtshcua.ground.audit.revoked import RevokedKeys
@@ -70,7 +70,7 @@ def newer(
 
 def judged(
     *roots: bytes, lines: tuple[bytes, ...] = (), pinned: bytes = ROOT_KEY.public, anchors: tuple[str, ...] = ()
-) -> Report:
+) -> LogReport:
     """The report on a log (the flight) under these roots."""
     auditor, revoked = Auditor(pinned, anchors=anchors), RevokedKeys(roots)
     for line in lines or flown():
@@ -80,13 +80,13 @@ def judged(
     return revoked.judged(auditor.audit()).report
 
 
-def found(report: Report) -> tuple[str, str, int]:
+def found(report: LogReport) -> tuple[str, str, int]:
     """Verdict, and what is the matter, at which record."""
     finding = report.failure or report.shortfall
     return report.verdict.value, finding.slug if finding else "", finding.record if finding else -1
 
 
-def told(report: Report) -> set[str]:
+def told(report: LogReport) -> set[str]:
     """The slugs of what is told of revocations."""
     proven = {f"+{each.slug}" for each in report.proven}
     return {each for each in proven | {each.slug for each in report.unproven} if "revo" in each}
@@ -208,7 +208,7 @@ def test_what_the_newest_root_leaves_as_it_was_is_told() -> None:
     assert told(judged(newer(AFTER))) == {"+revocations"}
     stranger = newer(AFTER, of=replace(ROOT, keys=(NEW_ROOT_KEY.verification(),)), by=NEW_ROOT_KEY)
     assert told(judged(stranger)) == {"revocations"}, "a root of somebody else says nothing of this log"
-    assert judged(newer(AFTER, version=9)).verdict is Verdict.VERIFIED
+    assert judged(newer(AFTER, version=9)).verdict is LogVerdict.VERIFIED
     assert told(judged(newer(AFTER, version=9))) == {"revocations"}
 
 

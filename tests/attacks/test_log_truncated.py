@@ -1,7 +1,7 @@
 """Threat: the end of the log is cut off, in a record, between two, or all of it."""
 
 from reference.forgery import edit, expect, flight, prove, read, rewritten, signers
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from virtual.rows import rows
 
 LINES = flight()
@@ -11,7 +11,7 @@ LAST = len(LINES) - 1
 @rows("count", range(1, LAST + 1))
 def test_cut_between_records(count: int) -> None:
     assert expect(LINES[:count]) == ("close/missing", count)
-    assert prove(LINES[:count]).report.verdict is Verdict.INCOMPLETE
+    assert prove(LINES[:count]).report.verdict is LogVerdict.INCOMPLETE
 
 
 @rows("kept", [1, 10, 40, 74, 200, -2, -1])
@@ -19,7 +19,7 @@ def test_cut_inside_a_record(kept: int) -> None:
     for number in (1, 2, LAST):
         cut = [*LINES[:number], LINES[number][: kept if kept < 0 else min(kept, len(LINES[number]) - 1)]]
         assert expect(cut) == ("tail/torn", number)
-        assert prove(cut).report.verdict is Verdict.INCOMPLETE
+        assert prove(cut).report.verdict is LogVerdict.INCOMPLETE
 
 
 def test_cut_inside_the_genesis() -> None:

@@ -11,7 +11,7 @@ from rtshcua.mavlink.parameters import bits_of
 from rtshcua.onboard.enforcement.executor import FORGED, LATE, NOT_DOWN, USED
 from rtshcua.onboard.enforcement.frames import NOT_DOWN as FRAME_NOT_DOWN
 from rtshcua.onboard.enforcement.frames import NOT_LISTED, OURS
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.enforcement.preparation import MALFORMED, NOT_AS_BEFORE, NOT_CONFIGURED, VALID_US, Owed
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode, open_preparation, seal
@@ -41,7 +41,8 @@ def prepares(settings: dict[str, float], owed: dict[str, Owed] | None = None) ->
     """A bundle in force, before an ArduCopter that stands on the ground."""
     configured = {name: bits(value) for name, value in settings.items()}
     of = load(
-        sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY, flight=FLIGHT,
+        sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE, session_key=SESSION_KEY,
+        flight=FLIGHT,
         peer_is_own_simulator=False, settings=configured, owed=owed or {},
     )  # fmt: skip
     assert isinstance(of, Loaded)

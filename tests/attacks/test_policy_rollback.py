@@ -7,10 +7,10 @@ from msgspec.structs import replace
 from reference.flat_case import MISSION, POLICY
 from reference.world import START, VEHICLE, loaded
 from rtshcua.adapters.store.replay import FileReplayStore
-from rtshcua.onboard.ports import Opening
+from rtshcua.onboard.ports import MissionOpening
 
 
-def opens(store: FileReplayStore, version: int) -> Opening:
+def opens(store: FileReplayStore, version: int) -> MissionOpening:
     of = loaded(replace(POLICY, version=version), replace(MISSION, policy_version=version))
     policy = of.bundle.policy
     return store.open_once(of.bundle.mission_digest, of.expires_us, START.utc_us, policy.name, policy.version)
@@ -18,7 +18,7 @@ def opens(store: FileReplayStore, version: int) -> Opening:
 
 def test_an_older_policy_does_not_come_back(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, VEHICLE)
-    assert opens(store, 7) is Opening.OPENED
-    assert opens(store, 6) is Opening.OLD_POLICY
-    assert opens(store, 8) is Opening.OPENED
-    assert opens(store, 7) is Opening.REPLAYED
+    assert opens(store, 7) is MissionOpening.OPENED
+    assert opens(store, 6) is MissionOpening.OLD_POLICY
+    assert opens(store, 8) is MissionOpening.OPENED
+    assert opens(store, 7) is MissionOpening.REPLAYED

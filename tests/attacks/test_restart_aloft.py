@@ -6,7 +6,7 @@ from msgspec.structs import replace
 from reference.documents import low, recall
 from reference.flat_case import S
 from reference.world import ROOT, START, FakeVehicle, Run, assert_audited, renewed
-from rtshcua.onboard.ports import AirState, Answering, Ending, Event, EvidenceFailed, Interrupted, Presented, Ready
+from rtshcua.onboard.ports import AirState, Ending, Event, EvidenceFailed, Interrupted, Presented, Ready, VehicleAnswers
 from rtshcua.onboard.runtime.limits import Limits
 
 OF = low()
@@ -49,10 +49,10 @@ def test_one_that_never_counts_as_ready_comes_down_too(known: bool) -> None:
 def test_one_that_answers_nothing_is_not_told_what_to_do_before_it_does() -> None:
     """What brings it home is chosen when it arrives; chosen before, on what was known then, it lands it on the spot."""
     run = back()
-    run.tick(AirState(0, True, True), Answering(0, answers=False))
+    run.tick(AirState(0, True, True), VehicleAnswers(0, answers=False))
     run.until(lambda run: run.clock.now().monotonic_us > START.monotonic_us + Limits().ready_us + 10 * S, 140)
     assert (run.flown, run.ending) == ([], None)
-    run.tick(Answering(0, answers=True))
+    run.tick(VehicleAnswers(0, answers=True))
     run.tick()
     assert run.flown == [], "it is not ready yet"
     run.tick(Ready(0))
@@ -63,7 +63,7 @@ def test_one_that_answers_nothing_is_not_told_what_to_do_before_it_does() -> Non
 
 def test_one_that_never_answers_is_given_up_when_it_cannot_fly_any_more() -> None:
     run = back()
-    run.tick(AirState(0, True, True), Answering(0, answers=False))
+    run.tick(AirState(0, True, True), VehicleAnswers(0, answers=False))
     flies_us = OF.bundle.policy.vehicle.endurance_us
     run.until_over((flies_us + Limits().silent_us) // S + 1)
     assert (run.flown, run.ending) == ([], Ending.LINK_LOST)

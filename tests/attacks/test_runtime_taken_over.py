@@ -23,13 +23,13 @@ from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.parameters import bits_of
-from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, SigningState
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedGate
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Command
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.simulation.world import Simulation
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
 
@@ -51,7 +51,7 @@ class Vehicle(NamedTuple):
         parameters = () if self.sign_cfg is None else (("MAV_SIGN_CFG", self.sign_cfg),)
         key = None if self.flavour == "px4" and self.release < (1, 17) else KEY
         return Simulation(SimulationConfig(
-            flavour=Kind(self.flavour), release=self.release, usb=self.usb, signing_key=key, utc_us=utc_us,
+            flavour=AutopilotKind(self.flavour), release=self.release, usb=self.usb, signing_key=key, utc_us=utc_us,
             parameters=parameters,
         ))  # fmt: skip
 
@@ -122,7 +122,7 @@ class TakenOver:
         self.simulation = vehicle.simulated(self.utc_us)
         self.caller = Caller(self.process.call, signs=True)
         made = load(
-            sealed(), root=ROOT, vehicle=VEHICLE, now=self.now, mode=Mode.PROCESS, session_key=bytes(32),
+            sealed(), root=ROOT, vehicle=VEHICLE, now=self.now, mode=EnforcementMode.PROCESS, session_key=bytes(32),
             flight=bytes(16), peer_is_own_simulator=False, settings={self.name: bits}, caller=self.caller,
         )  # fmt: skip
         assert isinstance(made, Loaded), made
@@ -169,7 +169,7 @@ class TakenOver:
 
     def attack(self, messages: list[Any]) -> list[bytes]:
         """Whatever the runtime can make of these: its frames, and others that it was given a signature for."""
-        forger = SignedLink(b"x" * 32, State(0, {}), self.utc_us + 90 * S, 0)
+        forger = SignedLink(b"x" * 32, SigningState(0, {}), self.utc_us + 90 * S, 0)
         passed = []
         for message in messages:
             self.codec.seq = 0
@@ -215,7 +215,7 @@ def test_nothing_that_no_permit_covers_is_obeyed(taken_over: TakenOver) -> None:
     assert taken_over.attack(hostile()) == []
     taken_over.wait(2 * S)
     assert taken_over.state() == before
-    key = SignedLink(KEY, State(0, {}), taken_over.utc_us + 300 * S, 0)
+    key = SignedLink(KEY, SigningState(0, {}), taken_over.utc_us + 300 * S, 0)
     for message in (long(176, 1, 4, 0), long(400, 1, 0)):
         taken_over.put(key.sign(taken_over.codec.pack(message), taken_over.simulation.now_us))
     assert taken_over.state() != before, "who has the key is obeyed: the vehicle would have done so"

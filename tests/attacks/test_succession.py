@@ -32,7 +32,7 @@ from rtshcua.front.cli.app import main
 from rtshcua.library import root as library
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, EnforcementMode, Loaded, load
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
 from virtual.policy import POLICY
@@ -62,7 +62,8 @@ def test_what_a_revoked_key_signs_is_refused_in_flight(document: Callable[..., b
 @pytest.mark.parametrize("key", [POLICY_KEY, MISSION_KEY])
 def test_a_bundle_of_a_revoked_key_is_not_loaded(key: SigningKey) -> None:
     found = load(
-        sealed_again(low()), root=revoking(key), vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, flight=bytes(16),
+        sealed_again(low()), root=revoking(key), vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE,
+        flight=bytes(16),
         session_key=bytes(SESSION_KEY_BYTES), peer_is_own_simulator=True,
     )  # fmt: skip
     assert isinstance(found, Refusal)
@@ -101,7 +102,8 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 def order(**changed: object) -> launch.Launch:
     usual = launch.Launch(
-        bundle=Path("old.bundle"), link=None, simulator=(), mode=Mode.SOFTWARE, speed=1, vehicle=None, roots=(),
+        bundle=Path("old.bundle"), link=None, simulator=(), mode=EnforcementMode.SOFTWARE, speed=1, vehicle=None,
+        roots=(),
         log_key=None, passphrase_file=None, data=data_folder(), state=state_folder(), runs=Path("runs"), style="json",
     )  # fmt: skip
     return altered(usual, **changed)  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import launch
 from rtshcua.front.cli.app import main
 from rtshcua.library import root as library
-from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.wire.keys import Duty
 
 PROPOSAL, POLICY = library() / "missions" / "proposal.json", library() / "policies" / "bridge_inspection.rts"
@@ -47,7 +47,8 @@ def hand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
     clock, base = SystemClock(), Path("base.bundle")
     trusted = trust((), data_folder(), state_folder(), "quad-07", clock.now().utc_us)
     order = launch.Launch(
-        bundle=base, link=None, simulator=(), mode=Mode.SOFTWARE, speed=1, vehicle=None, roots=(), log_key=None,
+        bundle=base, link=None, simulator=(), mode=EnforcementMode.SOFTWARE, speed=1, vehicle=None, roots=(),
+        log_key=None,
         passphrase_file=None, data=data_folder(), state=state_folder(), runs=Path("runs"), style="json", wait_s=60,
     )  # fmt: skip
     waits = launch._load(order, base.read_bytes(), trusted.root, clock.now(), secrets.token_bytes(16))

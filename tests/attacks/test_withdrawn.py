@@ -31,7 +31,7 @@ from rtshcua.ground.audit.sent import Nature, nature
 from rtshcua.ground.audit.sent import read as read_frame
 from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.onboard.enforcement.isolated import AHEAD, WITHDRAW
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire.permit import SIZE
 from rtshcua.wire.request import CONTINGENCY_LINK
@@ -131,8 +131,8 @@ def where(lines: Lines, event: str) -> list[int]:
     return [number for number, line in enumerate(lines) if event in (read(line).get("event"), read(line)["type"])]
 
 
-@pytest.mark.parametrize("mode", [Mode.SOFTWARE, Mode.PROCESS])
-def test_the_log_of_a_flight_whose_takeoff_was_late_is_sound(mode: Mode) -> None:
+@pytest.mark.parametrize("mode", [EnforcementMode.SOFTWARE, EnforcementMode.PROCESS])
+def test_the_log_of_a_flight_whose_takeoff_was_late_is_sound(mode: EnforcementMode) -> None:
     flown: Any = late(lambda: flight(mode=mode)).fly()
     assert flown.ending is Ending.COMPLETED
     assert flown.dispatched() == ["takeoff", "takeoff", "return_home"]

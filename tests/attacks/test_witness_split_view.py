@@ -7,7 +7,7 @@ import pytest
 
 from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Judge, Log
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors
 from rtshcua.evidence.witnessing.witness import CONFLICT, INCONSISTENT, Declined
 
 
@@ -24,7 +24,7 @@ def anchored(log: Log, witness: Judge, known: int | None = None) -> str:
     return found
 
 
-def audit(log: Log, anchors: list[str], threshold: int = 2) -> Anchored | Flaw:
+def audit(log: Log, anchors: list[str], threshold: int = 2) -> AnchoredExtent | Flaw:
     held = Anchors(ORIGIN, PUBLIC[:2], threshold)
     for note in log.notes:
         if (flaw := held.checkpoint(note)) is not None:
@@ -43,7 +43,7 @@ def slug(log: Log, anchors: list[str], threshold: int = 2) -> str:
 
 def records(log: Log, anchors: list[str], threshold: int = 2) -> int:
     found = audit(log, anchors, threshold)
-    assert isinstance(found, Anchored), found
+    assert isinstance(found, AnchoredExtent), found
     return found.records
 
 
@@ -135,7 +135,7 @@ def test_a_cosignature_moved_to_another_checkpoint(futures: tuple[Log, Log]) -> 
     cosignature = mark.removeprefix(flown.notes[-1])
     for log, note in ((told, told.notes[-1]), (flown, flown.notes[1])):
         found = audit(log, [note + cosignature])
-        assert isinstance(found, Anchored)
+        assert isinstance(found, AnchoredExtent)
         assert (found.records, found.witnessed, found.rejected) == (0, (), 1)
 
 

@@ -12,9 +12,9 @@ from reference.witnessed import LOG_KEY, ORIGIN, PUBLIC, Judge, Log
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.note import Checkpoint, parse, sign, split
 from rtshcua.evidence.verify import verify
-from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors
 from rtshcua.evidence.witnessing.submission import Submission, survey
-from rtshcua.evidence.witnessing.witness import CONFLICT, FORBIDDEN, INCONSISTENT, Declined, Request, judge
+from rtshcua.evidence.witnessing.witness import CONFLICT, FORBIDDEN, INCONSISTENT, CosignRequest, Declined, judge
 from rtshcua.wire.keys import Duty
 
 
@@ -102,7 +102,7 @@ def test_a_genesis_that_follows_something() -> None:
     genesis = parse(split(Log().notes[0])[0])
     assert isinstance(genesis, Checkpoint)
     note = sign(genesis._replace(after=bytes(32)), LOG_KEY.public, lambda text: LOG_KEY.sign(text, duty=Duty.LOG))
-    found = judge(Request(0, (), note), None, lambda vehicle: (LOG_KEY.public,))
+    found = judge(CosignRequest(0, (), note), None, lambda vehicle: (LOG_KEY.public,))
     assert isinstance(found, Declined)
     assert found.status == FORBIDDEN
 
@@ -127,7 +127,7 @@ def test_who_names_the_checkpoint_that_was_cosigned_over_another_record() -> Non
     held = Anchors(ORIGIN, PUBLIC[:1], 1)
     assert [held.checkpoint(note) for note in one.notes] == [None]
     assert held.anchor(mark) is None
-    assert not isinstance(held.finish(1), Anchored)
+    assert not isinstance(held.finish(1), AnchoredExtent)
 
 
 @pytest.mark.parametrize("number", [0, 3])

@@ -6,7 +6,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from rtshcua.mavlink.signing import MOST_STREAMS
-from rtshcua.mavlink.signing import State as LinkState
+from rtshcua.mavlink.signing import SigningState as LinkState
 
 LAYOUT, MOST_OPENED, MOST_POLICIES = 0x7274736863756103, 4_094, 256
 #: layout, turn, restarts, floor, and how many missions, policies and streams there are

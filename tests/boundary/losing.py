@@ -14,7 +14,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedGate
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Event
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.flight import claimed
@@ -56,7 +56,7 @@ class Apart:
         )  # fmt: skip
         self._answer: Callable[[bytes], bytes] = held._call
         loaded = load(
-            bundle, root=root, vehicle=policy.vehicle.identity, now=clock.now(), mode=Mode.PROCESS,
+            bundle, root=root, vehicle=policy.vehicle.identity, now=clock.now(), mode=EnforcementMode.PROCESS,
             session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=True,
             caller=Caller(self.call, signs=key is not None),
         )  # fmt: skip
@@ -68,7 +68,7 @@ class Apart:
             steps=mission.invocations,
         )  # fmt: skip
         monkeypatch.setattr(rtshcua.virtual.flight, "load", lambda *_, **__: loaded)
-        self.flight = Flight(bundle, config, vehicle=self.vehicle, mode=Mode.PROCESS)
+        self.flight = Flight(bundle, config, vehicle=self.vehicle, mode=EnforcementMode.PROCESS)
         self.lost_us: int | None = None
 
     def call(self, octets: bytes) -> bytes:

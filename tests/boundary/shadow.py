@@ -24,7 +24,7 @@ from rtshcua.onboard.enforcement.isolated import (
     IsolatedGate,
     IsolatedIssuer,
 )
-from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire.keys import Duty
@@ -292,7 +292,7 @@ class Shadow:
         signed, pin = self.roots[given["root"]]
         caller = begin(self._library, signed, pin, given["vehicle"], given["session_key"], given["now"],
                        given.get("settings", {}), given.get("owed", {}))  # fmt: skip
-        there = loading.load(bundle, **{**given, "mode": Mode.PROCESS, "caller": caller})
+        there = loading.load(bundle, **{**given, "mode": EnforcementMode.PROCESS, "caller": caller})
         flight = given["flight"] if isinstance(there, Refusal) else there.in_force.flight
         here = loading.load(bundle, **{**given, "flight": flight})
         if isinstance(here, Refusal) or isinstance(there, Refusal):

@@ -18,8 +18,8 @@ from rtshcua.codec.frames import Codec
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
-from rtshcua.wire.clock import APART_US, Source, bears_out
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
+from rtshcua.wire.clock import APART_US, ClockSource, bears_out
 from rtshcua.wire.receipt import Receipt
 from rtshcua.wire.receipt import decode as read_receipt
 
@@ -60,7 +60,7 @@ def some_frame(random: Random, number: int) -> bytes:
 
 def test_both_hold_to_the_same_time_of_day(boundary: ctypes.CDLL) -> None:
     boundary.rt_test_clock_asks.restype = boundary.rt_test_bears_out.restype = ctypes.c_bool
-    random, taken = Random(31), Counter[Source]()
+    random, taken = Random(31), Counter[ClockSource]()
     told = (ctypes.c_int64 * 5)()
     for _ in range(1_200):
         now_us, stated = random.randrange(100 * S), random.choice((-1, 0, 1_000))
@@ -93,7 +93,7 @@ def test_both_hold_to_the_same_time_of_day(boundary: ctypes.CDLL) -> None:
             boundary.rt_test_clock_now(at, told)
             assert (here.source, *vars_of(here.now(now_us)), here.number) == tuple(told)
         taken[here.source] += 1
-    assert min(taken[source] for source in list(Source)[:4]) > 20, taken
+    assert min(taken[source] for source in list(ClockSource)[:4]) > 20, taken
 
 
 def vars_of(now: Now) -> tuple[int, int, int]:
@@ -124,10 +124,10 @@ def test_both_decide_and_take_in_by_their_own_clock_alone(boundary: ctypes.CDLL,
     )
     caller.time(settle=True)
     own.settle(moment)
-    there = load(sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=SESSION_KEY,
+    there = load(sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.PROCESS, session_key=SESSION_KEY,
                  flight=bytes(16), peer_is_own_simulator=False, caller=caller)  # fmt: skip
     assert isinstance(there, Loaded)
-    here = load(sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY,
+    here = load(sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE, session_key=SESSION_KEY,
                 flight=there.in_force.flight, peer_is_own_simulator=False)  # fmt: skip
     assert isinstance(here, Loaded)
     assert isinstance(here.boundary, SoftwareBoundary)

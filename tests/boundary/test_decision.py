@@ -30,7 +30,7 @@ from rtshcua.model.flat.contract import QUANTITY, MotionKind, Parameter, SourceK
 from rtshcua.model.flat.limits import DAY, MAX_COMPARED, MAX_GAP, MAX_TOTAL_VERTICES, MAX_VALUE
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy, RuleKind
-from rtshcua.model.flat.situation import Approval
+from rtshcua.model.flat.situation import ConfirmAnswer
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zone
 from rtshcua.wire import bundle, names
 from rtshcua.wire.cbor import CborError
@@ -422,7 +422,7 @@ def test_every_two_answers_at_the_end_of_their_time(native: Native) -> None:
     now = flat.NOW.monotonic_us
     released = now - 30 * S
     answers = [
-        Approval(flat.CONFIRM_RULE, role, granted, now + late, person)
+        ConfirmAnswer(flat.CONFIRM_RULE, role, granted, now + late, person)
         for role, granted, late, person in product((0, 1), (0, 1), (-S, 0, 1), (0, 1))
     ]
     given = [(), *((one,) for one in answers), *product(answers, answers)]

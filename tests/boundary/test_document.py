@@ -37,7 +37,13 @@ from rtshcua.wire.cancellation import open_cancellation
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.recall import open_recall
-from rtshcua.wire.replacement import MAX_REPLACEMENTS, Replacement, fit_replacement, open_replacement, sign_replacement
+from rtshcua.wire.replacement import (
+    MAX_REPLACEMENTS,
+    VerifiedReplacement,
+    fit_replacement,
+    open_replacement,
+    sign_replacement,
+)
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
@@ -91,9 +97,9 @@ class Flight:
         except Untrusted as error:
             found, here = None, error.slug
         assert here == there, (here, there, document.hex())
-        if isinstance(found, tuple) and not isinstance(found, Replacement):
+        if isinstance(found, tuple) and not isinstance(found, VerifiedReplacement):
             assert tuple(out)[1:] == found
-        if isinstance(found, Replacement):
+        if isinstance(found, VerifiedReplacement):
             self._kept.append(document)
             self._replaced += self.bundle.mission.invocations[found.kept :]
             self.bundle = found.over(self.bundle)

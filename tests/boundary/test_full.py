@@ -27,7 +27,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.executor import NOT_COVERED
-from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.permit import LINK_VALID_US, Permit, seal
@@ -55,7 +55,8 @@ def shadow(boundary: ctypes.CDLL) -> Shadow:
 
 def both(shadow: Shadow, policy: Policy = flat.POLICY, mission: Mission = flat.MISSION) -> Loaded:
     loaded = shadow.load(
-        sealed(policy, mission), root=CROWD, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY,
+        sealed(policy, mission), root=CROWD, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE,
+        session_key=SESSION_KEY,
         flight=FLIGHT, peer_is_own_simulator=True,
     )  # fmt: skip
     assert isinstance(loaded, Loaded), loaded

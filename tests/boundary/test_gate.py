@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import unsigned
-from rtshcua.mavlink.signing import EPOCH_US, MINUTE, MOST_AHEAD, SignedLink, State
+from rtshcua.mavlink.signing import EPOCH_US, MINUTE, MOST_AHEAD, SignedLink, SigningState
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import SHIFT, Projection, unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -206,7 +206,7 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
         - random.choice((5, MINUTE + 5, -9))
         for _ in range(random.randrange(4))
     }
-    stored = State(local + random.choice((-5, 0, 900)), streams)
+    stored = SigningState(local + random.choice((-5, 0, 900)), streams)
     here = SignedLink(key, stored, utc_us, now_us)
     words = [part for stream, last in streams.items() for part in (*stream, last)]
     boundary.rt_test_link_begin(
@@ -232,7 +232,7 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
         else:
             ahead = (utc_us + now_us - EPOCH_US) // 10 + random.choice((0, -MINUTE - 9, 7, 200_000))
             of = random.choice((key, key, key, other_key))
-            signed = SignedLink(of, State(ahead, {}), EPOCH_US, 0, link=random.randrange(2)).sign(frame, 0)
+            signed = SignedLink(of, SigningState(ahead, {}), EPOCH_US, 0, link=random.randrange(2)).sign(frame, 0)
             signed = random.choice((signed, signed, signed, frame, *seen[-3:]))
             seen.append(signed)
             if random.random() < 0.1:
@@ -251,7 +251,7 @@ def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
 
 @pytest.mark.slow
 def test_both_refuse_a_flood_of_frames_to_sign_ahead_at_the_same_frame(boundary: ctypes.CDLL) -> None:
-    here = SignedLink(bytes(32), State(0, {}), EPOCH_US, 0)
+    here = SignedLink(bytes(32), SigningState(0, {}), EPOCH_US, 0)
     boundary.rt_test_link_begin(
         bytes(32), ctypes.c_int64(0), (ctypes.c_int64 * 1)(), 0, ctypes.c_int64(EPOCH_US), ctypes.c_int64(0), 0
     )

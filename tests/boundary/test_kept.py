@@ -15,7 +15,7 @@ from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State, timestamp_in, timestamp_of
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, SigningState, timestamp_in, timestamp_of
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedGate
 
@@ -58,7 +58,7 @@ def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_beli
     key = tmp_path / "link.key"
     key.write_bytes(bytes(range(32)))
     key.chmod(0o600)
-    vehicle = SignedLink(key.read_bytes(), State(timestamp_of(time.time_ns() // 1_000), {}), EPOCH_US, 0)
+    vehicle = SignedLink(key.read_bytes(), SigningState(timestamp_of(time.time_ns() // 1_000), {}), EPOCH_US, 0)
     beat = Codec(1, 1).pack(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3))
 
     def begin() -> tuple[BoundaryProcess, IsolatedGate]:

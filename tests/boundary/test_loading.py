@@ -10,7 +10,7 @@ from reference.world import FLIGHT, ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE,
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.executor import FORGED
 from rtshcua.onboard.enforcement.isolated import Caller
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Command
 
 
@@ -21,7 +21,8 @@ def held(boundary: ctypes.CDLL) -> Caller:
 
 def into(caller: Caller, bundle: bytes) -> Loaded:
     made = load(
-        bundle, root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS, session_key=SESSION_KEY, flight=FLIGHT,
+        bundle, root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.PROCESS, session_key=SESSION_KEY,
+        flight=FLIGHT,
         peer_is_own_simulator=False, caller=caller,
     )  # fmt: skip
     assert isinstance(made, Loaded), made

@@ -9,7 +9,7 @@ import pytest
 
 from boundary.losing import KEY, Apart, S, to_and_fro
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.mavlink.framing import message_id
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT
 from rtshcua.onboard.enforcement.isolated import DISPATCH, ENFORCE, STATEMENT
@@ -73,7 +73,7 @@ def came_down(flown: Any) -> None:
     assert not truth.armed
     report = flown.audit().report
     assert report.failure is None
-    assert report.verdict is Verdict.INCOMPLETE
+    assert report.verdict is LogVerdict.INCOMPLETE
     assert report.shortfall is not None
     assert report.shortfall.slug == "boundary/lost"
 
@@ -190,7 +190,7 @@ def test_it_is_signed_anew_all_the_way_and_told_of_nothing(apart: Make) -> None:
     flown = apart("px4", legs=8).fly(lambda _: False)
     assert flown.ending is Ending.COMPLETED
     report = flown.audit().report
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert [claim.slug for claim in report.unproven if "signed ahead" in claim.text] == ["boundary"]
     noted = [record["detail"] for record in flown.records if record.get("event") == "noted"]
     assert not [text for text in noted if "ahead" in text]

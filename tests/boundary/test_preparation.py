@@ -15,7 +15,7 @@ from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.onboard.enforcement.frames import OURS
-from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.onboard.enforcement.preparation import MOST_PERMITS, SETTABLE, TOO_MANY, Owed
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire.boundary_chain import START as BEFORE
@@ -51,7 +51,8 @@ def both(boundary: ctypes.CDLL, settings: dict[str, int], owed: dict[str, Owed])
     shadow = Shadow(boundary)
     shadow.know(ROOT, ROOT.sign(ROOT_KEY), ROOT_KEY.verification().public)
     made = shadow.load(
-        sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY, flight=FLIGHT,
+        sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE, session_key=SESSION_KEY,
+        flight=FLIGHT,
         peer_is_own_simulator=False, settings=settings, owed=owed,
     )  # fmt: skip
     assert isinstance(made, Loaded)

@@ -12,7 +12,7 @@ from reference import world
 from reference.documents import approval, hand, low_mission, recall
 from reference.world import ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, sealed_again
 from rtshcua.model.flat.mission import Mission
-from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.onboard.ports import Ending
 from rtshcua.simulation.fault_syntax import parse_fault
 from rtshcua.wire.trust import TrustRoot, open_root
@@ -45,7 +45,8 @@ def shadow(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
 
     def both(mission: Mission) -> Loaded:
         loaded = made.load(
-            sealed_again(world.loaded(mission=mission)), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE,
+            sealed_again(world.loaded(mission=mission)), root=ROOT, vehicle=VEHICLE, now=START,
+            mode=EnforcementMode.SOFTWARE,
             session_key=SESSION_KEY, flight=bytes(16), peer_is_own_simulator=True,
         )  # fmt: skip
         assert isinstance(loaded, Loaded), loaded

@@ -16,7 +16,7 @@ from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.model.decision import Decision
 from rtshcua.onboard.enforcement.frames import OURS
 from rtshcua.onboard.enforcement.isolated import DIGEST, DISPATCH, PREPARE, STAND_IN, WITHDRAW
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.boundary_chain import Tag, following, refused, unprepared
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK
@@ -38,7 +38,7 @@ def both(boundary: ctypes.CDLL) -> Callable[[], Loaded]:
 
     def made() -> Loaded:
         loaded = shadow.load(
-            sealed_again(world.loaded()), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE,
+            sealed_again(world.loaded()), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE,
             session_key=SESSION_KEY, flight=bytes(16), peer_is_own_simulator=True,
         )  # fmt: skip
         assert isinstance(loaded, Loaded), loaded
@@ -171,7 +171,7 @@ def test_a_permit_at_another_time_than_the_boundarys_is_told_as_refused(boundary
         own_us=lambda: clock[0],
     )  # fmt: skip
     of = load(
-        sealed_again(world.loaded()), root=ROOT, vehicle=VEHICLE, now=START, mode=Mode.PROCESS,
+        sealed_again(world.loaded()), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.PROCESS,
         session_key=SESSION_KEY, flight=bytes(16), peer_is_own_simulator=True, caller=caller,
     )  # fmt: skip
     assert isinstance(of, Loaded), of

@@ -42,12 +42,12 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.mavlink.signing import EPOCH_US, MOST_AHEAD, UNIT_US, SignedLink, timestamp_in
-from rtshcua.mavlink.signing import State as LinkState
+from rtshcua.mavlink.signing import SigningState as LinkState
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.ahead import MOST
-from rtshcua.onboard.enforcement.executor import Ahead
+from rtshcua.onboard.enforcement.executor import SignedAhead
 from rtshcua.onboard.enforcement.isolated import (
     AHEAD,
     DISPATCH,
@@ -61,9 +61,9 @@ from rtshcua.onboard.enforcement.isolated import (
     STAND_IN,
     Caller,
 )
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed, PreparationIssuer
-from rtshcua.onboard.ports import BoundaryKey, Command, Opening
+from rtshcua.onboard.ports import BoundaryKey, Command, MissionOpening
 from rtshcua.wire.boundary_chain import START as BEFORE
 from rtshcua.wire.document import DocumentError
 from rtshcua.wire.keys import Duty
@@ -259,13 +259,13 @@ class Together:
         }  # fmt: skip
         flight = self.caller.flight()
         assert isinstance(flight, bytes)
-        here = load(bundle, mode=Mode.SOFTWARE, flight=flight, owed=self._owed, **given)
+        here = load(bundle, mode=EnforcementMode.SOFTWARE, flight=flight, owed=self._owed, **given)
         refused = here.slug if isinstance(here, Refusal) else self._open(here)
         if refused is not None:
             same("load", refused, slug_of(self.caller.load(bundle, now)))
             self.counts["bundles refused"] += 1
             return
-        there = load(bundle, mode=Mode.PROCESS, flight=bytes(16), caller=self.caller, **given)
+        there = load(bundle, mode=EnforcementMode.PROCESS, flight=bytes(16), caller=self.caller, **given)
         assert isinstance(here, Loaded)
         assert isinstance(there, Loaded), there
         same("the flight", flight, there.in_force.flight)
@@ -308,7 +308,7 @@ class Together:
             return None
         earliest_us = self.now.utc_us - self.now.utc_error_us
         opening = self._replay.open_once(self._digest, here.expires_us, earliest_us, policy.name, policy.version)
-        return None if opening is Opening.OPENED else str(opening)
+        return None if opening is MissionOpening.OPENED else str(opening)
 
     def _go_on(self, here: Loaded) -> None:
         """What goes on from the bundle before: the numbers of permits, the link, and preparations; but no permit."""
@@ -505,10 +505,10 @@ class Together:
         return random.sample(known, random.randrange(3))
 
     def _sign_ahead(self, one: bytes, other: bytes, kind: int, link: int, frames: list[bytes]) -> bool:
-        here: Ahead | Refusal = self.here.executor.ahead(one, kind, link, frames, self.us)
+        here: SignedAhead | Refusal = self.here.executor.ahead(one, kind, link, frames, self.us)
         same(f"ahead {kind} {link}", here, self.there.executor.ahead(other, kind, link, frames, self.us))
         self.counts[f"ahead {here.slug}" if isinstance(here, Refusal) else "ahead"] += 1
-        return isinstance(here, Ahead)
+        return isinstance(here, SignedAhead)
 
     def _flood(self, one: bytes, other: bytes, kind: int, link: int, frames: list[bytes]) -> None:
         """More frames than are signed ahead of one moment."""

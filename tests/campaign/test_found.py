@@ -8,7 +8,7 @@ from campaign.flying import SKILLS, flown
 from campaign.test_wrong import at, of, slugs
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.scenario import AtTime, Incident
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
@@ -37,7 +37,7 @@ def test_what_stays_unknown_after_a_silence_is_waited_for_and_supervision_ends_a
     for_good = flown(of("px4", at(9.5, faults.Freeze(0)), at(13.2, faults.Stall(0, 5_300_000, 638))))
     assert {"fresh", "violated"} <= events(for_good)
     assert slugs(for_good) == set()
-    silence = at(50.1, faults.LinkSilence(0, 1_500_000, Way.BOTH, held=True))
+    silence = at(50.1, faults.LinkSilence(0, 1_500_000, Direction.BOTH, held=True))
     for_a_while = flown(of("ardupilot", silence, at(50, faults.Freeze(0, 7 * S))))
     assert "fresh" in events(for_a_while)
     assert slugs(for_a_while) == set()
@@ -86,8 +86,8 @@ FLIES = {
 PAUSE, GOTO, HOME, TAKEOFF = (
     faults.PilotPause(0),
     faults.PilotGoto(0, -20_000, 20_000, 10_000),
-    faults.PilotMode(0, Mode.RETURN),
-    faults.PilotMode(0, Mode.TAKEOFF),
+    faults.PilotMode(0, FlightMode.RETURN),
+    faults.PilotMode(0, FlightMode.TAKEOFF),
 )
 #: of which so many are flown at each `make test`
 _OFTEN = {
@@ -130,14 +130,14 @@ def test_a_takeoff_that_a_pilot_chose_in_the_air_shows_once_it_is_over(
 ) -> None:
     """It is in Hold again, 2.5 m above where ours had been."""
     was = flown(of("px4", at(killed_s, faults.RuntimeKilled(0, dead_s * S)), at(taken_s, TAKEOFF)))
-    assert next(each.mode for each in was.samples if each.at_us >= (killed_s + dead_s) * S) is Mode.LOITER
+    assert next(each.mode for each in was.samples if each.at_us >= (killed_s + dead_s) * S) is FlightMode.LOITER
     assert (was.ending, slugs(was), was.samples[-1].taken_over_by) == ("stood-down", set(), "pilot")
 
 
 @pytest.mark.slow
 def test_a_pause_in_a_takeoff_shows_as_little_where_a_pilot_also_chose_the_mode_that_it_was_in() -> None:
     """ArduCopter stays in its mode then, and pauses: the judge took the mode for the takeover."""
-    was = flown(of("ardupilot", at(7, faults.PilotMode(0, Mode.GUIDED)), at(7, PAUSE)))
+    was = flown(of("ardupilot", at(7, faults.PilotMode(0, FlightMode.GUIDED)), at(7, PAUSE)))
     assert (was.samples[-1].taken_over_by, slugs(was)) == ("pilot", set())
     assert {each.cause for each in judge(was).exceptions} == {"unseen"}
 
@@ -216,12 +216,12 @@ def test_a_target_that_is_told_late_is_waited_for_before_a_restart_takes_the_fli
 
 @pytest.mark.parametrize(
     "taken",
-    [at(468, faults.BatteryLevel(0, 900)), at(513.5, faults.PilotMode(0, Mode.LAND))],
+    [at(468, faults.BatteryLevel(0, 900)), at(513.5, faults.PilotMode(0, FlightMode.LAND))],
     ids=["failsafe", "pilot"],
 )
 @pytest.mark.soak  # each flies for nine minutes
 def test_a_landing_is_not_sent_again_to_a_vehicle_that_was_landed_by_others(taken: Incident) -> None:
     """The link to it was dead, so ours had not arrived; its mode was the one that ours asks for."""
-    was = flown(of("ardupilot", at(35, faults.LinkSilence(0, None, Way.UP)), taken))
+    was = flown(of("ardupilot", at(35, faults.LinkSilence(0, None, Direction.UP)), taken))
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
     assert judge(was).exceptions == ()

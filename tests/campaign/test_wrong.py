@@ -7,7 +7,7 @@ from campaign.wrong import BY_NAME, WRONG
 from rtshcua.campaign.drawing import Tally
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode, Way
+from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.scenario import AtTime, Incident, Scenario, Start
 from rtshcua.virtual.flown import ScenarioFlown
 from rtshcua.virtual.judge import judge
@@ -34,14 +34,14 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
     "grace-through-silence": (
         of("px4", at(1.6, faults.MessageSilence(0, "GPS_RAW_INT", 8 * S)), at(3.8, faults.LinkSilence(0, 3_500_000))),
         "needless"),
-    "mode-taken-ignored": (of("px4", at(12, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
+    "mode-taken-ignored": (of("px4", at(12, faults.PilotMode(0, FlightMode.POSITION))), "motion-after-takeover"),
     "target-taken-ignored": (of("px4", at(12, faults.PilotPause(0))), "motion-after-takeover"),
     "first-link-skipped": (of("px4", at(12, faults.GpsLoss(0, 4 * S))), "chain"),
     "sent-before-recorded": (of("px4", at(12, faults.DiskStall(0, 10 * S))), "unrecorded"),
     "fallback-held-for-record": (of("px4", at(12, faults.DiskFull(0))), "not-ended"),
     "dispatch-unwritten": (of("px4", at(12, faults.Recall(0))), "unlogged-effect"),
     "late-frames-leave": (of("px4", at(18, faults.MessageSilence(0, "HEARTBEAT", 3 * S))), "late"),
-    "aged-from-arrival": (of("px4", at(2, faults.LinkDelay(0, 2 * S, None, Way.DOWN))), "untrue"),
+    "aged-from-arrival": (of("px4", at(2, faults.LinkDelay(0, 2 * S, None, Direction.DOWN))), "untrue"),
     "stale-is-fresh": (of("px4", at(8, faults.MessageSilence(0, "BATTERY_STATUS"))), "derive"),
     "unknown-is-true": (of("px4", at(7, faults.MessageSilence(0, "GPS_RAW_INT"))), "derive"),
     "degrade-not-watched": (of("px4", at(12, faults.BatteryLevel(0, 4_500))), "not-watched"),
@@ -50,18 +50,18 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
     "approval-taken-again": (of("px4", at(2, faults.Approval(0, "supervisor", 2)), battery=8_000), "derive"),
     "recall-ignored": (of("px4", at(12, faults.Recall(0))), "chain"),
     "stop-unobserved": (
-        of("px4", at(12, faults.Recall(0)), at(12, faults.LinkSilence(0, 800_000, Way.UP))), "no-stop"),
+        of("px4", at(12, faults.Recall(0)), at(12, faults.LinkSilence(0, 800_000, Direction.UP))), "no-stop"),
     "last-link-once": (
         of("px4", at(12.4, faults.MessageSilence(0, "HEARTBEAT", 25 * S)), at(12.5, faults.Recall(0))), "chain"),
     "restart-ends-in-air": (of("px4", at(12, faults.RuntimeKilled(0, 2 * S))), "not-ended"),
     "restart-over-pilot": (
-        of("px4", at(12, faults.RuntimeKilled(0, 3 * S)), at(13, faults.PilotMode(0, Mode.POSITION))),
+        of("px4", at(12, faults.RuntimeKilled(0, 3 * S)), at(13, faults.PilotMode(0, FlightMode.POSITION))),
         "motion-after-takeover"),
     "full-disk-unnoticed": (of("px4", at(5, faults.DiskFull(0, 20 * S))), "unrecorded"),
     "airspace-unchecked": (of("px4", at(15, faults.GpsGlitch(0, 100_000, 0, 20 * S))), "derive"),
     "clock-moves-times": (of("px4", at(12, faults.ClockStep(0, 600 * S))), "needless"),
     "landing-by-word": (of("px4", at(12, faults.MessageSilence(0, "GPS_RAW_INT"))), "untrue"),
-    "mode-not-asked": (of("px4", at(26.4, faults.PilotMode(0, Mode.POSITION))), "motion-after-takeover"),
+    "mode-not-asked": (of("px4", at(26.4, faults.PilotMode(0, FlightMode.POSITION))), "motion-after-takeover"),
     "denied-trusts-step": (of("px4", battery=8_000), "chain"),
     "crash-ignored": (of("ardupilot", at(30, faults.Kill(0))), "went-on"),
     "judged-before-fresh": (of("px4", at(12, faults.LinkSilence(0, 4 * S))), "chain"),

@@ -305,7 +305,7 @@ WRONG: Final = (
     Wrong("stale-is-fresh", "A value does not become unknown when it is stale.",
           ((situation, "_situation", _stale_is_fresh),), (b"unknown", b'"defer"', *_FALLS)),
     Wrong("unknown-is-true", "A condition whose truth is not known passes.",
-          ((decide.Tally, "fails", _unknown_is_true),), (b'"defer"', b"/unknown")),
+          ((decide.ConditionTally, "fails", _unknown_is_true),), (b'"defer"', b"/unknown")),
     Wrong("degrade-not-watched", "A degrade rule counts when a step is admitted, and no more while it runs.",
           ((supervisor, "watch", _without("degrade")),), (b'"violated"',)),
     Wrong("assume-not-watched", "What a step assumes counts when it is admitted, and no more while it runs.",

@@ -5,7 +5,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import ANY
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request, encode
@@ -41,7 +41,7 @@ def opened(data: bytes, vehicle: str, utc_us: int) -> Loaded | Refusal:
         root=ROOT,
         vehicle=vehicle,
         now=Now(500 * S, utc_us, 20_000),
-        mode=Mode.SOFTWARE,
+        mode=EnforcementMode.SOFTWARE,
         session_key=world.SESSION_KEY,
         flight=world.FLIGHT,
         peer_is_own_simulator=False,

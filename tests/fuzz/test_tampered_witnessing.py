@@ -9,9 +9,9 @@ from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Judge, Log
 from rtshcua.codec.frames import Codec
 from rtshcua.codec.tunnel import MOST_OF_ONE, Assembler, Whole, messages
 from rtshcua.evidence.note import split
-from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors, notes
 from rtshcua.evidence.witnessing.submission import anchor
-from rtshcua.evidence.witnessing.witness import Declined, Request, Seen, decode, decode_answer
+from rtshcua.evidence.witnessing.witness import CosignRequest, Declined, LastCosigned, decode, decode_answer
 
 
 def logs() -> tuple[Log, Log]:
@@ -32,7 +32,7 @@ LOG, FORK = logs()
 TEXTS = {split(note)[0] for note in LOG.notes}
 
 
-def begun() -> Seen:
+def begun() -> LastCosigned:
     witness = Judge()
     request = LOG.submission.request(None, 14)
     assert request is not None
@@ -105,7 +105,7 @@ def tamper_anchor(of: Random) -> str:
         if flaw is not None:
             return flaw.slug
     found = held.finish(len(LOG.lines))
-    if not isinstance(found, Anchored):
+    if not isinstance(found, AnchoredExtent):
         return found.slug
     if WITNESSES[1].kid.hex() not in text:
         assert found.records == 0, text
@@ -167,4 +167,4 @@ def test_a_million_that_were_tampered_with(seed: int) -> None:
 
 
 def test_requests_decode_as_they_were() -> None:
-    assert all(isinstance(request := decode(each), Request) and request.encode() == each for each in REQUESTS)
+    assert all(isinstance(request := decode(each), CosignRequest) and request.encode() == each for each in REQUESTS)

@@ -6,7 +6,7 @@ from random import Random
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.framing import FLAG_SIGNED, checksum, with_flags
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 
 MARKER = 0xFD
 #: what he would most like to be believed
@@ -26,7 +26,7 @@ class Attacker:
         self._overheard = list(overheard)
         self._chance = Random(seed)
         self._impersonate = impersonate
-        self._wrong = SignedLink(bytes(range(32)), State(0, {}), 1_767_225_600_000_000, 0)
+        self._wrong = SignedLink(bytes(range(32)), SigningState(0, {}), 1_767_225_600_000_000, 0)
         self._ways = [self._garbage, self._markers, self._cut, self._spoofed, self._spoofed, self._several]
         if impersonate:
             self._ways += [self._replay, self._turned, self._unsigned, self._badly_signed, self._as_if_signed]

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.codec.frames import Codec
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command, Event
@@ -16,7 +16,7 @@ from virtual.policy import POLICY
 KEY = bytes(range(1, 33))
 UTC_US = 1_767_225_600_000_000
 AUTOPILOT = {"px4": 12, "ardupilot": 3}
-NEW = State(0, {})
+NEW = SigningState(0, {})
 PLAIN = (int, float, str, bytes, type(None))
 COUNTED = ("counts", "_counts", "damaged", "refused", "unknown", "foreign", "_policy")
 #: that another vehicle is heard, before a flight, is for people to know, and believed of nobody: `VehicleLink.crowd`
@@ -26,7 +26,7 @@ TOLD = ("crowd",)
 class Target:
     """`heard` are the frames of the vehicle up to now; `known` is all that the driver may know from frames."""
 
-    def __init__(self, flavour: str, *, keyed: bool, stored: State = NEW, greet: bool = True) -> None:
+    def __init__(self, flavour: str, *, keyed: bool, stored: SigningState = NEW, greet: bool = True) -> None:
         self.link = SignedLink(KEY, stored, UTC_US, 0)
         self.frames = FrameSession()
         if keyed:

@@ -15,7 +15,7 @@ from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.adapters.simulator import Simulator
 from rtshcua.front.cli import doctor as doctor_command
 from rtshcua.front.cli.doctor import _boundary
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from virtual.forked import Forked
 
 COMMAND = [sys.executable, "-m", "rtshcua", "doctor"]
@@ -71,7 +71,7 @@ def test_each_measure_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, 
     def asked(program: str) -> list[tuple[str, MissionVerdict, str]]:
         script.write_text(f"#!{sys.executable}\n{program}\n")
         script.chmod(0o755)
-        return [(each.slug, each.verdict, each.found) for each in _boundary(Mode.PROCESS)]
+        return [(each.slug, each.verdict, each.found) for each in _boundary(EnforcementMode.PROCESS)]
 
     says = "import os, sys; os.write(int(sys.argv[2]), ({}).to_bytes(4, 'little') + bytes(8))"
     every = sum(Measure)
@@ -91,8 +91,10 @@ def test_a_run_that_decides_in_its_own_process_is_judged_as_one(monkeypatch: pyt
     """Its boundary's process is not asked, also where its program was built."""
     for built in (Path("rtshcua-boundary"), None):
         monkeypatch.setattr(doctor_command, "program", lambda built=built: built)
-        ((slug, verdict, text),) = [each[:3] for each in map(msgspec.structs.astuple, _boundary(Mode.SOFTWARE))]
+        ((slug, verdict, text),) = [
+            each[:3] for each in map(msgspec.structs.astuple, _boundary(EnforcementMode.SOFTWARE))
+        ]
         assert (slug, verdict) == ("boundary/process", MissionVerdict.WARN)
         assert "decides in its own process" in text
-    ((_, verdict, _),) = [each[:3] for each in map(msgspec.structs.astuple, _boundary(Mode.NONE))]
+    ((_, verdict, _),) = [each[:3] for each in map(msgspec.structs.astuple, _boundary(EnforcementMode.NONE))]
     assert verdict is MissionVerdict.STOP, "as `run` refuses it"

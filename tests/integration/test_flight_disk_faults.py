@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from reference.faulty_disk import FaultyDisk
 from rtshcua.adapters.clock import StepWatch
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.model.flat.policy import WithoutEvidence
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Command, Ending, Event
@@ -87,7 +87,7 @@ def hangs(sink: DiskSink) -> None:
 
 def verified(flown: Flown) -> None:
     """Its log is whole, its chain without a hole."""
-    assert flown.audit().report.verdict is Verdict.VERIFIED, flown.audit().report.failure
+    assert flown.audit().report.verdict is LogVerdict.VERIFIED, flown.audit().report.failure
 
 
 FAULTS = {**{name: refuses(number) for name, number in REFUSED.items()}, "full within a line": fills}

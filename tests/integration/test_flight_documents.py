@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.app.programs import compile_sources
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.onboard.ports import Ending, Event, Presented
 from rtshcua.wire.approval import ApprovalDocument, sign_approval
@@ -71,7 +71,7 @@ def fly(bundle: bytes, flavour: str, when: str, document: Callable[[Flight], byt
     flown = flight.fly(each)
     assert len(since) == 2, "it was never handed in"
     audit = flown.audit()
-    assert audit.report.verdict is Verdict.VERIFIED, audit.report
+    assert audit.report.verdict is LogVerdict.VERIFIED, audit.report
     return flown
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.simulation.config import OtherBattery, Purpose
 from rtshcua.simulation.surroundings import Wind
 from virtual import case
@@ -64,7 +64,7 @@ def flown(folder: Path, flavour: str, without: str, hover_us: int, *, battery: i
     source = folder / f"{flavour}.rts"
     source.write_text(SOURCE.replace("WITHOUT", without), encoding="utf-8")
     found = Flight(sealed(source), simulated(flavour, battery=battery, hover_us=hover_us, **fields)).fly()
-    assert found.audit().report.verdict is Verdict.VERIFIED, "its audit derives each decision from what is recorded"
+    assert found.audit().report.verdict is LogVerdict.VERIFIED, "its audit derives each decision from what is recorded"
     assert not found.vehicle.simulation.truth().in_air
     return found
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from integration.test_flight_deadlines import MISSION
-from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.ports import Ending
@@ -32,7 +32,7 @@ def lined(bundle: bytes, address: Address, end: FarEnd | None, flavour: str, cap
 def flies_over_serial(bundle: bytes, folder: Path, flavour: str, baud: int) -> LinedVehicle:
     """Every step is admitted and done, and the line is not filled."""
     terminal, capacity = Terminal(folder / "ttyAMA0"), baud // 10
-    vehicle = lined(bundle, Address(Way.SERIAL, str(terminal.path), baud), terminal, flavour, capacity)
+    vehicle = lined(bundle, Address(LinkCarrier.SERIAL, str(terminal.path), baud), terminal, flavour, capacity)
     flown = Flight(bundle, simulated(flavour), vehicle=vehicle).fly()
     vehicle.close()
     assert flown.ending is Ending.COMPLETED
@@ -73,7 +73,7 @@ def test_a_mission_flies_over_tcp() -> None:
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         server.listen()
-        vehicle = lined(BUNDLE, Address(Way.TCP, *server.getsockname()), None, "px4", 100_000)
+        vehicle = lined(BUNDLE, Address(LinkCarrier.TCP, *server.getsockname()), None, "px4", 100_000)
         vehicle.poll(vehicle.clock.monotonic_us, 0)
         vehicle.end = Connection(server.accept()[0])
     assert Flight(BUNDLE, simulated("px4"), vehicle=vehicle).fly().ending is Ending.COMPLETED

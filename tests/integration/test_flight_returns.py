@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode
+from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.scenario import AfterStep
 from rtshcua.onboard.ports import Ending
 from rtshcua.virtual.flown import Sample, ScenarioFlown
@@ -93,14 +93,17 @@ def away(of: ScenarioFlown) -> Callable[[Sample], float]:
     return metres
 
 
-WHY: dict[str, Fault] = {"degraded": faults.BatteryLevel(0, 3_800), "by the pilot": faults.PilotMode(0, Mode.RETURN)}
+WHY: dict[str, Fault] = {
+    "degraded": faults.BatteryLevel(0, 3_800),
+    "by the pilot": faults.PilotMode(0, FlightMode.RETURN),
+}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("why", "flavour"), each_once(WHY, ["px4", "ardupilot"]))
 def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str, why: str) -> None:
     found = flown(scenario(when(AfterStep(2, 29 * case.S, 29 * case.S), WHY[why])), flavour, bundle=bundle)
-    homeward = [each for each in found.samples if each.mode is Mode.RETURN and each.in_air]
+    homeward = [each for each in found.samples if each.mode is FlightMode.RETURN and each.in_air]
     far = away(found)
     begun = homeward[0]
     assert begun.up_mm < 17 * M

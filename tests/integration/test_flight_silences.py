@@ -14,11 +14,11 @@ import pytest
 
 from rtshcua import library
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.evidence.report import Verdict
-from rtshcua.model.faults import LinkReorder, LinkSilence, Way, WindStep
+from rtshcua.evidence.report import LogVerdict
+from rtshcua.model.faults import Direction, LinkReorder, LinkSilence, WindStep
 from rtshcua.onboard.ports import Ending, Event
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 from rtshcua.virtual.vehicle import TICK_US
 from virtual import case
 from virtual.flight import Flight, Flown
@@ -35,7 +35,7 @@ UNDER_WAY, WAITED = 2 * case.S, case.S // 2
 def running(step: int) -> Callable[[Flight], bool]:
     def is_there(flight: Flight) -> bool:
         view = flight.runtime.view(flight.clock.now())
-        return view.stage is Stage.RUNNING and view.step == step
+        return view.stage is RunStage.RUNNING and view.step == step
 
     return is_there
 
@@ -43,13 +43,13 @@ def running(step: int) -> Callable[[Flight], bool]:
 def falling(skill: str) -> Callable[[Flight], bool]:
     def is_there(flight: Flight) -> bool:
         view = flight.runtime.view(flight.clock.now())
-        return view.stage is Stage.FALLING and view.contract == skill
+        return view.stage is RunStage.FALLING and view.contract == skill
 
     return is_there
 
 
 def waiting(flight: Flight) -> bool:
-    return flight.runtime.view(flight.clock.now()).stage is Stage.WAITING
+    return flight.runtime.view(flight.clock.now()).stage is RunStage.WAITING
 
 
 STAGES: dict[str, Callable[[Flight], bool]] = {
@@ -64,7 +64,7 @@ STAGES: dict[str, Callable[[Flight], bool]] = {
 }
 
 
-def fly(flavour: str, stage: str, seconds: float, way: Way) -> Flown:
+def fly(flavour: str, stage: str, seconds: float, way: Direction) -> Flown:
     """The standard mission; what falls back does so for the wind."""
     # heard this often, frames that come in another order are as many apart as they are on a real link
     flight = Flight(equipped("standard"), simulated(flavour, seed=round(seconds * 10)), tick_us=TICK_US)
@@ -91,10 +91,10 @@ def fly(flavour: str, stage: str, seconds: float, way: Way) -> Flown:
     return flown
 
 
-def lands_at_home(flavour: str, stage: str, seconds: float, way: Way) -> None:
+def lands_at_home(flavour: str, stage: str, seconds: float, way: Direction) -> None:
     flown = fly(flavour, stage, seconds, way)
     audit = flown.audit()
-    assert audit.report.verdict is Verdict.VERIFIED, audit.report
+    assert audit.report.verdict is LogVerdict.VERIFIED, audit.report
     told = f"{flown.ending} {flown.dispatched()} {[record['detail'] for record in flown.effects('violated')]}"
     assert not flown.effects("taken-over"), told
     if stage == "waiting":
@@ -104,7 +104,7 @@ def lands_at_home(flavour: str, stage: str, seconds: float, way: Way) -> None:
     truth = flown.vehicle.simulation.truth()
     assert not truth.armed, told
     assert abs(truth.north_mm) + abs(truth.east_mm) < 5_000, told
-    if "link" in stage or (seconds > GIVEN_UP_S + 2 and stage != "return" and way is not Way.UP):
+    if "link" in stage or (seconds > GIVEN_UP_S + 2 and stage != "return" and way is not Direction.UP):
         assert flown.ending is Ending.ABORTED, told
     else:
         assert flown.ending in (Ending.COMPLETED, Ending.ABORTED), told
@@ -116,12 +116,12 @@ def lands_at_home(flavour: str, stage: str, seconds: float, way: Way) -> None:
 @pytest.mark.parametrize(
     ("flavour", "stage", "seconds", "way"),
     [
-        ("px4", "return link", 8.0, Way.UP),
-        ("ardupilot", "survey", 45.0, Way.DOWN),
-        ("px4", "hover link", 5.0, Way.BOTH),
+        ("px4", "return link", 8.0, Direction.UP),
+        ("ardupilot", "survey", 45.0, Direction.DOWN),
+        ("px4", "hover link", 5.0, Direction.BOTH),
     ],
 )
-def test_a_silence_lands_nothing_on_the_spot(flavour: str, stage: str, seconds: float, way: Way) -> None:
+def test_a_silence_lands_nothing_on_the_spot(flavour: str, stage: str, seconds: float, way: Direction) -> None:
     lands_at_home(flavour, stage, seconds, way)
 
 
@@ -145,7 +145,7 @@ def resumed(flavour: str, seconds: float) -> Flown:
         first.fly(each)
     vehicle = first.vehicle
     if seconds:
-        silence = LinkSilence(vehicle.simulation.now_us, round(seconds * case.S), Way.UP)
+        silence = LinkSilence(vehicle.simulation.now_us, round(seconds * case.S), Direction.UP)
         vehicle.simulation.inject(silence)
     vehicle.driver = Driver(first.loaded.bundle.policy, vehicle.frames, fence=False)
     second = Flight(shipped("standard"), simulated(flavour), tick_us=TICK_US, resumed=True, vehicle=vehicle)
@@ -182,8 +182,8 @@ def test_begun_again_in_the_air_it_comes_home_and_lands_nothing_on_the_spot(flav
 )
 def test_a_vehicle_that_never_hears_us_again_is_not_waited_for_without_an_end(flavour: str, stage: str) -> None:
     """It has no failsafe of its own for that: it does what it was told last, until its battery brings it down."""
-    flown = fly(flavour, stage, 1e5, Way.UP)
-    assert flown.audit().report.verdict is Verdict.VERIFIED
+    flown = fly(flavour, stage, 1e5, Direction.UP)
+    assert flown.audit().report.verdict is LogVerdict.VERIFIED
     told = f"{flown.ending} {flown.dispatched()}"
     assert flown.ending in (Ending.COMPLETED, Ending.ABORTED, Ending.STOOD_DOWN, Ending.LINK_LOST), told
     last_us = flown.loaded.bundle.policy.vehicle.endurance_us + Limits().silent_us
@@ -195,8 +195,8 @@ def test_a_vehicle_that_never_hears_us_again_is_not_waited_for_without_an_end(fl
 @pytest.mark.soak
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("stage", STAGES)
-@pytest.mark.parametrize(("seconds", "way"), [*product(SECONDS, Way)])
-def test_no_silence_in_any_stage_lands_on_the_spot(flavour: str, stage: str, seconds: float, way: Way) -> None:
+@pytest.mark.parametrize(("seconds", "way"), [*product(SECONDS, Direction)])
+def test_no_silence_in_any_stage_lands_on_the_spot(flavour: str, stage: str, seconds: float, way: Direction) -> None:
     lands_at_home(flavour, stage, seconds, way)
 
 
@@ -214,16 +214,16 @@ def hovers() -> bytes:
 @pytest.mark.parametrize(
     ("flavour", "silences", "way"),
     [
-        ("px4", (20.0,), Way.BOTH),
-        pytest.param("ardupilot", (20.0,), Way.BOTH, marks=pytest.mark.soak),
-        pytest.param("px4", (5.0, 5.0, 5.0, 5.0), Way.DOWN, marks=pytest.mark.soak),
-        ("ardupilot", (5.0, 5.0, 5.0, 5.0), Way.DOWN),
-        ("px4", (20.0,), Way.UP),
-        pytest.param("ardupilot", (20.0,), Way.UP, marks=pytest.mark.soak),
+        ("px4", (20.0,), Direction.BOTH),
+        pytest.param("ardupilot", (20.0,), Direction.BOTH, marks=pytest.mark.soak),
+        pytest.param("px4", (5.0, 5.0, 5.0, 5.0), Direction.DOWN, marks=pytest.mark.soak),
+        ("ardupilot", (5.0, 5.0, 5.0, 5.0), Direction.DOWN),
+        ("px4", (20.0,), Direction.UP),
+        pytest.param("ardupilot", (20.0,), Direction.UP, marks=pytest.mark.soak),
     ],
 )
 def test_a_hover_goes_on_after_silences_that_are_longer_than_what_its_limit_leaves(
-    flavour: str, silences: tuple[float, ...], way: Way
+    flavour: str, silences: tuple[float, ...], way: Direction
 ) -> None:
     flight = Flight(hovers(), simulated(flavour))
     began: list[int] = []
@@ -240,4 +240,4 @@ def test_a_hover_goes_on_after_silences_that_are_longer_than_what_its_limit_leav
     flown = flight.fly(each)
     told = [record["detail"] for record in flown.effects("violated")]
     assert (flown.ending, told) == (Ending.COMPLETED, [])
-    assert flown.audit().report.verdict is Verdict.VERIFIED
+    assert flown.audit().report.verdict is LogVerdict.VERIFIED

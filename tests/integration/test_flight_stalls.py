@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
+from rtshcua.model.faults import FlightMode as FlightMode
 from rtshcua.model.faults import MessageSilence
-from rtshcua.model.faults import Mode as FlightMode
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Ending
 from virtual import case, shipped
 from virtual.flight import Flight
@@ -33,13 +33,13 @@ def bundle() -> bytes:
 @pytest.mark.slow
 @given(
     stalls=STALLS,
-    mode=some.sampled_from((Mode.SOFTWARE, Mode.PROCESS)),
+    mode=some.sampled_from((EnforcementMode.SOFTWARE, EnforcementMode.PROCESS)),
     flavour=some.sampled_from(("px4", "ardupilot")),
     attested=some.booleans(),
     lost=some.none() | some.integers(0, LOOKS),
 )
 def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
-    stalls: dict[int, int], mode: Mode, flavour: str, attested: bool, lost: int | None
+    stalls: dict[int, int], mode: EnforcementMode, flavour: str, attested: bool, lost: int | None
 ) -> None:
     """Two verifiers, written apart, agree (`audit`); no decision is derived otherwise, nothing is called forged. That
     its boundary is lost, if it is, is told as that alone. Nothing is called crashed, or taken over, that is not.
@@ -52,7 +52,7 @@ def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
     assert truth.crashed or "crashed" not in told
     assert truth.taken_over_us is not None or "taken-over" not in told
     gone = any(record.get("event") == "boundary-lost" for record in flown.records)
-    assert (report.verdict is Verdict.VERIFIED) or (gone and attested), report
+    assert (report.verdict is LogVerdict.VERIFIED) or (gone and attested), report
     assert {(gap.record, gap.us) for gap in report.gaps if gap.us > TOLD_US} == set(silences(flown))
     assert all(gap.signed is not None for gap in report.gaps)
     shown = [claim.text for claim in report.unproven if claim.slug == "gap"]
@@ -146,7 +146,7 @@ def test_a_mission_on_a_computer_that_stalls_is_nobody_elses(seed: int) -> None:
     stalls = {
         (at + chance.randrange(apart)) % 4_800: chance.randint(case.S, 20 * case.S) for _ in range(chance.randint(1, 6))
     }
-    mode = (Mode.SOFTWARE, Mode.PROCESS)[seed // 2 % 2]
+    mode = (EnforcementMode.SOFTWARE, EnforcementMode.PROCESS)[seed // 2 % 2]
     config = shipped.simulated(flavour)
     flown = StallingFlight(shipped.shipped("standard"), flavour, stalls, mode=mode, config=config).fly(most_s=7_200)
     truth = flown.vehicle.simulation.truth()

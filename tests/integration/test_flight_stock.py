@@ -10,7 +10,7 @@ from rtshcua.app.programs import compile_sources
 from rtshcua.codec.frames import kind_of
 from rtshcua.mavlink.framing import message_id
 from rtshcua.onboard.ports import Ending
-from rtshcua.simulation.config import STOCK, Boot, Kind
+from rtshcua.simulation.config import STOCK, AutopilotKind, Boot
 from rtshcua.virtual.fitting import fitting
 from virtual import case
 from virtual.flight import Flight, Flown
@@ -40,7 +40,7 @@ def bundle(name: str) -> bytes:
 def flown(name: str, flavour: str) -> tuple[Flown, set[str]]:
     """A flight on the stock vehicle, and the names of all that it said."""
     flight = Flight(
-        bundle(name), lambda policy: fitting(policy, flavour=Kind(flavour), extras=STOCK, boot=Boot.RECORDED),
+        bundle(name), lambda policy: fitting(policy, flavour=AutopilotKind(flavour), extras=STOCK, boot=Boot.RECORDED),
     )  # fmt: skip
     said = set[int]()
 

@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.codec.frames import Codec
-from rtshcua.evidence.report import Verdict
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.evidence.report import LogVerdict
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Ending, Event, Interrupted
 from rtshcua.simulation.fault_syntax import parse_fault
 from virtual import case
@@ -31,7 +31,7 @@ SHARED_US = 49 * case.S
 def verified(flown: Flown) -> Flown:
     """The flight, whose log proves itself; it ended on the ground unless somebody else took it, or nobody hears it."""
     audit = flown.audit()
-    assert audit.report.verdict is Verdict.VERIFIED, audit.report
+    assert audit.report.verdict is LogVerdict.VERIFIED, audit.report
     assert audit.derived == sum(record["type"] == "decision" for record in flown.records)
     if flown.ending not in (Ending.STOOD_DOWN, Ending.LINK_LOST):
         assert not flown.vehicle.simulation.truth().in_air
@@ -312,6 +312,6 @@ def test_a_full_disk_brings_it_down_and_loses_no_record() -> None:
 
 
 def test_mode_none_flies_what_would_be_refused() -> None:
-    flown = fly("short", "px4", "battery,at=0s,level=20%", mode=Mode.NONE)
+    flown = fly("short", "px4", "battery,at=0s,level=20%", mode=EnforcementMode.NONE)
     assert flown.decisions()[0][1] == "fallback"
     assert flown.dispatched()[0] == "takeoff"

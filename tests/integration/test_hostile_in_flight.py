@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import GAP_US
 from rtshcua.app.programs import compile_sources
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -118,7 +118,7 @@ class Hostile(VirtualFlight):
         assert isinstance(found, Flown)
         assert found.ending is ending, self.answers
         audit = found.audit()
-        assert audit.report.verdict is Verdict.VERIFIED, audit.report
+        assert audit.report.verdict is LogVerdict.VERIFIED, audit.report
         assert not found.vehicle.simulation.truth().in_air
         return found
 

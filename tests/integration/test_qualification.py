@@ -6,7 +6,7 @@ from functools import cache
 import pytest
 
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SILENCES_US, SORTIES, QualifyingDriver
-from rtshcua.model.faults import Mode, PilotMode
+from rtshcua.model.faults import FlightMode, PilotMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command, Event
 from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
@@ -130,7 +130,7 @@ def test_nothing_is_flown_after_a_sortie_that_did_not_go_as_planned() -> None:
 def lands(vehicle: VirtualVehicle, text: str) -> None:
     """A pilot who does as asked, after a moment."""
     assert text.startswith("PILOT: take over now")
-    vehicle.simulation.inject(PilotMode(vehicle.clock.elapsed_us + 2 * SECOND, Mode.LAND))
+    vehicle.simulation.inject(PilotMode(vehicle.clock.elapsed_us + 2 * SECOND, FlightMode.LAND))
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
@@ -156,7 +156,7 @@ def test_a_takeover_that_nobody_asked_for_ends_it() -> None:
     """A pilot's abort, at whatever stage: it stands down, and no other sortie is flown."""
 
     def taken(vehicle: VirtualVehicle) -> None:
-        vehicle.simulation.inject(PilotMode(12 * SECOND, Mode.LAND))
+        vehicle.simulation.inject(PilotMode(12 * SECOND, FlightMode.LAND))
 
     flown = Qualifying("px4", taken)
     flown.fly(SORTIES)

@@ -16,7 +16,7 @@ from typing import Any, Self
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.simulation.process import EXIT_OK, EXIT_PORT, EXIT_USAGE, main
 
 PATIENCE_S = 60.0
@@ -50,7 +50,7 @@ class Station:
         self.process.communicate()
         self.link.close()
 
-    def frames(self) -> Iterator[Received]:
+    def frames(self) -> Iterator[ReceivedFrame]:
         """Every frame as it comes, until patience ends."""
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:

@@ -26,10 +26,10 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
+    CommandFailed,
     Crashed,
     Event,
     EvidenceFailed,
-    Failed,
     Interrupted,
     LinkBack,
     LinkLost,
@@ -40,7 +40,7 @@ from rtshcua.onboard.ports import (
     TakenOver,
 )
 from rtshcua.onboard.runtime.runtime import Runtime
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 from rtshcua.wire.keys import Duty
 
 START = Now(BEGIN_US, ISSUED + 60 * UNIT, 20_000)
@@ -55,8 +55,8 @@ EVENTS: dict[str, Callable[["World"], Event]] = {
     "armed": lambda at: AirState(at.now_us, True, False),
     "in the air": lambda at: AirState(at.now_us, True, True),
     "succeeded": lambda at: Succeeded(at.now_us, at.token),
-    "failed": lambda at: Failed(at.now_us, at.token, "did-not-stop" if at.holds else "no-progress"),
-    "late": lambda at: Failed(at.now_us, at.token, "late"),
+    "failed": lambda at: CommandFailed(at.now_us, at.token, "did-not-stop" if at.holds else "no-progress"),
+    "late": lambda at: CommandFailed(at.now_us, at.token, "late"),
     "late success": lambda at: Succeeded(at.now_us, at.before),
     "taken over": lambda at: TakenOver(at.now_us, "POSCTL"),
     "crashed": lambda at: Crashed(at.now_us, "on its side"),
@@ -183,7 +183,7 @@ class Search:
             parents.append((parent, event))
             found.edges.append([])
             found.next.append([])
-            found.falling.append(at.runtime._controller.stage is Stage.FALLING)
+            found.falling.append(at.runtime._controller.stage is RunStage.FALLING)
             if at.runtime.ending is not None:
                 _guarded(found, new, "(over)", _over, at)
             if ending is not None:

@@ -30,7 +30,7 @@ from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.runtime import EventHandler
-from rtshcua.onboard.runtime.view import Decided, Stage
+from rtshcua.onboard.runtime.view import Decided, RunStage
 from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.permit import AGAIN, SIZE, open_permit
@@ -67,13 +67,13 @@ _ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
     StateMonitor: ("_state", "_held"),
 }
 #: attributes that are read in these stages only, and are set anew whenever a run comes into them
-_READ_IN: dict[tuple[type, str], tuple[Stage, ...]] = {
-    (MissionController, "_began_us"): (Stage.WAITING,),
-    (MissionController, "retry"): (Stage.DECIDING,),
-    (MissionController, "_supervisor"): (Stage.RUNNING,),
-    (VehicleStatus, "ready"): (Stage.WAITING,),
-    (InvocationQueue, "released_us"): (Stage.DECIDING,),
-    (Fallback, "_chain"): (Stage.FALLING,),
+_READ_IN: dict[tuple[type, str], tuple[RunStage, ...]] = {
+    (MissionController, "_began_us"): (RunStage.WAITING,),
+    (MissionController, "retry"): (RunStage.DECIDING,),
+    (MissionController, "_supervisor"): (RunStage.RUNNING,),
+    (VehicleStatus, "ready"): (RunStage.WAITING,),
+    (InvocationQueue, "released_us"): (RunStage.DECIDING,),
+    (Fallback, "_chain"): (RunStage.FALLING,),
 }
 
 
@@ -82,17 +82,17 @@ _PLAIN = frozenset((str, bool, type(None)))
 _ALWAYS = frozenset((PreparedPolicy, Policy, TrustRoot, Limits))
 
 
-def _unread(stage: Stage, late: bool) -> dict[type, tuple[str, ...]]:
+def _unread(stage: RunStage, late: bool) -> dict[type, tuple[str, ...]]:
     """What is not read in a stage, by class. Where a step may be `late`, its release counts on while it runs."""
     unread = dict(_ONLY_WRITTEN)
     for (kind, name), stages in _READ_IN.items():
-        counts_on = late and kind is InvocationQueue and stage is Stage.RUNNING
+        counts_on = late and kind is InvocationQueue and stage is RunStage.RUNNING
         if stage not in stages and not counts_on:
             unread[kind] = (*unread.get(kind, ()), name)
     return unread
 
 
-_UNREAD = {(stage, late): _unread(stage, late) for stage in Stage for late in (False, True)}
+_UNREAD = {(stage, late): _unread(stage, late) for stage in RunStage for late in (False, True)}
 
 
 def fixed(kind: type) -> bool:
@@ -130,14 +130,14 @@ class Snapshots:
         unpickler.persistent_load = self._shared.__getitem__  # type: ignore[method-assign]
         return unpickler.load()
 
-    def canonical(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> bytes:
+    def canonical(self, world: object, now_us: int, stage: RunStage, standing: bytes | None) -> bytes:
         """A digest that worlds share which differ only in what nothing reads, and in what time it is.
 
         `stage` is where the run stands, `standing` the one permit that is kept for later.
         """
         return blake2b(marshal.dumps(self.plain(world, now_us, stage, standing), 2), digest_size=16).digest()
 
-    def plain(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> Any:
+    def plain(self, world: object, now_us: int, stage: RunStage, standing: bytes | None) -> Any:
         """What is compared, as tuples."""
         return self._compare.plain(world, now_us, stage, standing)
 
@@ -178,7 +178,7 @@ class _Comparison:
         self._alike: dict[int, int] = {}
         self._values: dict[Any, int] = {}
 
-    def plain(self, world: object, now_us: int, stage: Stage, standing: bytes | None) -> Any:
+    def plain(self, world: object, now_us: int, stage: RunStage, standing: bytes | None) -> Any:
         self._now_us = now_us
         self._unread = _UNREAD[stage, self._late]
         permit = None if standing is None else open_permit(standing, self._key)

@@ -14,7 +14,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
-from rtshcua.model.faults import LinkDelay, Mode, PilotMode
+from rtshcua.model.faults import FlightMode, LinkDelay, PilotMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Noted, Sent, TakenOver
 from virtual.copying import copied
@@ -25,7 +25,7 @@ MS, S = 1_000, 1_000_000
 LAGS_US = (0, 10 * MS, 12 * MS, 15 * MS)
 #: when our next command is begun, after a time at which the pilot acts
 BEGUN_MS = range(-45, 26)
-TAKEN = {"land": Mode.LAND, "return": Mode.RETURN, "position": Mode.POSITION}
+TAKEN = {"land": FlightMode.LAND, "return": FlightMode.RETURN, "position": FlightMode.POSITION}
 
 
 @cache
@@ -50,7 +50,7 @@ def flying(lag_us: int) -> Flyer:
     return one
 
 
-def taken_at(of: Flyer, mode: Mode, begun_ms: int, kind: MotionKind) -> Flyer:
+def taken_at(of: Flyer, mode: FlightMode, begun_ms: int, kind: MotionKind) -> Flyer:
     """The pilot chooses a mode, and our next command is begun so much later, or sooner."""
     one = copied(of)
     now_us = one.vehicle.simulation.now_us
@@ -100,8 +100,8 @@ def test_no_leg_takes_a_mode_back_in_any_order() -> None:
 def test_a_stop_takes_no_mode_back() -> None:
     """A fallback leaves on a mode report that may be 300 ms old: it asks for no mode where it is in Hold."""
     for begun_ms in range(2, 20, 3):
-        one = taken_at(flying(15 * MS), Mode.LAND, begun_ms, MotionKind.HOLD)
-        assert one.truth.mode is Mode.LAND, begun_ms
+        one = taken_at(flying(15 * MS), FlightMode.LAND, begun_ms, MotionKind.HOLD)
+        assert one.truth.mode is FlightMode.LAND, begun_ms
         assert any(isinstance(event, TakenOver) for event in one.events)
 
 
@@ -118,7 +118,7 @@ def begun_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> 
     """Whether a pilot who takes over in a leg keeps it, where a command begins so long after; whether it is told."""
     one = copied(flying(lag_us))
     one.wait(phase_ms * MS / S)
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.wait(after_ms * MS / S)
     if not any(isinstance(event, TakenOver) for event in one.events):
         if kind == MotionKind.FLY:
@@ -126,7 +126,7 @@ def begun_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> 
         else:
             one.begin(kind)
         one.wait(2)
-    return one.truth.mode is Mode.POSITION, any(isinstance(event, TakenOver) for event in one.events)
+    return one.truth.mode is FlightMode.POSITION, any(isinstance(event, TakenOver) for event in one.events)
 
 
 def check_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> None:
@@ -152,13 +152,13 @@ def asks(frame: bytes) -> bool:
 @pytest.mark.parametrize("after_ms", [60, 100, 140])
 def test_a_question_that_is_lost_is_put_again_before_a_way_home_leaves(after_ms: int) -> None:
     one = copied(flying(15 * MS))
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.vehicle.lose = asks
     one.wait(after_ms / 1_000)
     one.begin(MotionKind.HOME)  # its question is lost too
     one.vehicle.lose = lambda frame: False
     one.wait(1)
-    assert one.truth.mode is Mode.POSITION
+    assert one.truth.mode is FlightMode.POSITION
     assert any(isinstance(event, TakenOver) for event in one.events)
 
 
@@ -176,13 +176,13 @@ def far_away() -> Flyer:
 def test_a_way_home_waits_for_the_round_trip_of_its_link(kind: MotionKind, after_ms: int) -> None:
     """It left after 50 ms, on a report from before the pilot's, and undid what was chosen 320 ms before."""
     one = copied(far_away())
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.wait(after_ms / 1_000)
     begun_us = one.now_us
     if not any(isinstance(event, TakenOver) for event in one.events):
         one.begin(kind)
     one.wait(1)
-    assert one.truth.mode is Mode.POSITION, begun_us
+    assert one.truth.mode is FlightMode.POSITION, begun_us
     assert any(isinstance(event, TakenOver) for event in one.events)
 
 

@@ -18,11 +18,11 @@ from rtshcua.onboard.ports import (
     Action,
     AirState,
     Command,
+    CommandFailed,
     Crashed,
     End,
     Ending,
     Event,
-    Failed,
     LinkBack,
     LinkLost,
     Release,
@@ -150,7 +150,7 @@ class Watch:
         elif isinstance(event, LinkBack) and self.down:
             self.down = False
             self.back_us = now_us if self.back_us is None else self.back_us
-        elif isinstance(event, Failed) and event.token == self.flying and self.ending is None:
+        elif isinstance(event, CommandFailed) and event.token == self.flying and self.ending is None:
             self.unstopped = self.command == MotionKind.HOLD
 
     def after(self, of: Loaded, ear: Ear, event: Event | None, actions: Sequence[Action], now_us: int) -> None:

@@ -12,7 +12,7 @@ from math import dist
 from typing import Any
 
 from recorded.trace import CLIENT, SECOND, Heard, Question
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.place import HomePosition
 
 ANSWERED = ("AUTOPILOT_VERSION", "HOME_POSITION")
 REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT")
@@ -141,7 +141,7 @@ def _text(heard: Heard) -> str:
 
 
 def motion(
-    home: Home, recorded: list[Heard], simulated: list[Heard], up_m: float, away_m: float
+    home: HomePosition, recorded: list[Heard], simulated: list[Heard], up_m: float, away_m: float
 ) -> Iterator[Difference]:
     """Stretches of time in which height or place differ by more than the limits, looked at where positions came."""
     own = [h for h in simulated if h.name == "GLOBAL_POSITION_INT" and h.message.lat]
@@ -154,7 +154,7 @@ def motion(
 
 
 def targets(
-    home: Home, recorded: list[Heard], simulated: list[Heard], up_m: float, away_m: float, late_us: int
+    home: HomePosition, recorded: list[Heard], simulated: list[Heard], up_m: float, away_m: float, late_us: int
 ) -> Iterator[Difference]:
     """The same for the targets that are reported, and stretches in which one side reports none for `late_us`."""
     during = _between(simulated, recorded[0].at_us, recorded[-1].at_us)

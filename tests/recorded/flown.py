@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import tlog
@@ -84,7 +84,7 @@ class Recorded:
     events: list[tuple[float, Event]] = field(default_factory=list)
     states: list[dict[str, int | None]] = field(default_factory=list)
     monitored: list[State] = field(default_factory=list)  # the same, as the decision takes it
-    sent: list[tuple[float, Received]] = field(default_factory=list)
+    sent: list[tuple[float, ReceivedFrame]] = field(default_factory=list)
     round_trip_us: int = 20_000
 
     def __post_init__(self) -> None:
@@ -138,12 +138,12 @@ class Recorded:
                 stretches.append((second, second))
         return stretches
 
-    def _entries(self) -> Iterator[tlog.Entry]:
+    def _entries(self) -> Iterator[tlog.TlogEntry]:
         data = lzma.decompress((TRACES / f"{self.name}.tlog.xz").read_bytes())
         first_us: int | None = None
         for entry in tlog.read(data):
             first_us = entry.at_us if first_us is None else first_us
-            yield tlog.Entry(START_US + self.late_us + entry.at_us - first_us, entry.frame)
+            yield tlog.TlogEntry(START_US + self.late_us + entry.at_us - first_us, entry.frame)
 
     def _pass(self, to_us: int, waiting: list[tuple[float, Command]]) -> None:
         before_us, self._now_us = self._now_us, to_us
@@ -224,7 +224,7 @@ class Recorded:
         self._take(self.driver.receive(Codec(1, 1).pack(value), self._now_us).events)
 
 
-def _boot_us(frame: Received) -> int:
+def _boot_us(frame: ReceivedFrame) -> int:
     """When it was measured, of those messages that are sent as soon as that; 0 of others."""
     match frame.name:
         case "GLOBAL_POSITION_INT":

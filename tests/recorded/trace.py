@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.mavlink import tlog
 
 TRACES = Path(__file__).resolve().parents[1] / "traces"
@@ -25,7 +25,7 @@ class Heard:
     """A good frame, and when it came: microseconds since the autopilot's start."""
 
     at_us: int
-    received: Received
+    received: ReceivedFrame
 
     @property
     def name(self) -> str:

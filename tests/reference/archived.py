@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from reference import generated_logs
-from rtshcua.adapters.archive.adding import Check
+from rtshcua.adapters.archive.adding import VerificationOptions
 from rtshcua.adapters.archive.entry import RECORDS
-from rtshcua.adapters.archive.examine import Processes
+from rtshcua.adapters.archive.examine import VerifierProcesses
 
 NOW_US = 1_760_000_000_000_000
-CHECK = Check(generated_logs.ROOT_KEY, RECORDS, NOW_US, Processes(1))
+CHECK = VerificationOptions(generated_logs.ROOT_KEY, RECORDS, NOW_US, VerifierProcesses(1))
 SKILLS = ("takeoff", "goto", "return_home")  # of the steps of the short mission
 
 

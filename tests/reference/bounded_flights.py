@@ -11,7 +11,7 @@ from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import Compiled, compile_program
 from rtshcua.ground.prove.mission_bounds import Bounds
 from rtshcua.mavlink import dialect
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.virtual.fitting import fitting
 from virtual import case
@@ -163,7 +163,7 @@ def simulated(drawn: Drawn, of: Compiled, flavour: str) -> SimulationConfig:
         }  # fmt: skip
     assert of.policy is not None
     chosen: dict[str, Any] = {
-        "flavour": Kind(flavour),
+        "flavour": AutopilotKind(flavour),
         "cruise_mm_s": round(1_000 * keeps.cruise),
         "land_mm_s": round(1_000 * keeps.landing),
         "parameters": tuple(parameters.items()),

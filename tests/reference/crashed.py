@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
-from rtshcua.adapters.store.recovery import Signer
+from rtshcua.adapters.store.recovery import LogEnder
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.evidence.verify import verify
 from rtshcua.model.decision import Decision
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.request import Ref
@@ -23,9 +23,9 @@ def certify(text: bytes) -> bytes:
     return LOG_KEY.sign(text, duty=Duty.LOG)
 
 
-def signer(chance: Random, *, utc_us: int = UTC_US + 86_400_000_000) -> Signer:
+def signer(chance: Random, *, utc_us: int = UTC_US + 86_400_000_000) -> LogEnder:
     """Recovers a day later, after a restart of the machine."""
-    return Signer(LOG_KEY.public, certify, lambda: chance.randbytes(32), lambda: Now(1_000_000, utc_us, 2_000))
+    return LogEnder(LOG_KEY.public, certify, lambda: chance.randbytes(32), lambda: Now(1_000_000, utc_us, 2_000))
 
 
 def writes(chance: Random, *, seals: int = 40) -> Iterator[tuple[bytes, int]]:
@@ -59,7 +59,7 @@ def writes(chance: Random, *, seals: int = 40) -> Iterator[tuple[bytes, int]]:
 
 
 def _decision(recorder: Recorder, now: Now, durability: int) -> bytes:
-    context = Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),))
+    context = Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (ConfirmAnswer(2, 0, 1, 4_999_999),))
     answer = Decision(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, None, 6_000_000)
     return recorder.decision(now, Ref(0, 0, -1), bytes(60), _STATE, context, answer, durability)
 
@@ -68,7 +68,7 @@ def unverified(path: Path, lines: list[bytes], acknowledged: int) -> str:
     """What is wrong with a recovered log of these lines, of which so many were acknowledged; nothing: empty."""
     data = path.read_bytes()
     report = verify(data.splitlines(keepends=True))
-    if report.verdict is not Verdict.VERIFIED:
+    if report.verdict is not LogVerdict.VERIFIED:
         return f"it does not verify: {report.failure or report.shortfall}"
     kept = 0
     for line, found in zip(lines, data.splitlines(keepends=True), strict=False):

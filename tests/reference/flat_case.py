@@ -22,7 +22,7 @@ from rtshcua.model.flat.contract import (
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Airspace, Policy, Rule, RuleKind, Vehicle
 from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, Signal, SignalSource
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, POLYGON, Projection, Zone
 
 S = 1_000_000  # us in a second
@@ -372,5 +372,5 @@ def context(of: Invocation = INVOCATIONS[INSPECTION_STEP], **fields: object) -> 
 
 def approval(
     granted: int, monotonic_us: int, role: int = SUPERVISOR, rule: int = CONFIRM_RULE, person: int = 0
-) -> Approval:
-    return Approval(rule, role, granted, monotonic_us, person)
+) -> ConfirmAnswer:
+    return ConfirmAnswer(rule, role, granted, monotonic_us, person)

@@ -16,7 +16,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from reference.resealing import resealed
 from reference.verifiers import ROOT_KEY, agree
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Audit, audit
 from rtshcua.model.faults import BatteryLevel, Fault
 from rtshcua.virtual.vehicle import TICK_US
@@ -64,7 +64,7 @@ def sound(lines: Iterable[bytes]) -> Audit:
     lines = list(lines)
     result = prove(lines)
     assert result.report.failure is None, result.report.failure
-    assert result.report.verdict is Verdict.VERIFIED
+    assert result.report.verdict is LogVerdict.VERIFIED
     assert result.derived == sum(read(line)["type"] == "decision" for line in lines)
     assert result.dispatches == sum(read(line).get("event") == "dispatched" for line in lines)
     return result

@@ -21,7 +21,7 @@ from rtshcua.adapters.store.evidence import SYSTEM, Disk, EvidenceFile, LogFile,
 from rtshcua.adapters.store.recovery import examine, recover
 from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.adapters.store.writing import open_new
-from rtshcua.evidence.recovery import State
+from rtshcua.evidence.recovery import LogState
 
 _ACKNOWLEDGED = struct.Struct("<II")
 _MOST_WAITING = 500
@@ -74,7 +74,7 @@ def _once(path: Path, chance: Random, number: int, done: dict[str, int]) -> str:
     done["acknowledged"] += written
     if synced > written:
         return f"{synced} were synced, of {written} written"
-    if not path.exists() or examine(path, LOG_KEY.public).state is State.UNBEGUN:
+    if not path.exists() or examine(path, LOG_KEY.public).state is LogState.UNBEGUN:
         done["unbegun"] += 1
         return "the beginning is lost" if written else ""
     done[examine(path, LOG_KEY.public).state.value] += 1
@@ -86,7 +86,7 @@ def _once(path: Path, chance: Random, number: int, done: dict[str, int]) -> str:
         time.sleep(chance.random() * _LONGEST_RECOVERY_S)
         done["recoveries killed"] += _kill(recoverer)
     found = recover(path, signer(chance)).found
-    if found.state not in (State.TORN, State.WHOLE, State.CLOSED):
+    if found.state not in (LogState.TORN, LogState.WHOLE, LogState.CLOSED):
         return f"{found.state.value}: {found.reason}"
     lines = [line for line, _ in islice(writes(Random(number)), found.records + 1)]
     return unverified(path, lines, written)

@@ -10,7 +10,7 @@ from reference.kept_frames import Entries, kept
 from rtshcua.model.faults import BatteryLevel, Fault, GpsLoss, LinkSilence, Obstacle, PilotMode, WindStep
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from virtual import case
 from virtual.flight import Flight
 from virtual.once import once
@@ -38,7 +38,7 @@ class Recorded(NamedTuple):
 
 
 @cache
-def recorded(fault: str, flavour: str, mode: Mode = Mode.SOFTWARE) -> Recorded:
+def recorded(fault: str, flavour: str, mode: EnforcementMode = EnforcementMode.SOFTWARE) -> Recorded:
     """A mission with one of `FAULTS`. A vehicle that is never heard again flies for 2 minutes at most."""
     return once(f"{fault}-{flavour}-{mode}", lambda: _flown(fault, flavour, mode))
 
@@ -49,7 +49,7 @@ def fallen_back(flavour: str) -> Recorded:
     return once(f"fallen_back-{flavour}", lambda: _fly(flavour, (WindStep(20 * S, 14 * M),), case.short_steps()))
 
 
-def _flown(fault: str, flavour: str, mode: Mode) -> Recorded:
+def _flown(fault: str, flavour: str, mode: EnforcementMode) -> Recorded:
     policy = case.policy()
     if fault == "silence":
         policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=2 * MIN))
@@ -59,7 +59,7 @@ def _flown(fault: str, flavour: str, mode: Mode) -> Recorded:
 
 def _fly(
     flavour: str, faults: tuple[Fault, ...], steps: tuple[Invocation, ...] | None, policy: Policy | None = None,
-    mode: Mode = Mode.SOFTWARE,
+    mode: EnforcementMode = EnforcementMode.SOFTWARE,
 ) -> Recorded:  # fmt: skip
     bundle = case.seal(case.mission(steps), policy)
     flight = Flight(bundle, case.simulated(flavour, faults=faults), mode=mode, attested=False)

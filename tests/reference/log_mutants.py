@@ -11,7 +11,7 @@ from reference.forgery import flight, read
 from reference.log_vectors import WITNESSES, anchor, close, effect, genesis, log, seal, sealing, times
 from reference.verifiers import ROOT_KEY, careful, independent, quick_accepts
 from rtshcua.adapters.store.logs import lines
-from rtshcua.evidence.verify import Verifier
+from rtshcua.evidence.verify import LogVerifier
 
 copyreg.pickle(type(sha256()), lambda hasher: (hasher.copy, ()))
 
@@ -56,8 +56,8 @@ class Verifiers:
 
     def __init__(self) -> None:
         self.lines = whole()
-        careful, other = Verifier(), independent_verifier.Walk(ROOT_KEY)
-        self._before: list[tuple[Verifier, independent_verifier.Walk]] = []
+        careful, other = LogVerifier(), independent_verifier.Walk(ROOT_KEY)
+        self._before: list[tuple[LogVerifier, independent_verifier.Walk]] = []
         for line in self.lines:
             self._before.append((careful, other))
             careful, other = deepcopy(careful), deepcopy(other)

@@ -19,7 +19,7 @@ from rtshcua.mavlink.layouts import SYSTEM_TIME, TIMESYNC
 from rtshcua.mavlink.signing import Stream
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
-from rtshcua.wire.clock import DRIFT_US, UNIX_US, Source
+from rtshcua.wire.clock import DRIFT_US, UNIX_US, ClockSource
 
 #: how far the vehicle's own UTC may be off, in us (`wire.clock.AUTOPILOT_US`), and a stamp that is in whole ms: of
 #: ArduPilot, and the worse of both autopilots
@@ -45,7 +45,7 @@ class OwnClock:
         """`machine` is the machine's clock, its error as the kernel says it (`UTC_UNKNOWN_US` where it is not
         synchronised); `stated_us` what an operator says that it is off by at most.
         """
-        self.source = Source.UNKNOWN
+        self.source = ClockSource.UNKNOWN
         self._stated_us = stated_us
         self._ahead_us = machine.utc_us - machine.monotonic_us
         self._error_us = UTC_UNKNOWN_US
@@ -56,23 +56,25 @@ class OwnClock:
     def now(self, monotonic_us: int) -> Now:
         """The present moment, by this clock."""
         error_us = self._error_us
-        if self.source is not Source.UNKNOWN:
+        if self.source is not ClockSource.UNKNOWN:
             error_us += max(0, monotonic_us - self._since_us) * DRIFT_US // _SECOND_US
         return Now(monotonic_us, max(0, monotonic_us + self._ahead_us), min(error_us, UTC_UNKNOWN_US))
 
     def look(self, machine: Now) -> None:
         """The machine's clock, once more: it is taken where it is synchronised, and nothing was taken before."""
-        if self.source is Source.UNKNOWN and machine.utc_error_us < UTC_UNKNOWN_US:
-            self._take(Source.KERNEL, machine.utc_us - machine.monotonic_us, machine.utc_error_us, machine.monotonic_us)
+        if self.source is ClockSource.UNKNOWN and machine.utc_error_us < UTC_UNKNOWN_US:
+            self._take(
+                ClockSource.KERNEL, machine.utc_us - machine.monotonic_us, machine.utc_error_us, machine.monotonic_us
+            )
 
     def settle(self, monotonic_us: int) -> None:
         """No more is waited for: what the operator stated holds, if nothing better was told."""
-        if self.source is Source.UNKNOWN and self._stated_us is not None:
-            self._take(Source.OPERATOR, self._ahead_us, self._stated_us, monotonic_us)
+        if self.source is ClockSource.UNKNOWN and self._stated_us is not None:
+            self._take(ClockSource.OPERATOR, self._ahead_us, self._stated_us, monotonic_us)
 
     def asks(self, monotonic_us: int) -> bool:
         """Whether a number is to be drawn for the next challenge."""
-        return self.source is Source.UNKNOWN and (
+        return self.source is ClockSource.UNKNOWN and (
             self._challenge is None or monotonic_us - self._challenge.drawn_us > CHALLENGE_US
         )
 
@@ -83,7 +85,7 @@ class OwnClock:
     @property
     def number(self) -> int:
         """The number that the vehicle is to send back; 0 where none is."""
-        return 0 if self._challenge is None or self.source is not Source.UNKNOWN else self._challenge.number
+        return 0 if self._challenge is None or self.source is not ClockSource.UNKNOWN else self._challenge.number
 
     def hear(self, frame: bytes, link: int, vehicle_us: int, monotonic_us: int) -> None:
         """A frame of which the link's signature was verified came in by a link of this id; its signature is off. The
@@ -92,7 +94,7 @@ class OwnClock:
         Frames of one stream are accepted in the order in which they were signed, and in no other.
         """
         asked = self._challenge
-        if self.source is not Source.UNKNOWN or asked is None or monotonic_us - asked.drawn_us > CHALLENGE_US:
+        if self.source is not ClockSource.UNKNOWN or asked is None or monotonic_us - asked.drawn_us > CHALLENGE_US:
             return
         message, body = _of_autopilot(frame)
         sender = (frame[5], frame[6], link) if body else None
@@ -105,9 +107,9 @@ class OwnClock:
             if UNIX_US <= utc_us <= MAX_VALUE:
                 open_us = max(0, monotonic_us - asked.drawn_us)
                 ahead_us = utc_us - monotonic_us + open_us // 2
-                self._take(Source.VEHICLE, ahead_us, vehicle_us + open_us - open_us // 2, monotonic_us)
+                self._take(ClockSource.VEHICLE, ahead_us, vehicle_us + open_us - open_us // 2, monotonic_us)
 
-    def _take(self, source: Source, ahead_us: int, error_us: int, since_us: int) -> None:
+    def _take(self, source: ClockSource, ahead_us: int, error_us: int, since_us: int) -> None:
         self.source, self._ahead_us, self._error_us, self._since_us = source, ahead_us, error_us, since_us
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from reference.sealed_log import LOG_KEY, PIN, SealedLog, sealed_log, sign
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.check import Proven, check_proof
-from rtshcua.evidence.proofs.cose_receipt import Received, check_receipt
+from rtshcua.evidence.proofs.cose_receipt import ReceiptClaim, check_receipt
 from rtshcua.evidence.proofs.make import (
     prove_consistency,
     prove_inclusion,
@@ -83,13 +83,13 @@ def check(data: bytes) -> str:
     return "true"
 
 
-def _true(result: Proven | Received, log: SealedLog) -> bool:
+def _true(result: Proven | ReceiptClaim, log: SealedLog) -> bool:
     genesis = json.loads(log.lines[0])
-    name = result.name if isinstance(result, Received) else result.believed.name
+    name = result.name if isinstance(result, ReceiptClaim) else result.believed.name
     if (name.vehicle, name.boot) != (genesis["vehicle"], genesis["boot"]):
         return False
     true = json.loads(log.lines[result.number])
-    if isinstance(result, Received):
+    if isinstance(result, ReceiptClaim):
         return _line(result.record) == log.lines[result.number] and result.number < result.size
     if any((each.public, each.time_s) != (WITNESS.public, SEEN_S) for each in result.believed.cosigned):
         return False

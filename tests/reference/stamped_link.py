@@ -8,7 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import ReceivedFrame
 
 SECOND = 1_000_000
 
@@ -28,7 +28,7 @@ class LinkKind:
 class Arrival:
     """A frame, when it came, when it was sent, and when what it says was measured, all on our clock."""
 
-    frame: Received
+    frame: ReceivedFrame
     came_us: int
     sent_us: int
     measured_us: int
@@ -100,7 +100,7 @@ class StampedVehicle:
         came_us = now_us + self._way(self.link.down_us)
         if self.link.ordered:
             came_us = self._last_came_us = max(came_us, self._last_came_us)
-        frame = Received(message, message.get_type(), 1, 1, number, False, b"")
+        frame = ReceivedFrame(message, message.get_type(), 1, 1, number, False, b"")
         self._schedule(came_us, ("came", Arrival(frame, came_us, now_us, measured_us, stamped)))
 
     def _schedule(self, at_us: int, what: Any) -> None:

@@ -9,7 +9,7 @@ from rtshcua.adapters.store.logs import lines
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.quick import outline, quick, scan
 from rtshcua.evidence.records import Genesis
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of
 from rtshcua.ground.audit.trust import Basis, establish
 from rtshcua.wire.keys import Duty
@@ -18,9 +18,9 @@ from virtual import case
 ROOT_KEY = case.KEYS[Duty.ROOT].public
 #: words of the two for the same thing
 WORDS = {
-    Verdict.VERIFIED: ("closed",),
-    Verdict.INCOMPLETE: ("incomplete",),
-    Verdict.FAILED: ("broken", "untrusted", "anchor", "boundary"),
+    LogVerdict.VERIFIED: ("closed",),
+    LogVerdict.INCOMPLETE: ("incomplete",),
+    LogVerdict.FAILED: ("broken", "untrusted", "anchor", "boundary"),
 }
 #: findings of things that docs/log-format.md says nothing about: what the records and the bundle mean
 OF_MEANING = (
@@ -82,6 +82,6 @@ def agree(data: bytes, audit: Audit, pinned: bytes = ROOT_KEY) -> None:
         assert word in WORDS[report.verdict], (word, report.failure)
     if quick_accepts(data, pinned):
         unasked = slug.startswith((*OF_MEANING, *OF_FORM_OF_BUNDLES, *OF_FORM, "boundary/"))
-        assert report.verdict is Verdict.VERIFIED or unasked or short, report.failure
+        assert report.verdict is LogVerdict.VERIFIED or unasked or short, report.failure
     else:
-        assert report.verdict is not Verdict.VERIFIED
+        assert report.verdict is not LogVerdict.VERIFIED

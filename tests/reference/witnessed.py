@@ -6,7 +6,7 @@ from copy import deepcopy
 from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.witnessing.cosign import cosign
 from rtshcua.evidence.witnessing.submission import Submission, anchor
-from rtshcua.evidence.witnessing.witness import Declined, Request, Seen, judge
+from rtshcua.evidence.witnessing.witness import CosignRequest, Declined, LastCosigned, judge
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -97,10 +97,10 @@ class Judge:
 
     def __init__(self, key: SigningKey = WITNESSES[0]) -> None:
         self.key = key
-        self.seen: dict[str, Seen] = {}
+        self.seen: dict[str, LastCosigned] = {}
         self.time_s = 1_750_000_000
 
-    def consider(self, request: Request) -> str | Declined:
+    def consider(self, request: CosignRequest) -> str | Declined:
         """The anchor, or the refusal."""
         origin = request.note.partition("\n")[0]
         found = judge(request, self.seen.get(origin), log_keys)

@@ -38,15 +38,15 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load, session
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load, session
 from rtshcua.onboard.ports import (
     Action,
     AirState,
     Append,
     Command,
+    CommandFailed,
     Ending,
     Event,
-    Failed,
     Readings,
     Ready,
     Release,
@@ -136,7 +136,9 @@ def sealed_again(of: Loaded) -> bytes:
     return _seal(The(of.bundle.policy), The(of.bundle.mission))
 
 
-def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = False) -> Loaded | Refusal:
+def try_load(
+    data: bytes, mode: EnforcementMode = EnforcementMode.SOFTWARE, *, own_simulator: bool = False
+) -> Loaded | Refusal:
     """`load` with the keys of this world."""
     return load(
         data,
@@ -150,13 +152,15 @@ def try_load(data: bytes, mode: Mode = Mode.SOFTWARE, *, own_simulator: bool = F
     )
 
 
-def loaded(policy: Policy = POLICY, mission: Mission = MISSION, mode: Mode = Mode.SOFTWARE) -> Loaded:
+def loaded(
+    policy: Policy = POLICY, mission: Mission = MISSION, mode: EnforcementMode = EnforcementMode.SOFTWARE
+) -> Loaded:
     """The bundle of both, in force."""
     return renewed(_loaded(The(policy), The(mission), mode))
 
 
 @_kept
-def _loaded(policy: The, mission: The, mode: Mode) -> Loaded:
+def _loaded(policy: The, mission: The, mode: EnforcementMode) -> Loaded:
     result = try_load(sealed(policy.thing, mission.thing), mode, own_simulator=True)
     assert isinstance(result, Loaded), result
     return result
@@ -231,7 +235,7 @@ class FakeVehicle:
         if command is not None and over and command.skill not in self.deaf:
             self._current = None
             if command.skill in self.fails:
-                events.append(Failed(now_us, command.token, "no-effect", "because"))
+                events.append(CommandFailed(now_us, command.token, "no-effect", "because"))
             else:
                 self._arrive(command)
                 events += [AirState(now_us, self.armed, self.airborne), Succeeded(now_us, command.token)]

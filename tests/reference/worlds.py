@@ -19,7 +19,7 @@ from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract,
 from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Airspace, Monitor, MonitorKind, Policy, Rule, RuleKind
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 
 Code = tuple[int, ...]
@@ -301,7 +301,7 @@ def context(of: Random, invocation: Invocation) -> Context:
 
     at = flat.NOW.monotonic_us
     answers = [
-        Approval(
+        ConfirmAnswer(
             of.choice([flat.CONFIRM_RULE, 0, 1, 2]),
             of.randrange(2),
             of.randrange(2),

@@ -45,7 +45,7 @@ from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.situation import Context, State
 from rtshcua.model.outcome import Outcome
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Command, Ending
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.document import DocumentError
@@ -69,7 +69,8 @@ def opened(mission: Mission, key: SigningKey = AGENT) -> Loaded | Refusal:
     bound = binding.bind(mission, bundle.policy_digest(payload))
     data = bundle.seal(payload, bundle.mission_payload(bound), policy_key=POLICY_KEY, mission_key=key)
     return load(
-        data, root=TRUST, vehicle=VEHICLE, now=START, mode=Mode.SOFTWARE, session_key=SESSION_KEY, flight=FLIGHT,
+        data, root=TRUST, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE, session_key=SESSION_KEY,
+        flight=FLIGHT,
         peer_is_own_simulator=True,
     )  # fmt: skip
 

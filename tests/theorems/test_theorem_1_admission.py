@@ -51,7 +51,7 @@ from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.flat.situation import Context, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement import executor as executors
-from rtshcua.onboard.enforcement.load import Loaded, Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.onboard.ports import Command
 from rtshcua.wire import permit as permits
 from rtshcua.wire.keys import Duty, SigningKey
@@ -63,7 +63,7 @@ from rtshcua.wire.response import decode
 
 WINDY = clause("wind.speed > 15 m/s", apply(Op.GT, signal(WIND), const(15 * M)))
 POLICY = replace(flat.POLICY, rules=(*flat.POLICY.rules, flat.rule(RuleKind.FORBID, when=WINDY)))
-OF, UNENFORCED = (loaded(POLICY, low_mission(), mode) for mode in (Mode.SOFTWARE, Mode.NONE))
+OF, UNENFORCED = (loaded(POLICY, low_mission(), mode) for mode in (EnforcementMode.SOFTWARE, EnforcementMode.NONE))
 STRANGER = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.APPROVAL, development=True)
 ACTS = ("ask", "ask", "ask", "send", "send", "stand in", "ended", "sign", "again", "wait", "fly", "fly", "fly")
 STRANGE = {BATTERY: 1_000, WIND: 20 * M, OBSTACLE: None, HEIGHT: 130 * M, POSITION_X: 600 * M}

@@ -36,7 +36,7 @@ from reference.forgery import (
 from reference.verifiers import ROOT_KEY
 from rtshcua.evidence import note
 from rtshcua.evidence import seal_verification as seals
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit import meaning
 from rtshcua.ground.audit.audit import audit
 from rtshcua.wire.keys import Duty, SigningKey
@@ -91,7 +91,7 @@ def edited(of: Random, line: bytes) -> bytes:
 
 def accepted(lines: list[bytes]) -> bool:
     """Whether the log is taken for whole, by whoever pins the root key."""
-    return audit(lines, ROOT_KEY).report.verdict is Verdict.VERIFIED
+    return audit(lines, ROOT_KEY).report.verdict is LogVerdict.VERIFIED
 
 
 def survives(of: Random) -> bool:

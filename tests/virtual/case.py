@@ -11,7 +11,7 @@ from rtshcua.model.flat.mission import Invocation, Mission, Plan
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import SignalSource
 from rtshcua.model.flat.zone import SHIFT, Projection
-from rtshcua.simulation.config import HOME, Kind, SimulationConfig
+from rtshcua.simulation.config import HOME, AutopilotKind, SimulationConfig
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
@@ -142,4 +142,4 @@ def simulated(
     flavour: str, *, return_mm: int = 16 * M, land_mm_s: int | None = LAND_MM_S, **fields: object
 ) -> SimulationConfig:
     """A simulated vehicle that fits the policy; it returns little above where it flies and lands fast: down soon."""
-    return SimulationConfig(flavour=Kind(flavour), return_mm=return_mm, land_mm_s=land_mm_s, **fields)
+    return SimulationConfig(flavour=AutopilotKind(flavour), return_mm=return_mm, land_mm_s=land_mm_s, **fields)

@@ -4,8 +4,8 @@ from functools import cache
 from typing import Any
 
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Command, Event, Failed, Readings, Ready, Succeeded, TakenOver
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.onboard.ports import Command, CommandFailed, Event, Readings, Ready, Succeeded, TakenOver
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 from virtual.policy import POLICY, geo
 
@@ -15,7 +15,9 @@ class Flyer:
 
     def __init__(self, flavour: str, *, return_mm: int = 22_000, **config: Any) -> None:
         """A return climbs little: it is down soon."""
-        self.vehicle = VirtualVehicle(POLICY, SimulationConfig(flavour=Kind(flavour), return_mm=return_mm, **config))
+        self.vehicle = VirtualVehicle(
+            POLICY, SimulationConfig(flavour=AutopilotKind(flavour), return_mm=return_mm, **config)
+        )
         self.events: list[Event] = []
         self.token = 0
 
@@ -61,7 +63,7 @@ class Flyer:
     def fly(self, kind: MotionKind, *points: tuple[int, int], seconds: float = 300, **more: int) -> Any:
         """Start a command and wait for its end."""
         token = self.begin(kind, *points, **more)
-        end = self.until((Succeeded, Failed, TakenOver), seconds)
+        end = self.until((Succeeded, CommandFailed, TakenOver), seconds)
         assert isinstance(end, TakenOver) or end.token == token
         return end
 

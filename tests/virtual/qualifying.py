@@ -8,10 +8,10 @@ from typing import Any
 from rtshcua import library
 from rtshcua.adapters.doctor.diagnosis import settings_told
 from rtshcua.adapters.qualification.checks import ends_after, judge
-from rtshcua.adapters.qualification.missions import NAME, Trial, source_of
+from rtshcua.adapters.qualification.missions import NAME, SortiePlan, source_of
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie
 from rtshcua.adapters.qualification.sortie import SORTIES, QualifyingDriver, Sortie
-from rtshcua.adapters.vehicle.bounds import Reach
+from rtshcua.adapters.vehicle.bounds import FlightReach
 from rtshcua.app.programs import compile_sources, read_text
 from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
@@ -19,14 +19,14 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.virtual.fitting import fitting
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from rtshcua.wire.qualification import QualificationCheck
 from virtual import case
 from virtual.flight import TICK_US, UTC_US, Flight
 
-TRIAL = Trial(10_000, 40_000, 5_000, 0)
+TRIAL = SortiePlan(10_000, 40_000, 5_000, 0)
 Wrong = Callable[[VirtualVehicle], None]
 Pilot = Callable[[VirtualVehicle, str], None]
 
@@ -63,7 +63,7 @@ class Qualifying:
     def __init__(self, flavour: str, wrong: Wrong = lambda _: None, pilot: Pilot | None = None, **chosen: Any) -> None:
         self._pilot = pilot
         self._policy, _ = compiled()
-        self._config: SimulationConfig = fitting(self._policy, flavour=Kind(flavour), **chosen)
+        self._config: SimulationConfig = fitting(self._policy, flavour=AutopilotKind(flavour), **chosen)
         self._wrong = wrong
         self._vehicle: VirtualVehicle | None = None
         self._clock = VirtualClock(Now(START.monotonic_us, UTC_US, START.utc_error_us))
@@ -123,6 +123,6 @@ class Qualifying:
         questions, flavour = first.questions, first.flavour
         assert questions is not None
         assert flavour is not None
-        settings = tuple(settings_told(flavour.name, questions.values.values, self._policy, Reach()))
+        settings = tuple(settings_told(flavour.name, questions.values.values, self._policy, FlightReach()))
         within, trip = flavour.mode_within_us, first.source.clock.round_trip_us
         return ObservedQualification(questions.firmware, within, trip, tuple(sorties), settings, missing)

@@ -10,7 +10,7 @@ from typing import Any
 
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import enums
-from rtshcua.model.faults import MessageSilence, Mode
+from rtshcua.model.faults import FlightMode, MessageSilence
 from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 
 ASKED = (enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE)
@@ -50,7 +50,7 @@ def hold_that_drifts(vehicle: VirtualVehicle) -> None:
     body = _of(vehicle).vehicle
 
     def act() -> None:
-        if body.mode in (Mode.BRAKE, Mode.LOITER) and body.in_air and body.destination is not None:
+        if body.mode in (FlightMode.BRAKE, FlightMode.LOITER) and body.in_air and body.destination is not None:
             body.shift_east(0.015)  # with each of some fifty messages a second
 
     _each_tick(vehicle, act)
@@ -119,7 +119,7 @@ def silent_mode_change(vehicle: VirtualVehicle) -> None:
 
     def heartbeat() -> Any:
         told = copy(build())
-        if _of(vehicle).vehicle.mode in (Mode.RETURN, Mode.LAND) and kept:
+        if _of(vehicle).vehicle.mode in (FlightMode.RETURN, FlightMode.LAND) and kept:
             told.custom_mode = kept[-1]
         else:
             kept.append(told.custom_mode)
@@ -196,7 +196,7 @@ def returns_when_we_are_silent(vehicle: VirtualVehicle) -> None:
 
     def act(to_us: int) -> list[bytes]:
         if body.in_air and to_us - heard[0] > 2 * SECOND:
-            body.set_mode(Mode.RETURN)
+            body.set_mode(FlightMode.RETURN)
         return advance(to_us)
 
     vehicle.lose = lose

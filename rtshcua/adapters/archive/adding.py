@@ -8,9 +8,9 @@ from typing import NamedTuple
 import duckdb
 from msgspec.structs import replace
 
-from rtshcua.adapters.archive.entry import AUDIT, FAILED, Entry, Examined
-from rtshcua.adapters.archive.examine import Task, Workers, missing
-from rtshcua.adapters.archive.folder import Folder, Source
+from rtshcua.adapters.archive.entry import AUDIT, FAILED, ArchiveEntry, VerifiedLog
+from rtshcua.adapters.archive.examine import LogVerifiers, Task, missing
+from rtshcua.adapters.archive.folder import ArchiveFolder, LogSource
 from rtshcua.adapters.archive.index import forget_unfinished, ingest, lay_out, read_catalogue, write_catalogue
 from rtshcua.wire.keys import PUBLIC_BYTES, Duty, key_id
 from rtshcua.wire.untrusted import Untrusted
@@ -22,13 +22,13 @@ _MOST = 512
 _DIGEST = re.compile("[0-9a-f]{64}")
 
 
-class Check(NamedTuple):
+class VerificationOptions(NamedTuple):
     """What logs are verified with: the pinned root key, how deep, the time (UTC, us), and by whom."""
 
     pinned: bytes
     depth: str
     now_us: int
-    workers: Workers
+    workers: LogVerifiers
 
     @property
     def root(self) -> str:
@@ -40,11 +40,11 @@ class Done(NamedTuple):
     """What became of one log: `known` where the archive had it already, verified no less."""
 
     path: Path
-    entry: Entry
+    entry: ArchiveEntry
     known: bool
 
 
-def add(folder: Folder, sources: Iterable[Source], check: Check) -> Iterator[Done]:
+def add(folder: ArchiveFolder, sources: Iterable[LogSource], check: VerificationOptions) -> Iterator[Done]:
     """Takes logs in, verifies them and indexes those that are to be believed.
 
     What was given is done when the iterator says so: a crash before leaves the archive as it was then. Raises OSError
@@ -72,7 +72,7 @@ def add(folder: Folder, sources: Iterable[Source], check: Check) -> Iterator[Don
         yield from batch.settle()
 
 
-def verify(folder: Folder, check: Check) -> Iterator[Done]:
+def verify(folder: ArchiveFolder, check: VerificationOptions) -> Iterator[Done]:
     """Verifies the logs of an archive once more, where they lie: those that were verified under this root."""
     with folder.writing():
         entries = read_catalogue(folder)
@@ -83,7 +83,7 @@ def verify(folder: Folder, check: Check) -> Iterator[Done]:
         yield from batch.settle()
 
 
-def reindex(folder: Folder, check: Check) -> Iterator[Done]:
+def reindex(folder: ArchiveFolder, check: VerificationOptions) -> Iterator[Done]:
     """Verifies every log of an archive, and makes the whole index anew from them; an old one is not believed, but for
     which logs there were: one that is gone is told.
 
@@ -107,14 +107,14 @@ def reindex(folder: Folder, check: Check) -> Iterator[Done]:
         yield from batch.settle()
 
 
-def _no_less(held: Entry, check: Check) -> bool:
+def _no_less(held: ArchiveEntry, check: VerificationOptions) -> bool:
     """Whether an entry already says what this check would."""
     return held.pinned == check.root and held.status != FAILED and (held.checked == AUDIT or check.depth != AUDIT)
 
 
-def _asked(held: Entry | None, digest: str, size: int, name: str, check: Check) -> Entry:
+def _asked(held: ArchiveEntry | None, digest: str, size: int, name: str, check: VerificationOptions) -> ArchiveEntry:
     """The row of a log before its verification; of one that is known, what stays."""
-    return Entry(
+    return ArchiveEntry(
         log=digest,
         bytes=size,
         name=name if held is None else held.name,
@@ -132,14 +132,14 @@ class _Batch:
     them the same came.
     """
 
-    def __init__(self, folder: Folder, entries: dict[str, Entry], check: Check) -> None:
-        self.logs: dict[str, tuple[Path, Entry]] = {}
+    def __init__(self, folder: ArchiveFolder, entries: dict[str, ArchiveEntry], check: VerificationOptions) -> None:
+        self.logs: dict[str, tuple[Path, ArchiveEntry]] = {}
         self.copies: list[tuple[Path, str]] = []
         self._folder = folder
         self._entries = entries
         self._check = check
 
-    def put(self, path: Path, entry: Entry) -> Iterator[Done]:
+    def put(self, path: Path, entry: ArchiveEntry) -> Iterator[Done]:
         """One more log; what came of all, where they are enough to be done before more are taken in."""
         self.logs[entry.log] = path, entry
         if len(self.logs) >= _MOST or sum(entry.bytes for _, entry in self.logs.values()) >= _BATCH:
@@ -155,7 +155,7 @@ class _Batch:
         tasks = [Task(folder.log(entry.log), entry, self._check.pinned) for entry in asked if entry.log not in gone]
         examined = list(self._check.workers.examine(tasks)) if tasks else []
         examined += [missing(entry) for entry in asked if entry.log in gone]
-        fresh: list[Examined] = []
+        fresh: list[VerifiedLog] = []
         for each in examined:
             if each.entry.part:
                 entries[each.entry.log] = each.entry  # its records are indexed already, and cannot have changed

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import duckdb
 
-from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
+from rtshcua.adapters.archive.folder import NOTHING, TABLES, ArchiveFolder
 from rtshcua.adapters.archive.index import is_digest, misleading, quoted
 from rtshcua.wire.untrusted import Untrusted
 
@@ -62,14 +62,14 @@ def view(name: str) -> str:
     return (_HERE / "views" / f"{name}.sql").read_text(encoding="utf-8")
 
 
-class Answer(NamedTuple):
+class QueryRows(NamedTuple):
     """Rows under the names of their columns."""
 
     columns: tuple[str, ...]
     rows: Sequence[tuple[object, ...]]
 
 
-class Conditions(NamedTuple):
+class DecisionQuery(NamedTuple):
     """What decisions are asked about; None is any. `since` and `until` are UTC in us, the latter not included."""
 
     vehicle: str | None = None
@@ -102,18 +102,18 @@ _NUMBER: Final = ", CASE WHEN step >= 0 THEN step + 1 END AS step_number"
 _ABOUT_STEPS: Final = frozenset({"decisions", "effects"})
 
 
-class Asker:
+class ArchiveReader:
     """A connection to an archive that can only read it."""
 
-    def __init__(self, folder: Folder, conditions: Conditions | None = None) -> None:
+    def __init__(self, folder: ArchiveFolder, conditions: DecisionQuery | None = None) -> None:
         self._engine = duckdb.connect()
         try:
-            self._begin(folder, conditions or Conditions())
+            self._begin(folder, conditions or DecisionQuery())
         except duckdb.Error as error:
             text = f"the index of `{folder.path}` cannot be read: {' '.join(str(error).split())}"
             raise Untrusted("archive-index", text) from None
 
-    def _begin(self, folder: Folder, conditions: Conditions) -> None:
+    def _begin(self, folder: ArchiveFolder, conditions: DecisionQuery) -> None:
         engine = self._engine
         if not folder.catalogue.exists():
             raise Untrusted("no-archive", f"`{folder.path}` is an archive that nothing was ever added to")
@@ -135,7 +135,7 @@ class Asker:
         engine.execute("SET enable_external_access = false")
         engine.execute("SET lock_configuration = true")
 
-    def ask(self, sql: str, limit: int | None = None) -> Answer:
+    def ask(self, sql: str, limit: int | None = None) -> QueryRows:
         """The answer to one SELECT. Raises `Untrusted` (`malformed`) for anything else, and where it makes no sense."""
         try:
             statements = duckdb.extract_statements(sql)
@@ -147,7 +147,7 @@ class Asker:
         except duckdb.Error as error:
             said = str(error).partition("\n\nLINE ")[0]  # then the question once more, with a caret under it
             raise Untrusted("malformed", " ".join(said.split())) from None
-        return Answer(columns, rows)
+        return QueryRows(columns, rows)
 
     def close(self) -> None:
         """Lets the connection go."""

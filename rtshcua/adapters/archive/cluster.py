@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 
 from distributed import Client
 
-from rtshcua.adapters.archive.entry import Examined
+from rtshcua.adapters.archive.entry import VerifiedLog
 from rtshcua.adapters.archive.examine import Task, examine
 
 
-class Cluster:
+class SchedulerWorkers:
     """The workers of a scheduler, at an address such as `tcp://10.0.0.1:8786`. Raises OSError where there is none."""
 
     def __init__(self, address: str) -> None:
@@ -23,7 +23,7 @@ class Cluster:
         except (OSError, ValueError):
             raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
 
-    def examine(self, tasks: Sequence[Task]) -> Iterator[Examined]:
+    def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
         """Verifies these logs; one whose worker is lost is given to another."""
         futures = self._client.map(examine, tasks, pure=False)
         yield from self._client.gather(futures)

@@ -9,7 +9,7 @@ RECORDS, AUDIT = "records", "audit"
 VERIFIED, INCOMPLETE, FAILED = "verified", "incomplete", "failed"
 
 
-class Entry(msgspec.Struct, frozen=True):
+class ArchiveEntry(msgspec.Struct, frozen=True):
     """A log. Times are UTC in us. What comes from the log itself is null where the log is not to be trusted.
 
     `part` names the files with the rows of its records; empty where none are indexed. `finding` is the slug of what is
@@ -51,7 +51,7 @@ class Entry(msgspec.Struct, frozen=True):
     root: str | None = None
 
 
-class Step(msgspec.Struct, frozen=True):
+class StepRecords(msgspec.Struct, frozen=True):
     """Which skill a step, or a link of a chain, stands for, in the records from `first` to before `until` of a log."""
 
     log: str
@@ -64,8 +64,8 @@ class Step(msgspec.Struct, frozen=True):
     what: str
 
 
-class Examined(msgspec.Struct, frozen=True):
+class VerifiedLog(msgspec.Struct, frozen=True):
     """What came of the verification of one log."""
 
-    entry: Entry
-    steps: tuple[Step, ...] = ()
+    entry: ArchiveEntry
+    steps: tuple[StepRecords, ...] = ()

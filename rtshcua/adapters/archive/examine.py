@@ -11,14 +11,14 @@ from typing import NamedTuple, Protocol
 
 from msgspec.structs import replace
 
-from rtshcua.adapters.archive.entry import AUDIT, FAILED, Entry, Examined, Step
+from rtshcua.adapters.archive.entry import AUDIT, FAILED, ArchiveEntry, StepRecords, VerifiedLog
 from rtshcua.adapters.store.logs import read_anchors
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.verification import follow
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.records import AnyRecord, Effect, Genesis
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.ground.audit.audit import Audit, Auditor
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.mission import Mission
@@ -39,11 +39,11 @@ class Task(NamedTuple):
     """A log to verify: where it lies, its anchors beside it; its row as far as it is known; the pinned root key."""
 
     path: Path
-    entry: Entry
+    entry: ArchiveEntry
     pinned: bytes
 
 
-def examine(task: Task) -> Examined:
+def examine(task: Task) -> VerifiedLog:
     """Verifies a log. Whatever it holds, the answer is a row; OSError where it cannot be read."""
     entry = task.entry
     replacements: list[Effect] = []
@@ -70,23 +70,23 @@ def examine(task: Task) -> Examined:
     described = replace(
         _with_finding(described, report.verdict.value, report.shortfall),
         records=report.records,
-        indexed=report.records if report.verdict is Verdict.VERIFIED else report.sealed,
+        indexed=report.records if report.verdict is LogVerdict.VERIFIED else report.sealed,
         anchored=report.anchored,
         recoveries=report.counts.get("recover", 0),
         last_leaf=leaf_hash(last).hex(),
         root=report.root.hex(),
     )
     assert report.genesis is not None
-    return Examined(described, _steps(entry.log, audit.basis.bundle, report.genesis, replacements))
+    return VerifiedLog(described, _steps(entry.log, audit.basis.bundle, report.genesis, replacements))
 
 
-def missing(entry: Entry) -> Examined:
+def missing(entry: ArchiveEntry) -> VerifiedLog:
     """What comes of a log that does not lie in the archive any more."""
     text = "the archive does not have the log any more: it was taken away from where it lay"
     return _failed(entry, Finding("archive/missing", 0, text, "no file", entry.log))
 
 
-def _described(entry: Entry, audit: Audit) -> Entry:
+def _described(entry: ArchiveEntry, audit: Audit) -> ArchiveEntry:
     """The row with what the log says of its flight, if the pinned root vouches for its beginning."""
     report, genesis = audit.report, audit.report.genesis
     if genesis is None or audit.basis is None:
@@ -110,19 +110,19 @@ def _described(entry: Entry, audit: Audit) -> Entry:
     )
 
 
-def _lasted_us(report: Report) -> int | None:
+def _lasted_us(report: LogReport) -> int | None:
     """Monotonic time begins anew at a recover: then nobody knows."""
     if report.genesis is None or report.counts.get("recover", 0):
         return None
     return report.last_us - report.genesis.at_us
 
 
-def _failed(entry: Entry, finding: Finding) -> Examined:
+def _failed(entry: ArchiveEntry, finding: Finding) -> VerifiedLog:
     """Nothing of such a log is indexed; what it said of its flight stays, where that much was to be trusted."""
-    return Examined(_with_finding(entry, FAILED, finding))
+    return VerifiedLog(_with_finding(entry, FAILED, finding))
 
 
-def _with_finding(entry: Entry, status: str, finding: Finding | None) -> Entry:
+def _with_finding(entry: ArchiveEntry, status: str, finding: Finding | None) -> ArchiveEntry:
     if finding is None:
         return replace(entry, status=status)
     return replace(entry, status=status, finding=finding.slug, finding_record=finding.record, finding_text=finding.text)
@@ -131,7 +131,7 @@ def _with_finding(entry: Entry, status: str, finding: Finding | None) -> Entry:
 # --------------------------------------------------- which skill the steps and links of a log stand for
 
 
-def _steps(log: str, bundle: Bundle, genesis: Genesis, replacements: Sequence[Effect]) -> tuple[Step, ...]:
+def _steps(log: str, bundle: Bundle, genesis: Genesis, replacements: Sequence[Effect]) -> tuple[StepRecords, ...]:
     """The steps and links of a log that verified, each for the records in which its mission was in force.
 
     `bundle` is that of the log, with or without what replaced its mission later.
@@ -146,7 +146,7 @@ def _steps(log: str, bundle: Bundle, genesis: Genesis, replacements: Sequence[Ef
             missions.append((record.seq, replaced))
     ends = [first for first, _ in missions[1:]] + [_END]
     return tuple(
-        Step(log, first, until, *row)
+        StepRecords(log, first, until, *row)
         for (first, mission), until in zip(missions, ends, strict=True)
         for row in _rows(bundle.policy, mission)
     )
@@ -181,24 +181,24 @@ def _skill(policy: Policy, index: int) -> str:
 # ------------------------------------------------------------------------------------------ who verifies
 
 
-class Workers(Protocol):
+class LogVerifiers(Protocol):
     """Whoever verifies logs; the answers come in the order of the tasks."""
 
-    def examine(self, tasks: Sequence[Task]) -> Iterator[Examined]:
+    def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
         """Verifies these logs."""
 
     def close(self) -> None:
         """Lets them go."""
 
 
-class Processes:
+class VerifierProcesses:
     """As many processes as there are cores, or `jobs`; they start with the first work that is worth it."""
 
     def __init__(self, jobs: int | None = None) -> None:
         self._jobs = jobs or _cores()
         self._pool: ProcessPoolExecutor | None = None
 
-    def examine(self, tasks: Sequence[Task]) -> Iterator[Examined]:
+    def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
         """Verifies these logs, the largest first."""
         if self._jobs == 1 or len(tasks) == 1 or (self._pool is None and sum(t.entry.bytes for t in tasks) < _LITTLE):
             return map(examine, tasks)

@@ -49,14 +49,14 @@ _MOST_ANCHORS: Final = 16 << 20  # octets of a file of anchors
 _PATTERN: Final = frozenset("*?[]{}")  # the engine would take a path with these for a pattern
 
 
-class Source(NamedTuple):
+class LogSource(NamedTuple):
     """A log to take in. Below `root`, the folder that somebody gave it in, no link is followed."""
 
     path: Path
     root: Path | None = None
 
 
-class Folder:
+class ArchiveFolder:
     """An archive's folder. Raises `Untrusted` (`no-archive`, `archive-version`, `archive-path`) where it is none."""
 
     def __init__(self, path: Path, *, make: bool = False) -> None:
@@ -137,7 +137,7 @@ class Folder:
                     left.unlink()
             yield
 
-    def take_in(self, source: Source) -> tuple[str, int, bool]:
+    def take_in(self, source: LogSource) -> tuple[str, int, bool]:
         """Copies a log in, with the anchors beside it, unless it is there. Its SHA-256, its octets, and whether
         anything is new.
         """
@@ -158,7 +158,7 @@ class Folder:
             scratch.unlink(missing_ok=True)
         return digest, size, self._take_anchors(source, digest) or new
 
-    def _take_anchors(self, source: Source, digest: str) -> bool:
+    def _take_anchors(self, source: LogSource, digest: str) -> bool:
         """Those beside a log that is named as in a run's folder are its own; else those that bear its name."""
         log, root = source
         found = log.parent.glob(f"*{ANCHORS}") if log.name == LOG else [anchors_path(log)]

@@ -17,8 +17,8 @@ import duckdb
 import msgspec
 from msgspec.structs import replace
 
-from rtshcua.adapters.archive.entry import Entry, Examined, Step
-from rtshcua.adapters.archive.folder import NOTHING, TABLES, Folder
+from rtshcua.adapters.archive.entry import ArchiveEntry, StepRecords, VerifiedLog
+from rtshcua.adapters.archive.folder import NOTHING, TABLES, ArchiveFolder
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, publish, replacing
@@ -72,14 +72,14 @@ def _engine() -> duckdb.DuckDBPyConnection:
     return duckdb.connect(config={"enable_external_file_cache": "false"})
 
 
-def read_catalogue(folder: Folder) -> dict[str, Entry]:
+def read_catalogue(folder: ArchiveFolder) -> dict[str, ArchiveEntry]:
     """The rows by log. Raises `Untrusted` (`archive-index`) where one would lead to what is not in the archive."""
     if not folder.catalogue.exists():
         return {}
-    names = ", ".join(Entry.__struct_fields__)
+    names = ", ".join(ArchiveEntry.__struct_fields__)
     with _engine().cursor() as engine:
         rows = engine.execute(f"SELECT {names} FROM read_parquet(?)", [str(folder.catalogue)]).fetchall()
-    entries = {row[0]: Entry(*row) for row in rows}
+    entries = {row[0]: ArchiveEntry(*row) for row in rows}
     for each in entries.values():
         if not (is_digest(each.log, 64) and (each.part == "" or is_digest(each.part, 32))):
             raise misleading(folder)
@@ -91,21 +91,21 @@ def is_digest(found: object, characters: int) -> bool:
     return isinstance(found, str) and len(found) == characters and set(found) <= _DIGITS
 
 
-def misleading(folder: Folder) -> Untrusted:
+def misleading(folder: ArchiveFolder) -> Untrusted:
     """Why an index is not gone by."""
     return Untrusted("archive-index", f"the index of `{folder.path}` names files that are not its own")
 
 
-def write_catalogue(folder: Folder, entries: Iterable[Entry]) -> None:
+def write_catalogue(folder: ArchiveFolder, entries: Iterable[ArchiveEntry]) -> None:
     """Puts these rows in the place of all that were there, in one step."""
     fresh = folder.scratch / "logs.parquet"
     with _engine().cursor() as engine:
-        _load(engine, "logs", Entry, entries, folder.scratch)
+        _load(engine, "logs", ArchiveEntry, entries, folder.scratch)
         engine.execute(f"COPY (SELECT * FROM logs ORDER BY begun_us, log) TO {quoted(fresh)} (FORMAT parquet)")
     publish(fresh, folder.catalogue, folder.path)
 
 
-def forget_unfinished(folder: Folder, entries: dict[str, Entry]) -> None:
+def forget_unfinished(folder: ArchiveFolder, entries: dict[str, ArchiveEntry]) -> None:
     """Removes the rows of records that a crash left, before the catalogue named them."""
     parts = {entry.part for entry in entries.values()}
     for path in folder.parts():
@@ -118,7 +118,7 @@ def quoted(value: object) -> str:
     return str(value) if isinstance(value, int) else "'" + str(value).replace("'", "''") + "'"
 
 
-def ingest(folder: Folder, examined: Sequence[Examined]) -> list[Entry]:
+def ingest(folder: ArchiveFolder, examined: Sequence[VerifiedLog]) -> list[ArchiveEntry]:
     """Writes a part with the rows of these logs, and gives their entries, which name it. The catalogue must follow."""
     sound = [each for each in examined if each.entry.indexed]
     if not sound:
@@ -126,8 +126,8 @@ def ingest(folder: Folder, examined: Sequence[Examined]) -> list[Entry]:
     part = sha256("".join(sorted(each.entry.log for each in sound)).encode()).hexdigest()[:32]
     with duckdb.connect() as engine:
         engine.execute(f"SET temp_directory = {quoted(folder.scratch)}")
-        _load(engine, "entries", Entry, (each.entry for each in sound), folder.scratch)
-        _load(engine, "steps", Step, (step for each in sound for step in each.steps), folder.scratch)
+        _load(engine, "entries", ArchiveEntry, (each.entry for each in sound), folder.scratch)
+        _load(engine, "steps", StepRecords, (step for each in sound for step in each.steps), folder.scratch)
         with _files(folder, sound) as files:
             _read(engine, files)
         _count(engine)
@@ -136,20 +136,20 @@ def ingest(folder: Folder, examined: Sequence[Examined]) -> list[Entry]:
     return [replace(each.entry, part=part) if each.entry.indexed else each.entry for each in examined]
 
 
-def lay_out(folder: Folder) -> None:
+def lay_out(folder: ArchiveFolder) -> None:
     """A part without rows, so that every table has its columns before there is anything in it."""
     if all((folder.table(table) / f"{NOTHING}.parquet").exists() for table in TABLES):
         return
     with _engine().cursor() as engine:
-        _load(engine, "entries", Entry, (), folder.scratch)
-        _load(engine, "steps", Step, (), folder.scratch)
+        _load(engine, "entries", ArchiveEntry, (), folder.scratch)
+        _load(engine, "steps", StepRecords, (), folder.scratch)
         types = ", ".join(f"{name} {kind}" for name, kind in _KINDS.items())
         engine.execute(f"CREATE TEMP TABLE raw (log VARCHAR, {types})")
         for table in TABLES:
             _write(engine, folder, table, NOTHING)
 
 
-def _write(engine: duckdb.DuckDBPyConnection, folder: Folder, table: str, part: str) -> None:
+def _write(engine: duckdb.DuckDBPyConnection, folder: ArchiveFolder, table: str, part: str) -> None:
     fresh = folder.scratch / f"{table}.parquet"
     engine.execute(f"COPY ({_ROWS[table]}) TO {quoted(fresh)} (FORMAT parquet, COMPRESSION zstd)")
     publish(fresh, folder.table(table) / f"{part}.parquet", folder.path)
@@ -203,7 +203,7 @@ def _write_lines(place: Path, data: Iterable[bytes]) -> None:
 
 
 @contextmanager
-def _files(folder: Folder, sound: Sequence[Examined]) -> Iterator[list[str]]:
+def _files(folder: ArchiveFolder, sound: Sequence[VerifiedLog]) -> Iterator[list[str]]:
     """The logs to read; of one that ends inside a line, a copy of its whole lines."""
     copies: list[Path] = []
     files = []

@@ -9,10 +9,10 @@ import msgspec
 
 from rtshcua.adapters.doctor.examination import ExaminingDriver, Talker
 from rtshcua.adapters.doctor.identity import firmware_of, those_that_matter
-from rtshcua.adapters.doctor.settings import SETTINGS, Setting
+from rtshcua.adapters.doctor.settings import SETTINGS, VehicleSetting
 from rtshcua.adapters.doctor.standing import Standing
-from rtshcua.adapters.utc import TimeOfDay
-from rtshcua.adapters.vehicle.bounds import Reach, reach_of
+from rtshcua.adapters.utc import TimeSources
+from rtshcua.adapters.vehicle.bounds import FlightReach, reach_of
 from rtshcua.adapters.vehicle.drain import drained
 from rtshcua.adapters.vehicle.preflight import SAME_MM
 from rtshcua.adapters.vehicle.returns import ONLY_ZERO, Need
@@ -69,7 +69,7 @@ def told_apart(agent: str, user: int, own: int) -> VehicleFinding:
 
 
 def diagnose(
-    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, time: TimeOfDay,
+    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, *, keyed: bool, time: TimeSources,
     unheard: frozenset[int] = frozenset(), named: bool = False,
     qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing] | None = None,
 ) -> Iterator[VehicleFinding]:  # fmt: skip
@@ -97,7 +97,7 @@ def diagnose(
 
 
 def _found(
-    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, keyed: bool, time: TimeOfDay,
+    vehicle: ExaminingDriver, policy: Policy, flown: Mission | None, keyed: bool, time: TimeSources,
     unheard: frozenset[int], named: bool,
     qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing] | None,
 ) -> Iterator[VehicleFinding]:  # fmt: skip
@@ -501,7 +501,7 @@ _STATE: Final = "`--utc-error 500ms`, here and for `run`, states how far its tim
 _STATE_THERE: Final = "`--utc-error US` in the boundary's own command line states how far its time of day is off"
 
 
-def _clock(vehicle: ExaminingDriver, time: TimeOfDay) -> VehicleFinding:
+def _clock(vehicle: ExaminingDriver, time: TimeSources) -> VehicleFinding:
     """By which time of day a run would judge, in the order in which it takes them."""
     ahead_us = vehicle.ahead_us
     if time.machine_us is None:
@@ -537,7 +537,7 @@ def _settings(
     if vehicle.parameters is None:
         return
     seen = vehicle.seen
-    reach = Reach()
+    reach = FlightReach()
     if flown is not None and seen.located:
         here = project(policy.projection, seen.latitude, seen.longitude)
         reach = reach_of(flown.invocations, policy, here)
@@ -548,7 +548,7 @@ def _settings(
 
 
 def settings_told(
-    flavour: str, values: Mapping[str, float], policy: Policy, reach: Reach,
+    flavour: str, values: Mapping[str, float], policy: Policy, reach: FlightReach,
     meant: Mapping[str, float] = MappingProxyType({}),
 ) -> Iterator[VehicleFinding]:  # fmt: skip
     """A finding for each of the parameters that were read, which a mission of that reach is to fly with. `meant` is
@@ -574,14 +574,14 @@ def _sees_voltage(policy: Policy) -> bool:
     return any(signal.dimension == Dimension.VOLTAGE.value for signal in policy.signals)
 
 
-def _words(setting: Setting, value: float) -> str:
+def _words(setting: VehicleSetting, value: float) -> str:
     if value == 0 and setting.at_zero:
         return setting.at_zero
     return f"{value * setting.mm / 1_000:g}{setting.unit}" if setting.mm else setting.words.get(value, f"{value:g}")
 
 
 def _setting(
-    setting: Setting,
+    setting: VehicleSetting,
     value: float,
     need: Need | None,
     meant: float | None,

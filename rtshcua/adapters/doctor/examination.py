@@ -11,15 +11,15 @@ from typing import Any, Final
 from rtshcua.adapters.doctor.settings import SETTINGS
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.driver import Driver
-from rtshcua.adapters.vehicle.link import Heard, is_radio
+from rtshcua.adapters.vehicle.link import DatagramContents, is_radio
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
-from rtshcua.mavlink.signing import Verifier
+from rtshcua.mavlink.signing import FrameVerifier
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.ports import Clock, Event, Readings, Said
+from rtshcua.onboard.ports import Clock, Event, Readings, StatusText
 
 _ASK_US: Final = 1_000_000
 _ONCE: Final = ("AUTOPILOT_VERSION", "HOME_POSITION", "SYSTEM_TIME")
@@ -39,7 +39,7 @@ class Talker:
     autopilot: int | None = None  # and MAV_AUTOPILOT
     sequence: int | None = None
 
-    def hear(self, frame: Received) -> None:
+    def hear(self, frame: ReceivedFrame) -> None:
         """Count one frame."""
         if self.sequence is not None:
             gap = (frame.sequence - self.sequence - 1) % 256
@@ -72,7 +72,7 @@ class ExaminingDriver(Driver):
     judges = True
 
     def __init__(
-        self, policy: Policy, clock: Clock, frames: FrameSession, verifier: Verifier | None = None,
+        self, policy: Policy, clock: Clock, frames: FrameSession, verifier: FrameVerifier | None = None,
         system: int | None = None, steps: Sequence[Invocation] = (), meant: Mapping[str, int] | None = None,
     ) -> None:  # fmt: skip
         super().__init__(policy, frames, fence=False, verifier=verifier, system=system, steps=steps, meant=meant)
@@ -90,7 +90,7 @@ class ExaminingDriver(Driver):
         self._heard_us = 0
         self._of_autopilot: set[str] = set()  # what the autopilot itself tells is taken from nobody else, as in a run
 
-    def receive(self, datagram: bytes, now_us: int) -> Heard:
+    def receive(self, datagram: bytes, now_us: int) -> DatagramContents:
         """As any driver, and keep what was heard: who speaks, and of what is believed what it says."""
         self._heard_us = now_us
         heard = super().receive(datagram, now_us)
@@ -146,7 +146,7 @@ class ExaminingDriver(Driver):
         else:
             told.count, told.last_us = told.count + 1, now_us
 
-    def _examine(self, frame: Received, now_us: int) -> None:
+    def _examine(self, frame: ReceivedFrame, now_us: int) -> None:
         """Take in what one frame of the vehicle says."""
         name, message = frame.name, frame.message
         if frame.component == AUTOPILOT:
@@ -176,5 +176,5 @@ class ExaminingDriver(Driver):
                 self.values.update(event.values)
                 for slot, _ in event.values:
                     self._count(slot)
-            elif isinstance(event, Said) and event.text not in self.texts and len(self.texts) < _MOST_TEXTS:
+            elif isinstance(event, StatusText) and event.text not in self.texts and len(self.texts) < _MOST_TEXTS:
                 self.texts.append(event.text)

@@ -9,13 +9,13 @@ from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle import returns
-from rtshcua.adapters.vehicle.bounds import Reach
+from rtshcua.adapters.vehicle.bounds import FlightReach
 from rtshcua.adapters.vehicle.returns import Need
 from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.policy import Policy, Vehicle
 
 
-class Setting(NamedTuple):
+class VehicleSetting(NamedTuple):
     """A parameter, what it is about, its values in words, and why some of them are worth a warning.
 
     `better` is a value to set in place of those. For a number, `mm` is how many mm, mm/s or ms one is, and `needs`
@@ -29,7 +29,7 @@ class Setting(NamedTuple):
     warns: Mapping[float, str] = {}
     better: float | None = None
     mm: int = 0
-    needs: Callable[[Policy, Reach], Need | None] = lambda _policy, _reach: None
+    needs: Callable[[Policy, FlightReach], Need | None] = lambda _policy, _reach: None
     otherwise: str = ""
     limit: returns.ReturnLimit | None = None
     battery: bool = False  # about a low battery
@@ -52,49 +52,49 @@ class Setting(NamedTuple):
         return " s" if "empty" in self.about else " m/s" if "speed" in self.about else " m"
 
 
-def _speed(policy: Policy, _: Reach) -> Need | None:
+def _speed(policy: Policy, _: FlightReach) -> Need | None:
     vehicle = policy.vehicle
     return Need(vehicle.speeds.cruise if vehicle.speeds else None, vehicle.speed) if vehicle.speed else None
 
 
-def _speed_and_return(policy: Policy, _: Reach) -> Need | None:
+def _speed_and_return(policy: Policy, _: FlightReach) -> Need | None:
     vehicle = policy.vehicle
     least = max(vehicle.speeds.cruise, vehicle.speeds.homeward) if vehicle.speeds else None
     return Need(least, vehicle.speed) if vehicle.speed else None
 
 
-def _climb(policy: Policy, _: Reach) -> Need | None:
+def _climb(policy: Policy, _: FlightReach) -> Need | None:
     vehicle = policy.vehicle
     return Need(vehicle.speeds.climb if vehicle.speeds else None, vehicle.climb) if vehicle.climb else None
 
 
-def _descent(policy: Policy, _: Reach) -> Need | None:
+def _descent(policy: Policy, _: FlightReach) -> Need | None:
     vehicle = policy.vehicle
     return Need(vehicle.speeds.descent if vehicle.speeds else None, vehicle.climb) if vehicle.climb else None
 
 
-def _takeoff(policy: Policy, _: Reach) -> Need | None:
+def _takeoff(policy: Policy, _: FlightReach) -> Need | None:
     return Need(policy.vehicle.speeds.climb) if policy.vehicle.speeds else None
 
 
-def _homeward(policy: Policy, _: Reach) -> Need | None:
+def _homeward(policy: Policy, _: FlightReach) -> Need | None:
     return Need(policy.vehicle.speeds.homeward) if policy.vehicle.speeds else None
 
 
-def _landing(policy: Policy, _: Reach) -> Need | None:
+def _landing(policy: Policy, _: FlightReach) -> Need | None:
     return Need(policy.vehicle.speeds.landing) if policy.vehicle.speeds else None
 
 
-def _slow_below(policy: Policy, _: Reach) -> Need | None:
+def _slow_below(policy: Policy, _: FlightReach) -> Need | None:
     return Need(most=policy.vehicle.speeds.landing_below) if policy.vehicle.speeds else None
 
 
-def _gains(slows: int) -> Callable[[Policy, Reach], Need | None]:
+def _gains(slows: int) -> Callable[[Policy, FlightReach], Need | None]:
     """What it must gain of speed in a second to keep its acceleration on a whole leg, slowing down by no more than
     `slows` mm/s in a second before a target, as recorded.
     """
 
-    def needs(policy: Policy, _: Reach) -> Need | None:
+    def needs(policy: Policy, _: FlightReach) -> Need | None:
         if policy.vehicle.speeds is None:
             return None
         kept = policy.vehicle.speeds.acceleration
@@ -107,30 +107,30 @@ def _gains(slows: int) -> Callable[[Policy, Reach], Need | None]:
     return needs
 
 
-def _returns(policy: Policy, _: Reach) -> Need | None:
+def _returns(policy: Policy, _: FlightReach) -> Need | None:
     height = policy.vehicle.return_altitude
     return Need(height, height) if height else None
 
 
-def _lasts(policy: Policy, _: Reach) -> Need | None:
+def _lasts(policy: Policy, _: FlightReach) -> Need | None:
     """For how long a full battery flies, ms."""
     vehicle = policy.vehicle
     return Need(-(-(vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us) // 1_000))
 
 
-def _of(needs: Callable[[Vehicle], Need | None]) -> Callable[[Policy, Reach], Need | None]:
+def _of(needs: Callable[[Vehicle], Need | None]) -> Callable[[Policy, FlightReach], Need | None]:
     return lambda policy, _: needs(policy.vehicle)
 
 
-def _far(policy: Policy, reach: Reach) -> Need | None:
+def _far(policy: Policy, reach: FlightReach) -> Need | None:
     return Need(least=reach.farthest + policy.vehicle.position_error) if reach.farthest else None
 
 
-def _high(policy: Policy, reach: Reach) -> Need | None:
+def _high(policy: Policy, reach: FlightReach) -> Need | None:
     return Need(least=reach.highest + policy.vehicle.position_error) if reach.highest else None
 
 
-def _low(policy: Policy, reach: Reach) -> Need | None:
+def _low(policy: Policy, reach: FlightReach) -> Need | None:
     return None if reach.lowest is None else Need(most=reach.lowest - policy.vehicle.position_error)
 
 
@@ -146,146 +146,152 @@ _FENCES: Final[Mapping[float, str]] = {
 _LOST: Final[Mapping[float, str]] = {0: "nothing", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "lockdown"}
 _MOTORS_OFF: Final = "the motors stop in the air"
 
-SETTINGS: Final[Mapping[str, tuple[Setting, ...]]] = {
+SETTINGS: Final[Mapping[str, tuple[VehicleSetting, ...]]] = {
     "px4": (
-        Setting("NAV_DLL_ACT", "when the ground station is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
-        Setting("NAV_RCL_ACT", "when the remote control is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
-        Setting(
+        VehicleSetting("NAV_DLL_ACT", "when the ground station is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
+        VehicleSetting("NAV_RCL_ACT", "when the remote control is lost", _LOST, {5: _MOTORS_OFF, 6: _MOTORS_OFF}),
+        VehicleSetting(
             "COM_LOW_BAT_ACT", "when the battery is low", {0: "warns only", 2: "land", 3: "return, then land"},
             {0: "the autopilot does not react to an empty battery"}, 3, battery=True,
         ),
-        Setting(
+        VehicleSetting(
             "GF_ACTION", "at the fence",
             {0: "nothing", 1: "warns only", 2: "hold", 3: "return", 4: "terminate", 5: "land"},
             {0: "its fence is no second line of defence", 1: "its fence gives no second protection", 4: _MOTORS_OFF},
             2,
         ),
-        Setting("GF_MAX_HOR_DIST", "radius of its own fence around home (0: no limit)", mm=1_000, needs=_far),
-        Setting("GF_MAX_VER_DIST", "height of its own fence above home (0: no limit)", mm=1_000, needs=_high),
-        Setting("RTL_RETURN_ALT", "height of a return", mm=1_000, needs=_returns),
-        Setting("RTL_CONE_ANG", "half angle, in degrees, of the cone around home in which a return is low (0: none)"),
-        Setting("RTL_MIN_DIST", "distance from home at which a return may be low", mm=1_000, needs=_of(returns.near)),
-        Setting("NAV_MC_ALT_RAD", "error at which a height counts as reached", mm=1_000, needs=_of(returns.corner)),
-        Setting("RTL_TYPE", "where a return goes", returns.RETURNS_TO, limit=returns.RTL_TYPE),
-        Setting("MPC_XY_CRUISE", "horizontal speed where a step names none", mm=1_000, needs=_speed_and_return),
-        Setting("MPC_XY_VEL_MAX", "maximum horizontal speed", mm=1_000),
-        Setting("MPC_Z_VEL_MAX_UP", "maximum climb speed", mm=1_000, needs=_climb),
-        Setting("MPC_Z_VEL_MAX_DN", "maximum descent speed", mm=1_000, needs=_descent),
-        Setting("MPC_TKO_SPEED", "climb speed at takeoff", mm=1_000, needs=_takeoff),
-        Setting("MPC_LAND_SPEED", "descent speed at the end of a landing", mm=1_000, needs=_landing),
-        Setting("MPC_LAND_ALT1", "height above home below which a landing is slow", mm=1_000, needs=_slow_below),
-        Setting("MPC_ACC_HOR", "horizontal speed gained in a second", mm=1_000, needs=_gains(750)),
-        Setting(
+        VehicleSetting("GF_MAX_HOR_DIST", "radius of its own fence around home (0: no limit)", mm=1_000, needs=_far),
+        VehicleSetting("GF_MAX_VER_DIST", "height of its own fence above home (0: no limit)", mm=1_000, needs=_high),
+        VehicleSetting("RTL_RETURN_ALT", "height of a return", mm=1_000, needs=_returns),
+        VehicleSetting("RTL_CONE_ANG", "half angle (degrees) of the cone around home with low returns (0: none)"),
+        VehicleSetting("RTL_MIN_DIST", "distance from home at which a return may be low", mm=1_000,
+            needs=_of(returns.near)),
+        VehicleSetting("NAV_MC_ALT_RAD", "error at which a height counts as reached", mm=1_000,
+            needs=_of(returns.corner)),
+        VehicleSetting("RTL_TYPE", "where a return goes", returns.RETURNS_TO, limit=returns.RTL_TYPE),
+        VehicleSetting("MPC_XY_CRUISE", "horizontal speed where a step names none", mm=1_000, needs=_speed_and_return),
+        VehicleSetting("MPC_XY_VEL_MAX", "maximum horizontal speed", mm=1_000),
+        VehicleSetting("MPC_Z_VEL_MAX_UP", "maximum climb speed", mm=1_000, needs=_climb),
+        VehicleSetting("MPC_Z_VEL_MAX_DN", "maximum descent speed", mm=1_000, needs=_descent),
+        VehicleSetting("MPC_TKO_SPEED", "climb speed at takeoff", mm=1_000, needs=_takeoff),
+        VehicleSetting("MPC_LAND_SPEED", "descent speed at the end of a landing", mm=1_000, needs=_landing),
+        VehicleSetting("MPC_LAND_ALT1", "height above home below which a landing is slow", mm=1_000, needs=_slow_below),
+        VehicleSetting("MPC_ACC_HOR", "horizontal speed gained in a second", mm=1_000, needs=_gains(750)),
+        VehicleSetting(
             "CP_DIST", "distance kept by collision prevention, in position flight (below 0: off)", mm=1_000,
         ),
-        Setting("EKF2_NOAID_TOUT", "dead reckoning, in us, after which the position counts as lost"),
-        Setting("COM_POS_FS_EPH", "horizontal error, in m, at which the position counts as lost"),
-        Setting(
+        VehicleSetting("EKF2_NOAID_TOUT", "dead reckoning, in us, after which the position counts as lost"),
+        VehicleSetting("COM_POS_FS_EPH", "horizontal error, in m, at which the position counts as lost"),
+        VehicleSetting(
             "COM_RC_OVERRIDE", "sticks take over",
             {0: "never", 1: "in automatic modes", 2: "in offboard", 3: "in automatic modes and offboard"},
             {0: "the pilot's sticks end nothing: a switch has to", 2: "the pilot's sticks end nothing in Hold"}, 1,
         ),
-        Setting(
+        VehicleSetting(
             "COM_OBL_RC_ACT", "when offboard control is lost",
             {0: "position", 1: "altitude", 2: "stabilised", 3: "return", 4: "land", 5: "hold", 6: "terminate"},
             {6: _MOTORS_OFF},
         ),
-        Setting("COM_DISARM_PRFLT", "seconds until it disarms on the ground", {}, {}),
-        Setting(  # PX4's simulators alone have it (docs.px4.io/v1.16/en/simulation/failsafes): 60 as it is delivered
+        VehicleSetting("COM_DISARM_PRFLT", "seconds until it disarms on the ground", {}, {}),
+        VehicleSetting(  # only PX4's simulators have it (docs.px4.io/v1.16/en/simulation/failsafes); 60 by default
             "SIM_BAT_DRAIN", "time until a full simulated battery is empty (0: never)", mm=1_000, needs=_lasts,
         ),
     ),
     "ardupilot": (
-        Setting(
+        VehicleSetting(
             "FS_GCS_ENABLE", "when the ground station is lost",
             {0: "nothing", 1: "return", 2: "go on if in a mission", 3: "SmartRTL or return", 4: "SmartRTL or land",
              5: "land"},
             {},
         ),
-        Setting(
+        VehicleSetting(
             "FS_THR_ENABLE", "when the remote control is lost",
             {0: "nothing", 1: "return", 2: "go on if in a mission", 3: "land", 4: "SmartRTL or return",
              5: "SmartRTL or land"},
             {},
         ),
-        Setting(
+        VehicleSetting(
             "BATT_FS_LOW_ACT", "when the battery is low",
             {0: "warns only", 1: "land", 2: "return", 3: "SmartRTL or return", 4: "SmartRTL or land", 5: "terminate"},
             {0: "the autopilot does not react to an empty battery", 5: _MOTORS_OFF}, 2,
             battery=True,
         ),
-        Setting(
+        VehicleSetting(
             "BATT_FS_CRT_ACT", "when the battery is critical",
             {0: "warns only", 1: "land", 2: "return", 3: "SmartRTL or return", 4: "SmartRTL or land", 5: "terminate"},
             {5: _MOTORS_OFF}, 1,
         ),
-        Setting(
+        VehicleSetting(
             "FS_DR_ENABLE", "when it flies by dead reckoning",
             {0: "nothing", 1: "land", 2: "return", 3: "SmartRTL or return", 4: "SmartRTL or land"},
             {0: "the autopilot flies on without a position"}, 1,
         ),
-        Setting(
+        VehicleSetting(
             "FS_EKF_ACTION", "when the estimator fails",
             {0: "reports only", 1: "land", 2: "altitude hold", 3: "land, even in a manual mode"},
             {0: "the autopilot flies on without knowing where it is"}, 1,
         ),
-        Setting(
+        VehicleSetting(
             "FENCE_ENABLE", "fence", {0: "off", 1: "on"}, {0: "its fence is off until a flight of ours switches it on"}
         ),
-        Setting(
+        VehicleSetting(
             "FENCE_AUTOENABLE", "fence switched on automatically",
             {0: "no", 1: "at takeoff", 2: "at takeoff, without the floor when landing", 3: "when armed"},
         ),
-        Setting("FENCE_TYPE", "what the fence is, once it is on", _FENCES),
-        Setting("FENCE_RADIUS", "radius of its circular fence around home", mm=1_000, needs=_far),
-        Setting("FENCE_ALT_MAX", "ceiling of its fence above home", mm=1_000, needs=_high),
-        Setting("FENCE_ALT_MIN", "floor of its fence above home", mm=1_000, needs=_low),
-        Setting("FENCE_MARGIN", "margin that it keeps to its fence", mm=1_000),
-        Setting("RTL_ALT", "height of a return", mm=10, needs=_returns),
-        Setting("RTL_ALT_M", "height of a return", mm=1_000, needs=_returns),
-        Setting(
+        VehicleSetting("FENCE_TYPE", "what the fence is, once it is on", _FENCES),
+        VehicleSetting("FENCE_RADIUS", "radius of its circular fence around home", mm=1_000, needs=_far),
+        VehicleSetting("FENCE_ALT_MAX", "ceiling of its fence above home", mm=1_000, needs=_high),
+        VehicleSetting("FENCE_ALT_MIN", "floor of its fence above home", mm=1_000, needs=_low),
+        VehicleSetting("FENCE_MARGIN", "margin that it keeps to its fence", mm=1_000),
+        VehicleSetting("RTL_ALT", "height of a return", mm=10, needs=_returns),
+        VehicleSetting("RTL_ALT_M", "height of a return", mm=1_000, needs=_returns),
+        VehicleSetting(
             "RTL_CONE_SLOPE", "slope of the cone in which a return is low near home (0: none)", mm=1_000,
             needs=_of(returns.slope),
         ),
-        Setting("RTL_CLIMB_MIN", "least climb at the start of a return", mm=10, needs=_of(returns.climb)),
-        Setting("RTL_CLIMB_MIN_M", "least climb at the start of a return", mm=1_000, needs=_of(returns.climb)),
-        Setting("RTL_ALT_TYPE", "height of a return counts from", returns.HEIGHTS_FROM, limit=returns.RTL_ALT_TYPE),
-        Setting("RALLY_TOTAL", "rally points, to which a return may go", limit=returns.RALLY_TOTAL),
-        Setting("WPNAV_RADIUS", "distance from a waypoint at which it turns", mm=10, needs=_of(returns.corner)),
-        Setting("WP_RADIUS_M", "distance from a waypoint at which it turns", mm=1_000, needs=_of(returns.corner)),
-        Setting(
+        VehicleSetting("RTL_CLIMB_MIN", "least climb at the start of a return", mm=10, needs=_of(returns.climb)),
+        VehicleSetting("RTL_CLIMB_MIN_M", "least climb at the start of a return", mm=1_000, needs=_of(returns.climb)),
+        VehicleSetting("RTL_ALT_TYPE", "height of a return counts from", returns.HEIGHTS_FROM,
+            limit=returns.RTL_ALT_TYPE),
+        VehicleSetting("RALLY_TOTAL", "rally points, to which a return may go", limit=returns.RALLY_TOTAL),
+        VehicleSetting("WPNAV_RADIUS", "distance from a waypoint at which it turns", mm=10, needs=_of(returns.corner)),
+        VehicleSetting("WP_RADIUS_M", "distance from a waypoint at which it turns", mm=1_000,
+            needs=_of(returns.corner)),
+        VehicleSetting(
             "AVOID_ENABLE", "avoids, in LOITER and GUIDED velocity flight",
             {0: "nothing", 1: "fences", 2: "obstacles", 3: "fences and obstacles", 4: "beacon fences",
              7: "fences, obstacles and beacon fences"},
         ),
-        Setting("WPNAV_SPEED", "horizontal speed where a step names none", mm=10, needs=_speed),
-        Setting("WPNAV_SPEED_UP", "climb speed", mm=10, needs=_climb),
-        Setting("WPNAV_SPEED_DN", "descent speed", mm=10, needs=_descent),
-        Setting("WPNAV_ACCEL", "horizontal speed gained in a second", mm=10, needs=_gains(1_250)),
-        Setting(
+        VehicleSetting("WPNAV_SPEED", "horizontal speed where a step names none", mm=10, needs=_speed),
+        VehicleSetting("WPNAV_SPEED_UP", "climb speed", mm=10, needs=_climb),
+        VehicleSetting("WPNAV_SPEED_DN", "descent speed", mm=10, needs=_descent),
+        VehicleSetting("WPNAV_ACCEL", "horizontal speed gained in a second", mm=10, needs=_gains(1_250)),
+        VehicleSetting(
             "RTL_SPEED", "horizontal speed of a return (0: as elsewhere)", mm=10, needs=_homeward,
             otherwise="WPNAV_SPEED",
         ),
-        Setting("LAND_SPEED", "descent speed at the end of a landing", mm=10, needs=_landing),
-        Setting("LAND_ALT_LOW", "height above home below which a landing is slow", mm=10, needs=_slow_below),
-        Setting("WP_SPD", "horizontal speed where a step names none", mm=1_000, needs=_speed),
-        Setting("WP_SPD_UP", "climb speed", mm=1_000, needs=_climb),
-        Setting("WP_SPD_DN", "descent speed", mm=1_000, needs=_descent),
-        Setting("WP_ACC", "horizontal speed gained in a second", mm=1_000, needs=_gains(1_250)),
-        Setting(
+        VehicleSetting("LAND_SPEED", "descent speed at the end of a landing", mm=10, needs=_landing),
+        VehicleSetting("LAND_ALT_LOW", "height above home below which a landing is slow", mm=10, needs=_slow_below),
+        VehicleSetting("WP_SPD", "horizontal speed where a step names none", mm=1_000, needs=_speed),
+        VehicleSetting("WP_SPD_UP", "climb speed", mm=1_000, needs=_climb),
+        VehicleSetting("WP_SPD_DN", "descent speed", mm=1_000, needs=_descent),
+        VehicleSetting("WP_ACC", "horizontal speed gained in a second", mm=1_000, needs=_gains(1_250)),
+        VehicleSetting(
             "RTL_SPEED_MS", "horizontal speed of a return (0: as elsewhere)", mm=1_000, needs=_homeward,
             otherwise="WP_SPD",
         ),
-        Setting("LAND_SPD_MS", "descent speed at the end of a landing", mm=1_000, needs=_landing),
-        Setting("LAND_ALT_LOW_M", "height above home below which a landing is slow", mm=1_000, needs=_slow_below),
-        Setting(
+        VehicleSetting("LAND_SPD_MS", "descent speed at the end of a landing", mm=1_000, needs=_landing),
+        VehicleSetting("LAND_ALT_LOW_M", "height above home below which a landing is slow", mm=1_000,
+            needs=_slow_below),
+        VehicleSetting(
             "FENCE_ACTION", "at the fence",
             {0: "reports only", 1: "return or land", 2: "land", 3: "SmartRTL, return or land", 4: "brake or land",
              5: "SmartRTL or land"},
             {0: "its fence is no second line of defence"}, 1,
         ),
-        Setting("ARMING_CHECK", "checks before arming", {0: "none", 1: "all"}, {0: "it arms whatever is wrong"}, 1),
-        Setting("ARMING_SKIPCHK", "checks left out before arming", {0: "none"}, {}),
-        Setting("DISARM_DELAY", "seconds until it disarms on the ground", {}, {}),
+        VehicleSetting("ARMING_CHECK", "checks before arming", {0: "none", 1: "all"},
+            {0: "it arms whatever is wrong"}, 1),
+        VehicleSetting("ARMING_SKIPCHK", "checks left out before arming", {0: "none"}, {}),
+        VehicleSetting("DISARM_DELAY", "seconds until it disarms on the ground", {}, {}),
     ),
 }  # fmt: skip

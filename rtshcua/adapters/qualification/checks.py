@@ -11,12 +11,12 @@ from typing import Final
 
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.adapters.qualification.observed import (
+    MotionSample,
     ObservedCommand,
     ObservedQualification,
     ObservedSilence,
     ObservedSortie,
     ObservedTakeover,
-    Sample,
     TakeoverKind,
 )
 from rtshcua.adapters.qualification.sortie import SILENCES_US, SORTIES
@@ -201,7 +201,7 @@ def _speeds(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[Quali
     yield _check("fly/speed", least <= peak <= most, expected, _speed(peak), most, peak, _MM_S, advice)
 
 
-def _kept_climb(samples: Sequence[Sample]) -> int:
+def _kept_climb(samples: Sequence[MotionSample]) -> int:
     """The fastest climb that was kept for so long, mm/s: a takeoff takes metres to come to speed (PX4: to
     MPC_TKO_SPEED, ramped), so one that is stopped half-way tells little by its mean.
     """
@@ -216,7 +216,7 @@ def _kept_climb(samples: Sequence[Sample]) -> int:
     return best
 
 
-def _flown(observed: ObservedQualification, kind: MotionKind) -> list[tuple[ObservedCommand, list[Sample]]]:
+def _flown(observed: ObservedQualification, kind: MotionKind) -> list[tuple[ObservedCommand, list[MotionSample]]]:
     """The commands of a kind that were sent, and the samples while each flew."""
     return [
         (command, _while(sortie, command))
@@ -226,7 +226,7 @@ def _flown(observed: ObservedQualification, kind: MotionKind) -> list[tuple[Obse
     ]
 
 
-def _while(sortie: ObservedSortie, command: ObservedCommand) -> list[Sample]:
+def _while(sortie: ObservedSortie, command: ObservedCommand) -> list[MotionSample]:
     since, until = command.sent_us or command.begun_us, command.ended_us
     return [each for each in sortie.samples if since <= each.at_us and (until is None or each.at_us <= until)]
 
@@ -286,14 +286,14 @@ def _stop(
     return _check(slug, holds, expected, f"{_metres(way)} in {_time(took_us)}", limit, way, _MM, advice)
 
 
-def _stood(samples: Sequence[Sample]) -> int | None:
+def _stood(samples: Sequence[MotionSample]) -> int | None:
     """From which sample on it stands; None where it does not."""
     moving = [number for number, each in enumerate(samples) if _whole_speed(each) > STILL]
     stood = moving[-1] + 1 if moving else 0
     return stood if stood < len(samples) else None
 
 
-def _hold(slug: str, samples: Sequence[Sample], limit: int) -> QualificationCheck:
+def _hold(slug: str, samples: Sequence[MotionSample], limit: int) -> QualificationCheck:
     expected, stood = f"stays within {_metres(limit)} of where it stopped", _stood(samples)
     if stood is None:
         return _check(slug, False, expected, "it does not come to stand")
@@ -301,15 +301,15 @@ def _hold(slug: str, samples: Sequence[Sample], limit: int) -> QualificationChec
     return _check(slug, strays <= limit, expected, _metres(strays), limit, strays, _MM)
 
 
-def _whole_speed(sample: Sample) -> int:
+def _whole_speed(sample: MotionSample) -> int:
     return round(hypot(sample.speed, sample.climb))
 
 
-def _way(one: Sample, other: Sample) -> int:
+def _way(one: MotionSample, other: MotionSample) -> int:
     return round(hypot(_across(one, other), one.height - other.height))
 
 
-def _across(one: Sample, other: Sample) -> int:
+def _across(one: MotionSample, other: MotionSample) -> int:
     return round(apart(other.latitude, other.longitude, one.latitude, one.longitude))
 
 
@@ -340,7 +340,7 @@ def _ends(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[Qualifi
 
 def _ended(
     observed: ObservedQualification, slug: str, name: str, kind: MotionKind, limit: int, expected: str,
-    to: Callable[[ObservedSortie, Sequence[Sample]], Sample],
+    to: Callable[[ObservedSortie, Sequence[MotionSample]], MotionSample],
 ) -> QualificationCheck:  # fmt: skip
     flown = observed.sortie(name)
     command = None if flown is None else next((each for each in flown.commands if each.kind == kind), None)

@@ -33,7 +33,7 @@ _PILOT_US: Final = 30_000_000
 NAME: Final = "qualification"
 
 
-class Trial(NamedTuple):
+class SortiePlan(NamedTuple):
     """How high the sorties are, how long and fast their legs, and which way they go."""
 
     height: int
@@ -42,10 +42,10 @@ class Trial(NamedTuple):
     bearing: int
 
 
-def trials() -> Iterator[Trial]:
+def trials() -> Iterator[SortiePlan]:
     """What is tried, the most telling first."""
     for height, leg, speed, bearing in product(_HEIGHTS_MM, _LEGS_MM, _SPEEDS_MM_S, _BEARINGS_DEG):
-        yield Trial(height, leg, speed, bearing)
+        yield SortiePlan(height, leg, speed, bearing)
 
 
 def skill_of(policy: Policy, kind: MotionKind) -> Contract | None:
@@ -54,7 +54,9 @@ def skill_of(policy: Policy, kind: MotionKind) -> Contract | None:
     return next((each for each in those if each.name == _SHIPPED[kind]), those[0] if those else None)
 
 
-def source_of(sortie: Sortie, trial: Trial, imported: str, policy: Policy, mission: Mission, *, by_pilot: bool) -> str:
+def source_of(
+    sortie: Sortie, trial: SortiePlan, imported: str, policy: Policy, mission: Mission, *, by_pilot: bool
+) -> str:
     """The source of a sortie's mission: beside the file `imported`, by whoever proposes `mission`, under its policy.
 
     Raises LookupError with the kind of motion for which the policy has no skill.
@@ -88,7 +90,7 @@ def _held(sortie: Sortie, *, by_pilot: bool) -> int:
     return _AROUND_US + _EACH_US * len(sortie.silences) if sortie.silences else _HOLD_US
 
 
-def _step(contract: Contract, hold_us: int, trial: Trial, policy: Policy) -> str:
+def _step(contract: Contract, hold_us: int, trial: SortiePlan, policy: Policy) -> str:
     motion, arguments = contract.motion, []
     for each in contract.parameters:
         if each.kind == PLACE and motion.kind == MotionKind.FLY:
@@ -106,7 +108,7 @@ def _within(parameter: Parameter, value: int) -> int:
     return min(max(value, parameter.low), parameter.high)
 
 
-def _place(trial: Trial, policy: Policy) -> str:
+def _place(trial: SortiePlan, policy: Policy) -> str:
     angle = radians(trial.bearing)
     east, north = round(trial.leg * sin(angle)), round(trial.leg * cos(angle))
     latitude, longitude = unproject(policy.projection, east, north)

@@ -20,7 +20,7 @@ class TakeoverKind(StrEnum):
     TARGET = "target"
 
 
-class Sample(NamedTuple):
+class MotionSample(NamedTuple):
     """A report of place and speed: over ground and upwards."""
 
     at_us: int
@@ -97,7 +97,7 @@ class ObservedSortie:
     """One sortie, from its takeoff to the ground."""
 
     name: str
-    samples: list[Sample] = field(default_factory=list)
+    samples: list[MotionSample] = field(default_factory=list)
     commands: list[ObservedCommand] = field(default_factory=list)
     answers: list[ObservedAnswer] = field(default_factory=list)
     beats: list[int] = field(default_factory=list)

@@ -14,12 +14,12 @@ from typing import Any, Final
 
 from rtshcua.adapters.doctor.identity import IdentityQuestions
 from rtshcua.adapters.qualification.observed import (
+    MotionSample,
     ObservedAnswer,
     ObservedCommand,
     ObservedSilence,
     ObservedSortie,
     ObservedTakeover,
-    Sample,
     TakeoverKind,
 )
 from rtshcua.adapters.qualification.station import GroundStation
@@ -28,13 +28,13 @@ from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.effects import Effect, apart
 from rtshcua.adapters.vehicle.flavour import Stage, Stages
-from rtshcua.adapters.vehicle.link import Heard
+from rtshcua.adapters.vehicle.link import DatagramContents
 from rtshcua.adapters.vehicle.manoeuvre import AGAIN_US, LATE_US
 from rtshcua.adapters.vehicle.messages import REPOSITION, Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.streams import IN_THE_AIR
-from rtshcua.codec.frames import Received, is_addressed
+from rtshcua.codec.frames import ReceivedFrame, is_addressed
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.model.flat.contract import MotionKind
@@ -180,10 +180,10 @@ class QualifyingDriver(Driver):
 
     # -------------------------------------------------------- what comes in and goes out
 
-    def receive(self, datagram: bytes, now_us: int) -> Heard:
+    def receive(self, datagram: bytes, now_us: int) -> DatagramContents:
         """As any driver, but that nothing is heard in a silence."""
         if self._is_silent(now_us):
-            return Heard([], [], [])
+            return DatagramContents([], [], [])
         self._look_again(now_us)
         heard = super().receive(datagram, now_us)
         for frame in heard.frames:
@@ -292,13 +292,13 @@ class QualifyingDriver(Driver):
 
     # -------------------------------------------------------- what is seen
 
-    def _observe(self, frame: Received, now_us: int) -> None:
+    def _observe(self, frame: ReceivedFrame, now_us: int) -> None:
         name, message, found = frame.name, frame.message, self.found
         match name:
             case "GLOBAL_POSITION_INT" if self.seen.located:
                 speed = round(10 * hypot(message.vx, message.vy))
                 found.samples.append(
-                    Sample(now_us, message.lat, message.lon, message.relative_alt, speed, -10 * message.vz)
+                    MotionSample(now_us, message.lat, message.lon, message.relative_alt, speed, -10 * message.vz)
                 )
             case "HEARTBEAT" if self.speaks(message):
                 flies = self._current is not None and self._current.ended_us is None and found.takeover is None
@@ -332,7 +332,7 @@ class QualifyingDriver(Driver):
                     self._of(token).sent_us = now_us
                 case ports.Succeeded(_, token):
                     self._ends(self._of(token), now_us, "succeeded")
-                case ports.Failed(_, token, reason):
+                case ports.CommandFailed(_, token, reason):
                     self._ends(self._of(token), now_us, reason)
                     self._shown(reason, now_us)
                 case ports.TakenOver(_, how):

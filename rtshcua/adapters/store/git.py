@@ -61,7 +61,7 @@ class NoChanges(Exception):
         self.help = help
 
 
-class Changes(NamedTuple):
+class GitChanges(NamedTuple):
     """What differs in the repositories whose folders are `tops`: files, deleted ones included, and whole folders, such
     as submodules and what a link to a folder leads to. All paths are absolute, and free of links but for the last part.
     """
@@ -79,7 +79,7 @@ class Changes(NamedTuple):
         return False if all(_is_below(place, self.tops) for place in places) else None
 
 
-def changed_files(paths: Iterable[Path], base: str | None = None) -> Changes:
+def changed_files(paths: Iterable[Path], base: str | None = None) -> GitChanges:
     """What differs from `base`, or is not known to git yet, in the repositories that `paths` lie in.
 
     With a `base`, what counts is the commit at which this branch left it; without one, the last commit. Raises
@@ -94,7 +94,7 @@ def changed_files(paths: Iterable[Path], base: str | None = None) -> Changes:
             files.add(place)
             if os.path.isdir(place):  # noqa: PTH112
                 folders[os.path.realpath(place)] = None
-    return Changes(frozenset(files), tuple(folders), tuple(top for top, _ in tops))
+    return GitChanges(frozenset(files), tuple(folders), tuple(top for top, _ in tops))
 
 
 def _names(top: str, around: _Around, base: str | None) -> list[str]:

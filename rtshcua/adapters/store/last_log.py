@@ -18,7 +18,7 @@ import msgspec
 from rtshcua.adapters.store.reading import read_if_there
 from rtshcua.adapters.store.recovery import InUse, Recovered
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace
-from rtshcua.evidence.recovery import RECOVERABLE, State
+from rtshcua.evidence.recovery import RECOVERABLE, LogState
 
 #: the folder, in the state folder, of what simulated vehicles that a run starts itself leave behind: nothing of them
 #: hangs in the air, or has parameters to be put back, when the real one of that identity is connected
@@ -37,7 +37,7 @@ class _Kept(msgspec.Struct):
     last: _Hash | None = None
 
 
-class Earlier(NamedTuple):
+class PreviousLog(NamedTuple):
     """The log before the next one: the hash of its last line, None where there is none or it is not known; what there
     is to tell of it, empty where all is as it should be; where it lies, if its flight is not known to have ended it;
     where it lies, if it may be believed; and whether it is gone, so that nobody knows.
@@ -58,26 +58,26 @@ class LastLog:
     def __init__(self, state: Path, vehicle: str) -> None:
         self.path = state / "logs" / f"vehicle-{quote(vehicle, safe='')}"
 
-    def settle(self, recover: Callable[[Path], Recovered]) -> Earlier:
+    def settle(self, recover: Callable[[Path], Recovered]) -> PreviousLog:
         """The last log; `recover` ends it where it has no end, if it can. Never raises: no flight waits for a log."""
         try:
             known = _remembered(self.path)
         except (OSError, ValueError) as error:
-            return Earlier(None, f"it is not known which log came before: `{self.path}`: {_words(error)}")
+            return PreviousLog(None, f"it is not known which log came before: `{self.path}`: {_words(error)}")
         if known is None:
-            return Earlier(None)
+            return PreviousLog(None)
         log = Path(known.log)
         if known.last is not None:
-            return Earlier(known.last, log=log)
+            return PreviousLog(known.last, log=log)
         try:
             return _told(log, known.before, recover(log))._replace(broken_off=log)
         except FileNotFoundError:
             text = f"the log before, `{log}`, is no longer there: whether its flight ended is not known"
-            return Earlier(None, text, log, gone=True)
+            return PreviousLog(None, text, log, gone=True)
         except (OSError, InUse) as error:
             living = isinstance(error, InUse)  # its run flies on, and broke off nowhere
             text = f"the log before, `{log}`, was not closed, nor can it be: {_words(error)}"
-            return Earlier(None, text, None if living else log)
+            return PreviousLog(None, text, None if living else log)
 
     def begin(self, log: Path, before: str | None) -> None:
         """A log was made that will name `before`. Raises OSError."""
@@ -113,22 +113,22 @@ def _remembered(path: Path) -> _Kept | None:
         raise ValueError("it is damaged") from None
 
 
-def _told(log: Path, before: str | None, done: Recovered) -> Earlier:
+def _told(log: Path, before: str | None, done: Recovered) -> PreviousLog:
     found = done.found
     if done.done:
         text = f"the log before, `{log}`, was not closed: it is recovered, {found.records} records of it are kept"
         note = text if not found.discarded else f"{text}, {found.discarded} octets discarded"
-        return Earlier(done.last, note, log=log)
-    if found.state is State.CLOSED:
-        return Earlier(done.last, log=log)
+        return PreviousLog(done.last, note, log=log)
+    if found.state is LogState.CLOSED:
+        return PreviousLog(done.last, log=log)
     if found.state in RECOVERABLE:
         text = f"the log before, `{log}`, was not closed: `rtshcua recover` ends it, where the log's key is"
-        return Earlier(done.last, text, log=log)
-    if found.state is State.UNBEGUN:
-        return Earlier(before)
+        return PreviousLog(done.last, text, log=log)
+    if found.state is LogState.UNBEGUN:
+        return PreviousLog(before)
     reason = "" if found.reason is None else f" (record {found.reason.record}: {found.reason.text})"
-    what = "was tampered with" if found.state is State.TAMPERED else "is of another log key"
-    return Earlier(done.last, f"the log before, `{log}`, {what} and is left as it is{reason}")
+    what = "was tampered with" if found.state is LogState.TAMPERED else "is of another log key"
+    return PreviousLog(done.last, f"the log before, `{log}`, {what} and is left as it is{reason}")
 
 
 def _words(error: Exception) -> str:

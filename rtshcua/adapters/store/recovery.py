@@ -29,7 +29,7 @@ from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, Recover
-from rtshcua.evidence.recovery import RECOVERABLE, Examination, Examined, State, ending
+from rtshcua.evidence.recovery import RECOVERABLE, Examination, FoundLog, LogState, ending
 from rtshcua.evidence.witnessing.anchors import Anchors
 from rtshcua.evidence.witnessing.submission import note_of
 from rtshcua.model.flat.situation import Now
@@ -45,7 +45,7 @@ class InUse(Exception):
     """The log is still being written, or recovered, by another process."""
 
 
-class Signer(NamedTuple):
+class LogEnder(NamedTuple):
     """Who ends logs: signs with the log key `public`, at a moment; `draw` gives 32 secret random bytes."""
 
     public: bytes
@@ -60,13 +60,13 @@ class Recovered(NamedTuple):
     `done` False: the log is as it was. `last` is then that of the last line that verifies, hexadecimal.
     """
 
-    found: Examined
+    found: FoundLog
     done: bool
     discarded: Path | None
     last: str
 
 
-def examine(path: Path, public: bytes | None) -> Examined:
+def examine(path: Path, public: bytes | None) -> FoundLog:
     """The log as it is, for the log key `public` or any, and for the notes of witnesses beside it. Raises OSError."""
     anchors = read_anchors(path)  # before the log: see there
     examination, checkpoints = Examination(public), list[str]()
@@ -79,13 +79,13 @@ def examine(path: Path, public: bytes | None) -> Examined:
     return found if not anchors else _witnessed(found, checkpoints, anchors)
 
 
-def _witnessed(found: Examined, checkpoints: Iterable[str], anchors: Iterable[str]) -> Examined:
+def _witnessed(found: FoundLog, checkpoints: Iterable[str], anchors: Iterable[str]) -> FoundLog:
     """The log as it was found, unless a witness of its own trust root saw another. That root is taken at its word: who
     ends the log has the key that signed it, and whether it is to be trusted is for whoever verifies it.
     """
     genesis = found.genesis
     data = None if genesis is None else octets(genesis.root)
-    if genesis is None or data is None or found.state not in (*RECOVERABLE, State.CLOSED):
+    if genesis is None or data is None or found.state not in (*RECOVERABLE, LogState.CLOSED):
         return found
     try:
         root = open_root(data, pinned=cose.unverified(data, limit=MAX_ROOT).kid, now_us=genesis.utc_us)
@@ -97,7 +97,7 @@ def _witnessed(found: Examined, checkpoints: Iterable[str], anchors: Iterable[st
     flaw = next((each for each in flaws if isinstance(each, Flaw)), None)
     if flaw is None:
         return found
-    return found._replace(state=State.TAMPERED, reason=flaw.at(found.records, found.kept))
+    return found._replace(state=LogState.TAMPERED, reason=flaw.at(found.records, found.kept))
 
 
 @contextmanager
@@ -120,7 +120,7 @@ def look(path: Path) -> Recovered:
         return Recovered(found, False, None, found.head.prev)
 
 
-def recover(path: Path, signer: Signer, *, disk: Disk = SYSTEM) -> Recovered:
+def recover(path: Path, signer: LogEnder, *, disk: Disk = SYSTEM) -> Recovered:
     """Ends a log that has no close, unless it was tampered with. Raises `InUse` and OSError; it can be called again."""
     with alone(path):
         begun = _begun(path, signer.public)
@@ -139,7 +139,7 @@ def recover(path: Path, signer: Signer, *, disk: Disk = SYSTEM) -> Recovered:
 # ------------------------------------------------------------------------------------------ what was begun
 
 
-def _begun(path: Path, public: bytes) -> tuple[Examined, bytes] | None:
+def _begun(path: Path, public: bytes) -> tuple[FoundLog, bytes] | None:
     """What an earlier recovery found and the two lines that it meant to append, if it got far enough."""
     if not _plan_of(path).is_file():
         return None
@@ -154,15 +154,15 @@ def _begun(path: Path, public: bytes) -> tuple[Examined, bytes] | None:
             if not examination.take(line):
                 return None
     found = examination.examined()
-    if found.state is not State.WHOLE or not examination.take(first + newline) or not examination.take(second):
+    if found.state is not LogState.WHOLE or not examination.take(first + newline) or not examination.take(second):
         return None
     if recover.discarded_bytes:
         discarded = bytes.fromhex(recover.discarded_digest)
-        found = found._replace(state=State.TORN, discarded=recover.discarded_bytes, discarded_digest=discarded)
+        found = found._replace(state=LogState.TORN, discarded=recover.discarded_bytes, discarded_digest=discarded)
     return found, tail
 
 
-def _finish(path: Path, found: Examined, tail: bytes, disk: Disk) -> Recovered:
+def _finish(path: Path, found: FoundLog, tail: bytes, disk: Disk) -> Recovered:
     discarded = _kept_before(path, found) if found.discarded else None
     with open_regular(path) as file:
         file.seek(found.kept)
@@ -181,7 +181,7 @@ def _last(tail: bytes) -> str:
     return leaf_hash(tail.partition(b"\n")[2]).hex()
 
 
-def _kept_before(path: Path, found: Examined) -> Path | None:
+def _kept_before(path: Path, found: FoundLog) -> Path | None:
     for place in _places(path):
         if not place.exists():
             return None
@@ -190,7 +190,7 @@ def _kept_before(path: Path, found: Examined) -> Path | None:
     return None
 
 
-def _same(path: Path, start: int, found: Examined) -> bool:
+def _same(path: Path, start: int, found: FoundLog) -> bool:
     """Whether the file, from there on, is what is discarded."""
     size = path.stat().st_size - start
     return size == found.discarded and _digest(path, start, size) == found.discarded_digest

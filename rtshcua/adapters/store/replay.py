@@ -32,7 +32,7 @@ from rtshcua.adapters.store.writing import (
     sync_folder,
     write_new,
 )
-from rtshcua.onboard.ports import Opening
+from rtshcua.onboard.ports import MissionOpening
 
 _FLOOR = "floor"
 _POLICIES = "floor-policies"
@@ -48,7 +48,7 @@ class FileReplayStore:
         self.folder = _folder(state, vehicle)
         make_folder(self.folder, mode=PRIVATE_FOLDER)
 
-    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> Opening:
+    def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> MissionOpening:
         """`OPENED` once for a mission, after that and its policy's version are on the disk.
 
         `expires_us` is when nothing of the mission is valid any more. `DAMAGED` leaves all as it is.
@@ -65,7 +65,7 @@ class FileReplayStore:
                 raised = json.dumps(versions | {policy: version}, sort_keys=True).encode()
                 replace(self.folder / _POLICIES, raised, mode=PRIVATE_FILE)
             write_new(marker, b"%d\n" % expires_us, mode=PRIVATE_FILE)
-        return Opening.OPENED
+        return MissionOpening.OPENED
 
     def give_back(self, digest: bytes) -> None:
         """Of a mission that was opened, nothing was sent: it opens again, once that is on the disk. Its policy's
@@ -95,31 +95,31 @@ class FileReplayStore:
         sync_folder(self.folder)
 
 
-def looked_up(state: Path, vehicle: str, digest: bytes, expires_us: int, policy: str, version: int) -> Opening:
+def looked_up(state: Path, vehicle: str, digest: bytes, expires_us: int, policy: str, version: int) -> MissionOpening:
     """What `open_once` would say; nothing is made, written or used up. Raises OSError."""
     folder = _folder(state, vehicle)
     try:
         folder.stat()
     except FileNotFoundError:  # any other error is told: what is in the way of the folder is no absence
-        return Opening.OPENED
+        return MissionOpening.OPENED
     with _alone(folder):
-        return _refusal(folder, digest, expires_us, policy, version) or Opening.OPENED
+        return _refusal(folder, digest, expires_us, policy, version) or MissionOpening.OPENED
 
 
 def _folder(state: Path, vehicle: str) -> Path:
     return state / "replay" / f"vehicle-{quote(vehicle, safe='')}"
 
 
-def _refusal(folder: Path, digest: bytes, expires_us: int, policy: str, version: int) -> Opening | None:
+def _refusal(folder: Path, digest: bytes, expires_us: int, policy: str, version: int) -> MissionOpening | None:
     if (folder / digest.hex()).exists():
-        return Opening.REPLAYED
+        return MissionOpening.REPLAYED
     try:
         floor, versions = _floor(folder), _versions(folder)
     except _Damaged:
-        return Opening.DAMAGED
+        return MissionOpening.DAMAGED
     if expires_us <= floor:
-        return Opening.REPLAYED
-    return Opening.OLD_POLICY if version < versions.get(policy, version) else None
+        return MissionOpening.REPLAYED
+    return MissionOpening.OLD_POLICY if version < versions.get(policy, version) else None
 
 
 class _Damaged(Exception):

@@ -27,7 +27,7 @@ from urllib.parse import quote
 from rtshcua.adapters.store.memory import memory_file, open_memory
 from rtshcua.adapters.store.reading import exposed, open_regular, read_if_there
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, lock, make_folder, replace, write_new
-from rtshcua.mavlink.signing import KEY_OCTETS, LAST, MOST_STREAMS, UNIT_US, SignedLink, State, Stream
+from rtshcua.mavlink.signing import KEY_OCTETS, LAST, MOST_STREAMS, UNIT_US, SignedLink, SigningState, Stream
 
 EVERY_S: Final = 1.0
 RESERVE_S: Final = 3.0
@@ -178,22 +178,22 @@ class LinkStore:
         self.heard = HeardStamps(hashlib.sha256(os.fsencode(self.path.absolute())).hexdigest()[:16])
         self._exact = False  # the file has all that `heard` has
 
-    def load(self) -> State:
+    def load(self) -> SigningState:
         """What was kept; nothing for a new key. Raises LinkKeyError (`damaged`), and OSError."""
         data = read_if_there(self.path, _LARGEST)
         if data is None:
-            return State(0, {})
+            return SigningState(0, {})
         try:
             kept = json.loads(data)
             streams = {(int(a), int(b), int(c)): int(last) for a, b, c, last in kept["streams"]}
             heard = self.heard.load()
             streams |= {each: max(last, streams.get(each, 0)) for each, last in heard.items()}
-            return State(int(kept["timestamp"]), streams)
+            return SigningState(int(kept["timestamp"]), streams)
         except (ValueError, TypeError, KeyError):
             text = f"`{self.path}` is damaged: which timestamps the link used is not known"
             raise LinkKeyError("damaged", text, "a new key on both ends; `rtshcua keys link` makes one") from None
 
-    def save(self, state: State, ahead: int = 0) -> None:
+    def save(self, state: SigningState, ahead: int = 0) -> None:
         """Keep a state, our own timestamp so many ahead. Raises OSError."""
         self._exact = False
         streams = [[*stream, last] for stream, last in sorted(state.streams.items())]

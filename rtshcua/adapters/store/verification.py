@@ -13,7 +13,7 @@ from typing import BinaryIO, Final, NamedTuple
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.quick import LONGEST_SEGMENT, Octets, Outline, Part, outline, quick, scan
+from rtshcua.evidence.quick import LONGEST_SEGMENT, LogOutline, Octets, SegmentPart, outline, quick, scan
 from rtshcua.evidence.records import AnyRecord
 from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of, trusted
 from rtshcua.ground.audit.frames import Frames
@@ -26,7 +26,7 @@ _GROUP: Final = 16  # segments that a process takes at a time
 _PIECE: Final = 1 << 18  # octets that are read at a time to be hashed alone
 
 
-class Asked(NamedTuple):
+class VerificationInputs(NamedTuple):
     """What is known before a log is read: the pinned root key, the bundle that it should be of, notes of anchors."""
 
     pinned: bytes
@@ -40,7 +40,7 @@ Progress = Callable[[int], None]
 
 def verify_carefully(
     path: Path,
-    asked: Asked,
+    asked: VerificationInputs,
     *,
     derive: bool,
     frames: Frames | None = None,
@@ -79,7 +79,7 @@ def follow(
 
 
 def verify_quickly(
-    path: Path, asked: Asked, *, fast: bool = False, jobs: int = 0, progress: Progress = lambda _: None
+    path: Path, asked: VerificationInputs, *, fast: bool = False, jobs: int = 0, progress: Progress = lambda _: None
 ) -> Audit:
     """The audit of a log by what was signed; line by line where that does not hold.
 
@@ -93,7 +93,9 @@ def verify_quickly(
     return found or verify_carefully(path, asked, derive=False, progress=progress)
 
 
-def _quick(path: Path, log: Outline, asked: Asked, *, fast: bool, jobs: int, told: Progress) -> Audit | None:
+def _quick(
+    path: Path, log: LogOutline, asked: VerificationInputs, *, fast: bool, jobs: int, told: Progress
+) -> Audit | None:
     basis = establish(log.genesis, asked.pinned, bundle=asked.bundle)
     if isinstance(basis, Flaw):
         return None
@@ -105,7 +107,9 @@ def _quick(path: Path, log: Outline, asked: Asked, *, fast: bool, jobs: int, tol
     return None if report is None else Audit(trusted(report, basis), basis, 0, 0)
 
 
-def _counted(parts: Iterable[Part | None], offsets: "array[int]", told: Progress) -> Iterator[Part | None]:
+def _counted(
+    parts: Iterable[SegmentPart | None], offsets: "array[int]", told: Progress
+) -> Iterator[SegmentPart | None]:
     for offset, part in zip(offsets, parts, strict=False):
         told(offset)
         yield part
@@ -128,7 +132,7 @@ def _reader(handle: int) -> Octets:
     return read
 
 
-def _digests(log: Outline, jobs: int) -> Iterator[Part | None]:
+def _digests(log: LogOutline, jobs: int) -> Iterator[SegmentPart | None]:
     """The parts of a log by their octets alone. Hashing lets other threads run: signatures are verified meanwhile."""
     threads = ThreadPoolExecutor(jobs)
     try:
@@ -137,16 +141,16 @@ def _digests(log: Outline, jobs: int) -> Iterator[Part | None]:
         threads.shutdown(cancel_futures=True)
 
 
-def _digest(octets: Octets, start: int, end: int) -> Part | None:
+def _digest(octets: Octets, start: int, end: int) -> SegmentPart | None:
     if end - start > LONGEST_SEGMENT:
         return None
     hasher = sha256()
     for offset in range(start, end, _PIECE):
         hasher.update(octets(offset, min(_PIECE, end - offset)))
-    return Part(hasher.hexdigest(), None)
+    return SegmentPart(hasher.hexdigest(), None)
 
 
-def _scanned(path: Path, log: Outline, jobs: int) -> Iterator[Part | None]:
+def _scanned(path: Path, log: LogOutline, jobs: int) -> Iterator[SegmentPart | None]:
     """The parts of a log with their leaves."""
     spans = list(zip(log.offsets, log.offsets[1:], strict=False))
     groups = [spans[number : number + _GROUP] for number in range(0, len(spans), _GROUP)]
@@ -162,9 +166,9 @@ def _scanned(path: Path, log: Outline, jobs: int) -> Iterator[Part | None]:
             processes.shutdown(cancel_futures=True)
 
 
-def _scan(path: Path, spans: list[tuple[int, int]]) -> list[Part | None]:
+def _scan(path: Path, spans: list[tuple[int, int]]) -> list[SegmentPart | None]:
     """The parts of some segments, up to the first that is out of place."""
-    parts: list[Part | None] = []
+    parts: list[SegmentPart | None] = []
     with open_regular(path) as file:
         read = _reader(file.fileno())
         for start, end in spans:

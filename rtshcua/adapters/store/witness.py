@@ -21,17 +21,17 @@ from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.note import parse, split
 from rtshcua.evidence.witnessing.cosign import cosign, cosignatures
 from rtshcua.evidence.witnessing.submission import anchor, request_of, survey
-from rtshcua.evidence.witnessing.witness import (
+from rtshcua.evidence.witnessing.witness import (  # fmt: skip
     CONFLICT,
     INCONSISTENT,
     OK,
-    Answer,
+    CosignRequest,
     Declined,
+    LastCosigned,
     LogKeys,
-    Request,
-    Seen,
+    WitnessResponse,
     judge,
-)  # fmt: skip
+)
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.untrusted import Untrusted
 
@@ -65,7 +65,7 @@ class WitnessStore:
         except BlockingIOError:
             raise WitnessError("in-use", f"another process cosigns with key {key.kid.hex()}") from None
 
-    def seen(self, origin: str) -> tuple[Seen, int] | None:
+    def seen(self, origin: str) -> tuple[LastCosigned, int] | None:
         """What was cosigned last of a log, and when. Raises WitnessError (`damaged`), and OSError."""
         path = self._path(origin)
         data = read_if_there(path, _LARGEST)
@@ -79,9 +79,9 @@ class WitnessStore:
         checkpoint = parse(kept.text)
         if isinstance(checkpoint, Flaw) or checkpoint.origin != origin or len(signer) != 32:
             raise WitnessError("damaged", f"`{path}` is damaged: what was cosigned of `{origin}` is not known")
-        return Seen(kept.text, signer), kept.time_s
+        return LastCosigned(kept.text, signer), kept.time_s
 
-    def keep(self, origin: str, seen: Seen, time_s: int) -> None:
+    def keep(self, origin: str, seen: LastCosigned, time_s: int) -> None:
         """Remember. Raises OSError; then what was remembered before still is, or this."""
         kept = _Kept(seen.text, seen.signer.hex(), time_s)
         replace(self._path(origin), msgspec.json.encode(kept) + b"\n", mode=PRIVATE_FILE)
@@ -127,7 +127,7 @@ class FileWitness:
         before = self.store.seen(origin)
         return None if before is None else int(before[0].text.split("\n", 2)[1])
 
-    def consider(self, request: Request) -> Answer | Declined:
+    def consider(self, request: CosignRequest) -> WitnessResponse | Declined:
         """The cosignature, once it is remembered what for; or why there is none. Raises WitnessError and OSError."""
         origin = request.note.partition("\n")[0]
         before = self.store.seen(origin)
@@ -136,7 +136,7 @@ class FileWitness:
             return found
         time_s = max(self._now_s(), 0 if before is None else before[1])
         self.store.keep(origin, found, time_s)
-        return Answer(OK, cosign(found.text, time_s, self._key.public, self._sign))
+        return WitnessResponse(OK, cosign(found.text, time_s, self._key.public, self._sign))
 
     def _sign(self, message: bytes) -> bytes:
         return self._key.sign(message, duty=Duty.WITNESS)

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 from rtshcua.diagnostics.suggest import nearest
 
 
-class Way(StrEnum):
+class LinkCarrier(StrEnum):
     """What carries a link, and who begins it."""
 
     UDP_IN = "udpin"
@@ -42,11 +42,11 @@ BAUDS: Final = tuple(
 BITS_OF_AN_OCTET: Final = 10
 
 _EXAMPLES: Final = {
-    Way.UDP_IN: "udpin:0.0.0.0:14550",
-    Way.UDP_OUT: "udpout:127.0.0.1:14550",
-    Way.TCP: "tcp:192.168.1.10:5760",
-    Way.TCP_IN: "tcpin:0.0.0.0:5760",
-    Way.SERIAL: "serial:/dev/ttyAMA0:921600",
+    LinkCarrier.UDP_IN: "udpin:0.0.0.0:14550",
+    LinkCarrier.UDP_OUT: "udpout:127.0.0.1:14550",
+    LinkCarrier.TCP: "tcp:192.168.1.10:5760",
+    LinkCarrier.TCP_IN: "tcpin:0.0.0.0:5760",
+    LinkCarrier.SERIAL: "serial:/dev/ttyAMA0:921600",
 }
 _HOST: Final = re.compile(r"[^:\[\]\s]+", re.ASCII)
 _NUMBER: Final = re.compile(r"\d{1,9}", re.ASCII)
@@ -63,14 +63,14 @@ class AddressError(ValueError):
 class Address(NamedTuple):
     """Where a link goes: what carries it and who begins it, then host and port, or serial device and baud rate."""
 
-    way: Way
+    way: LinkCarrier
     host: str
     port: int
 
     @property
     def is_loopback(self) -> bool:
         """Whether the other end is on this machine, by its loopback interface."""
-        if self.way is Way.SERIAL:
+        if self.way is LinkCarrier.SERIAL:
             return False
         try:
             return ip_address(self.host).is_loopback
@@ -80,25 +80,25 @@ class Address(NamedTuple):
     @property
     def capacity(self) -> int | None:
         """Octets a second that the link carries each way; None where the address does not say."""
-        return self.port // BITS_OF_AN_OCTET if self.way is Way.SERIAL else None
+        return self.port // BITS_OF_AN_OCTET if self.way is LinkCarrier.SERIAL else None
 
     def __str__(self) -> str:
         return f"{self.way}:{self.host}:{self.port}"
 
 
-def parse(text: str, ways: Collection[Way] = tuple(Way)) -> Address:
+def parse(text: str, ways: Collection[LinkCarrier] = tuple(LinkCarrier)) -> Address:
     """The address in a text, in one of the `ways` that are accepted here. Raises AddressError."""
-    accepted = " or ".join(f"`{_EXAMPLES[way]}`" for way in Way if way in ways)
+    accepted = " or ".join(f"`{_EXAMPLES[way]}`" for way in LinkCarrier if way in ways)
     if not text:
         raise AddressError("the address is empty", text, 0, 0, f"write {accepted}")
     word, colon, rest = text.partition(":")
     if word not in [way.value for way in ways]:
         near = nearest(word, [way.value for way in ways])
-        found = f"`{word}` is no way to connect here" if word in list(Way) else f"`{word}` is no kind of link"
-        help = f"did you mean `{near}`?" if near and word not in list(Way) else f"write {accepted}"
+        found = f"`{word}` is no way to connect here" if word in list(LinkCarrier) else f"`{word}` is no kind of link"
+        help = f"did you mean `{near}`?" if near and word not in list(LinkCarrier) else f"write {accepted}"
         raise AddressError(found, text, 0, len(word), help)
-    way, begin = Way(word), len(word) + 1
-    serial = way is Way.SERIAL
+    way, begin = LinkCarrier(word), len(word) + 1
+    serial = way is LinkCarrier.SERIAL
     place, number = ("device", "baud rate") if serial else ("host", "port")
     example = f"write it as `{_EXAMPLES[way]}`"
     host, second, port = rest.rpartition(":")

@@ -40,7 +40,7 @@ class OwnFence(NamedTuple):
         return (self.circle, self.ceiling, *(name for name in extra if name is not None))
 
 
-class Reach(NamedTuple):
+class FlightReach(NamedTuple):
     """How far from home something goes, how high above it and how low, in mm; None where nothing says."""
 
     farthest: int = 0
@@ -58,7 +58,7 @@ class Narrow(NamedTuple):
     bit: int
 
 
-def reach_of(steps: Sequence[Invocation], policy: Policy, home: tuple[int, int]) -> Reach:
+def reach_of(steps: Sequence[Invocation], policy: Policy, home: tuple[int, int]) -> FlightReach:
     """Where the targets of a mission lie, its returns among them; `home` is where it stands, in local mm."""
     targets = [each.plan for each in steps]
     far = [
@@ -68,15 +68,15 @@ def reach_of(steps: Sequence[Invocation], policy: Policy, home: tuple[int, int])
     ]
     high = [plan.altitude for plan in targets if plan.kind in (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)]
     returns = [policy.vehicle.return_altitude] if steps else []
-    return Reach(max(far, default=0), max((*high, *returns), default=0), min(high, default=None))
+    return FlightReach(max(far, default=0), max((*high, *returns), default=0), min(high, default=None))
 
 
-def airspace_reach(policy: Policy) -> Reach:
+def airspace_reach(policy: Policy) -> FlightReach:
     """How far an airspace goes: as far as the narrowest of the zones that must be kept to."""
     inside = [] if policy.airspace is None else [policy.zones[number] for number in policy.airspace.inside]
     far = min((_extent(zone) for zone in inside), default=0)
     high = min((zone.ceiling for zone in inside if zone.ceiling < HIGHEST), default=0)
-    return Reach(far, high)
+    return FlightReach(far, high)
 
 
 def _extent(zone: Zone) -> int:
@@ -94,7 +94,9 @@ def unknown(own: OwnFence, values: Mapping[str, float], *, armed: bool) -> str |
     return next((name for name, _, _ in _bounds(own, values, armed=armed) if name not in values), None)
 
 
-def narrower(own: OwnFence, values: Mapping[str, float], reach: Reach, room: int, *, armed: bool) -> Iterator[Narrow]:
+def narrower(
+    own: OwnFence, values: Mapping[str, float], reach: FlightReach, room: int, *, armed: bool
+) -> Iterator[Narrow]:
     """The bounds that are armed and leave less than `room` (mm) around what is reached."""
     room = max(room, _mm(values.get(own.margin, 0.0)) if own.margin is not None else 0)
     for name, about, bit in _bounds(own, values, armed=armed):

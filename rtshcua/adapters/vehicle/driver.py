@@ -12,7 +12,7 @@ from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
 from rtshcua.adapters.vehicle.link import (
     SILENT,
     UNANSWERED,
-    Heard,
+    DatagramContents,
     LinkWatch,
     VehicleLink,
     is_radio,
@@ -38,21 +38,21 @@ from rtshcua.adapters.vehicle.streams import (
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Batteries, Telemetry
 from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
-from rtshcua.codec.frames import Received, is_addressed
+from rtshcua.codec.frames import ReceivedFrame, is_addressed
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_MODE_FLAG_SAFETY_ARMED as ARMED
 from rtshcua.mavlink.enums import MULTIROTORS
 from rtshcua.mavlink.modes import is_another, is_vehicle
 from rtshcua.mavlink.parameters import value_of
-from rtshcua.mavlink.signing import Verifier
+from rtshcua.mavlink.signing import FrameVerifier
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard import ports
 from rtshcua.onboard.enforcement.frames import OURS, Gate
 from rtshcua.onboard.left import Left
-from rtshcua.onboard.ports import Command, Event, Said
+from rtshcua.onboard.ports import Command, Event, StatusText
 
 HEARTBEAT_US = 1_000_000
 #: who an autopilot is that was heard is asked so often
@@ -102,7 +102,7 @@ class Driver:
 
     def __init__(
         self, policy: Policy, frames: Gate, slack: int = 1, *, fence: bool = True,
-        verifier: Verifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
+        verifier: FrameVerifier | None = None, manoeuvres: Mapping[str, Stages] | None = None,
         system: int | None = None, steps: Sequence[Invocation] = (), meant: Mapping[str, int] | None = None,
     ) -> None:  # fmt: skip
         self._policy = policy
@@ -271,7 +271,7 @@ class Driver:
         """Take in a datagram of another sender than the vehicle's."""
         self.link.overhear(datagram, now_us)
 
-    def receive(self, datagram: bytes, now_us: int) -> Heard:
+    def receive(self, datagram: bytes, now_us: int) -> DatagramContents:
         """Take in a datagram; whatever its bytes, never raises."""
         events: list[Event] = []
         send: list[Message] = []
@@ -292,8 +292,8 @@ class Driver:
                 if told or (manoeuvre is not None and now_us >= manoeuvre.due_us):
                     self._advance(now_us, send, events)
         if self.flavour is None:
-            return _heard(Heard, (events, self._ask_who(received, now_us) if self.hurries else [], received))
-        return _heard(Heard, (events, self._pack(send, now_us, events) if send else [], received))
+            return _heard(DatagramContents, (events, self._ask_who(received, now_us) if self.hurries else [], received))
+        return _heard(DatagramContents, (events, self._pack(send, now_us, events) if send else [], received))
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """What is due at a time: heartbeat, requests for streams, retries, a link that went down."""
@@ -337,7 +337,7 @@ class Driver:
             self._unfit_us = now_us
         elif self._unfit_us is not None and now_us - self._unfit_us >= UNFIT_US:
             self._unfit_us = None
-            events.append(ports.Unfit(now_us, why))
+            events.append(ports.VehicleUnfit(now_us, why))
 
     def _housekeeping(self, now_us: int) -> list[Message]:
         """The heartbeat and the questions that are due, whatever flies."""
@@ -386,10 +386,10 @@ class Driver:
         if flavour is None:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
         if self._others is not None:  # also where this was on its way while the takeover showed
-            return [ports.Failed(now_us, command.token, "taken-over", self._others)], []
+            return [ports.CommandFailed(now_us, command.token, "taken-over", self._others)], []
         contradicted = None if self._flies or self._manoeuvre is not None else self._contradicted
         if contradicted is not None:
-            return [ports.Failed(now_us, command.token, "two-speak", contradicted)], []
+            return [ports.CommandFailed(now_us, command.token, "two-speak", contradicted)], []
         self.link.begin()
         before = modes_of(self.left, flavour) if self._manoeuvre is None else self._manoeuvre.modes
         doubted = self._aids.suspicion.kind
@@ -399,7 +399,7 @@ class Driver:
             stages = self._stages(flavour, command)
         except Exception as error:  # noqa: BLE001  a pack's code: whatever it raises, its skill has failed
             slug = "no-datum" if isinstance(error, NoDatum) else "broken-manoeuvre"
-            return [ports.Failed(now_us, command.token, slug, str(error))], []
+            return [ports.CommandFailed(now_us, command.token, slug, str(error))], []
         self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before, doubted)
         self._left_mode = None  # it goes on as a suspicion of the manoeuvre
         self.consumption.fly(command.speed)
@@ -440,7 +440,7 @@ class Driver:
         """Stand down: nothing that moves the vehicle is sent any more."""
         self._manoeuvre, self._unsent, self._released = None, None, True
 
-    def _ask_who(self, received: Sequence[Received], now_us: int) -> list[bytes]:
+    def _ask_who(self, received: Sequence[ReceivedFrame], now_us: int) -> list[bytes]:
         if self._who_us is not None and now_us - self._who_us < WHO_US:
             return []
         system = next((frame.system for frame in received if frame.component == AUTOPILOT), None)
@@ -453,7 +453,7 @@ class Driver:
         """Tell any ground station; goes out with a later `tick`, when the link has nothing better to do."""
         self._announcer.add(severity, text)
 
-    def _choose(self, frame: Received) -> None:
+    def _choose(self, frame: ReceivedFrame) -> None:
         if frame.name != "HEARTBEAT" or frame.component != AUTOPILOT:
             return
         told = frame.message.type, frame.message.autopilot
@@ -497,7 +497,7 @@ class Driver:
         """Whether a heartbeat under the vehicle's ids is its own, by what it says that it is."""
         return (heartbeat.type, heartbeat.autopilot) == self._kind
 
-    def _is_strange(self, frame: Received, now_us: int, events: list[Event]) -> bool:
+    def _is_strange(self, frame: ReceivedFrame, now_us: int, events: list[Event]) -> bool:
         """Whether a heartbeat comes under the vehicle's ids and is not its own: of a gimbal or a companion computer
         that was given them, or of another vehicle. It says neither how the vehicle flies nor that it is heard.
         """
@@ -520,7 +520,7 @@ class Driver:
         if self.asks is not None:
             self.asks.take(name, message)
 
-    def _take(self, frame: Received, now_us: int, events: list[Event], send: list[Message]) -> bool:
+    def _take(self, frame: ReceivedFrame, now_us: int, events: list[Event], send: list[Message]) -> bool:
         """Take in one frame; whether a manoeuvre may see something new in it."""
         message, name, _, component, _, _, octets = frame
         source, seen = self.source, self.seen
@@ -583,7 +583,7 @@ class Driver:
         """Whether a frame waits until it is known who flies, which it may be time to ask."""
         return self._aids.query.waits
 
-    def _acknowledge(self, frame: Received, now_us: int, events: list[Event]) -> bool:
+    def _acknowledge(self, frame: ReceivedFrame, now_us: int, events: list[Event]) -> bool:
         """Take in a COMMAND_ACK; whether it is of the command under way."""
         message = frame.message
         if frame.component != AUTOPILOT:
@@ -623,7 +623,7 @@ class Driver:
         """Whether a message that names whom it is for is for us, or for everybody. We are of the vehicle's system."""
         return is_addressed(message, self.system, OURS)
 
-    def _hear(self, said: Sequence[Said], events: list[Event]) -> None:
+    def _hear(self, said: Sequence[StatusText], events: list[Event]) -> None:
         for each in said:
             self.seen.say(each.severity, each.text)
             events.append(each)
@@ -659,7 +659,7 @@ class Driver:
         self.seen.up_us, self.seen.stood_us = watch.up_us, watch.stood_us
         if watch.mute != self._was_mute:
             self._was_mute = watch.mute
-            events.append(ports.Answering(now_us, answers=not self._was_mute))
+            events.append(ports.VehicleAnswers(now_us, answers=not self._was_mute))
         if not changed:
             return
         down = watch.down
@@ -739,7 +739,7 @@ class Driver:
     def _fail(self, reason: str, text: str, now_us: int, events: list[Event]) -> None:
         if self._manoeuvre is not None and not self._manoeuvre.over:
             self._manoeuvre.over = True
-            events.append(ports.Failed(now_us, self._manoeuvre.token, reason, text))
+            events.append(ports.CommandFailed(now_us, self._manoeuvre.token, reason, text))
 
     @property
     def _flies(self) -> bool:

@@ -7,13 +7,13 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.modes import is_another
 from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM, UnsignedRadio
-from rtshcua.mavlink.signing import Verifier
+from rtshcua.mavlink.signing import FrameVerifier
 from rtshcua.onboard.enforcement.frames import OURS, UNSIGNED, Gate
 from rtshcua.onboard.ports import Command, Event
 
@@ -25,7 +25,7 @@ _DELIVERED: Final = 1
 _OBSERVED: Final = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE", "PARAM_VALUE"})
 
 
-def is_radio(frame: Received) -> bool:
+def is_radio(frame: ReceivedFrame) -> bool:
     """Whether it is the status of a SiK radio in a link between two: it speaks for itself, as no part of a vehicle.
 
     Which vehicle's link it is about nobody can tell where several speak, so with a named `system` it is not heard.
@@ -38,12 +38,12 @@ def two_speak(system: int, who: str) -> str:
     return f"two speak as {system}/{AUTOPILOT}: {who} besides the vehicle; give each component ids of its own"
 
 
-class Heard(NamedTuple):
+class DatagramContents(NamedTuple):
     """What a datagram brought: events, frames that answer it, and its good frames, for the raw log."""
 
     events: Sequence[Event]
     answers: Sequence[bytes]
-    frames: Sequence[Received]
+    frames: Sequence[ReceivedFrame]
 
 
 class VehicleLink:
@@ -54,7 +54,7 @@ class VehicleLink:
     circumstances under the same id: two autopilots that send to one port, of which one is flown, must not go unnoticed.
     """
 
-    def __init__(self, frames: Gate, verifier: Verifier | None = None, system: int | None = None) -> None:
+    def __init__(self, frames: Gate, verifier: FrameVerifier | None = None, system: int | None = None) -> None:
         self._frames = frames
         self._verifier = verifier
         self._named = system is not None
@@ -121,7 +121,7 @@ class VehicleLink:
         if self._others is not None:
             self.crowd = other
 
-    def parse(self, datagram: bytes, now_us: int) -> list[Received]:
+    def parse(self, datagram: bytes, now_us: int) -> list[ReceivedFrame]:
         """The good frames in a datagram, in order; never raises, whatever the bytes."""
         if self._others is not None:
             self.overhear(datagram, now_us, elsewhere=False)
@@ -136,7 +136,7 @@ class VehicleLink:
                 self._verifier.temper(each.message, now_us)
         return received
 
-    def _is_nobody(self, frame: Received) -> bool:
+    def _is_nobody(self, frame: ReceivedFrame) -> bool:
         """Whether a frame comes under a radio's system id, and is neither of the vehicle nor a radio's status."""
         return self._system not in (0, RADIO_SYSTEM) and not is_radio(frame)
 

@@ -29,7 +29,7 @@ from rtshcua.adapters.vehicle.supervision import (
 )
 from rtshcua.adapters.vehicle.suspicion import CROSSED_US, Contradictions, Suspicion
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import PAUSED, Command, Event, Failed, Hindered, Obeyed, Succeeded, TakenOver
+from rtshcua.onboard.ports import PAUSED, Command, CommandFailed, Event, Hindered, Obeyed, Succeeded, TakenOver
 
 RETRY_US = 1_000_000
 RETRIES = 5
@@ -505,7 +505,9 @@ class Manoeuvre:
         if reason is None and not self._has_held(seen):
             return [], ()
         self.over = True
-        return [], [Succeeded(now_us, self.token) if reason is None else Failed(now_us, self.token, reason, seen.text)]
+        return [], [
+            Succeeded(now_us, self.token) if reason is None else CommandFailed(now_us, self.token, reason, seen.text)
+        ]
 
     def _hindered(self, seen: ObservedVehicle, now_us: int) -> Sequence[Event]:
         """That it is flown slower than it was told, once."""

@@ -58,7 +58,9 @@ class Preflight:
         self._told = self._rally_told = False
         self._missed: set[str] = set()  # what limits its way home and was not answered, as far as that was told
         self._advised = 0  # what its circle was said to be set to
-        self._reached: tuple[tuple[int, int], bounds.Reach] | None = None  # where it stood, and what was made of it
+        self._reached: tuple[tuple[int, int], bounds.FlightReach] | None = (
+            None  # where it stood, and what was made of it
+        )
         self._checked_us: int | None = None
         self.notes: list[str] = []
 
@@ -189,7 +191,7 @@ class Preflight:
             f"beyond, which it would ignore: set `{found.parameter}` to {self._advice(found)} at the {least}{off}"
         )
 
-    def _reach(self) -> bounds.Reach:
+    def _reach(self) -> bounds.FlightReach:
         """How far the mission goes from where it stands: asked for much more often than it moves."""
         place = self._seen.latitude, self._seen.longitude
         if self._reached is None or self._reached[0] != place:

@@ -12,7 +12,7 @@ from rtshcua.adapters.vehicle import flavour as ways
 from rtshcua.adapters.vehicle.flavour import KEPT, AutopilotFlavour, ExpectedTarget
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.left import InForce, Left
+from rtshcua.onboard.left import CommandInForce, Left
 
 _LEGS = (MotionKind.FLY, MotionKind.COVER)
 
@@ -46,7 +46,7 @@ def arrives(left: Left | None, flavour: AutopilotFlavour, before: int, mode: int
     return any(before in earlier and mode in later for earlier, later in combinations(shows, 2))
 
 
-def _goes_there(of: InForce, seen: ObservedVehicle, kept: int) -> bool:
+def _goes_there(of: CommandInForce, seen: ObservedVehicle, kept: int) -> bool:
     """Whether the target that the vehicle names may be the command's; one that names none may go to any.
 
     `kept`: how far off, in mm, what it names may be from what it named before. To the digit, where another command came
@@ -58,7 +58,7 @@ def _goes_there(of: InForce, seen: ObservedVehicle, kept: int) -> bool:
     return not targets or any(target.matches(seen.target) for target in targets)
 
 
-def _targets(of: InForce, seen: ObservedVehicle, kept: int) -> Iterator[ExpectedTarget]:
+def _targets(of: CommandInForce, seen: ObservedVehicle, kept: int) -> Iterator[ExpectedTarget]:
     """Where it may say that it flies to: what it said last, and the next place, of which it had said nothing yet.
 
     Nothing where it goes by a way of its own, or where nobody knows.

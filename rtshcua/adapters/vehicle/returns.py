@@ -50,7 +50,7 @@ def plain(vehicle: Vehicle) -> Need | None:
 ONLY_ZERO: Final = Need(0, 0)
 
 
-class Wrong(NamedTuple):
+class WrongSetting(NamedTuple):
     """A value that does not fit: the parameter, what it is, and what is accepted, in words and as a value to set."""
 
     parameter: str
@@ -77,12 +77,12 @@ class ReturnLimit(NamedTuple):
     words: Mapping[float, str] = {}
     proved: str = "at the height that is proved"
 
-    def wrong(self, value: float, vehicle: Vehicle) -> Wrong | None:
+    def wrong(self, value: float, vehicle: Vehicle) -> WrongSetting | None:
         """What is wrong with its value for the vehicle of a policy."""
         need = self.need(vehicle)
         return None if need is None or (self.may_be_off and value == 0) else self.misfit(value, need)
 
-    def misfit(self, value: float, need: Need) -> Wrong | None:
+    def misfit(self, value: float, need: Need) -> WrongSetting | None:
         """What is wrong with its value where this is needed."""
         has = quantise(value, self.mm, 1)
         least, most = need
@@ -92,7 +92,7 @@ class ReturnLimit(NamedTuple):
             accepted = self._told((least or 0) / self.mm)
         else:
             accepted = f"at most {(most or 0) // self.mm}" if least is None else f"at least {-(-least // self.mm)}"
-        return Wrong(self.parameter, self._told(value), accepted, self.proved)
+        return WrongSetting(self.parameter, self._told(value), accepted, self.proved)
 
     def _told(self, value: float) -> str:
         return f"{value:g}, {self.words[value]}" if value in self.words else f"{value:g}"

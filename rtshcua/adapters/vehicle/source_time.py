@@ -26,7 +26,7 @@ from operator import attrgetter
 from statistics import median_low
 from typing import Any, Final, NamedTuple
 
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import ReceivedFrame
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.onboard.enforcement.frames import OURS
@@ -231,7 +231,7 @@ class SourceTime:
         half_us = (open_us + 1) // 2
         return self._unix_us - least_us - half_us, half_us
 
-    def of(self, frame: Received, now_us: int) -> int | None:
+    def of(self, frame: ReceivedFrame, now_us: int) -> int | None:
         """The earliest time at which what a frame says may have been measured, at most `now_us`; None where no bound is
         known. To be called once for every frame of the vehicle's system.
         """

@@ -10,7 +10,7 @@ from typing import Any, Final
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.mavlink.layouts import TEXT_OCTETS
-from rtshcua.onboard.ports import Said
+from rtshcua.onboard.ports import StatusText
 
 LONGEST: Final = 200  # characters
 #: A text whose next chunk does not come is taken as it is after this long.
@@ -40,10 +40,10 @@ class StatusTexts:
         self._paid_us: int | None = None
         self._dropped = 0
 
-    def take(self, message: Any, now_us: int) -> list[Said]:
+    def take(self, message: Any, now_us: int) -> list[StatusText]:
         """Take in one STATUSTEXT; the texts that are complete now."""
         part: str = message.text
-        said: list[Said] = []
+        said: list[StatusText] = []
         if not (self.parts and message.id == self._id and message.chunk_seq == len(self.parts)):
             said += self._finish(now_us)
         self._id, self._severity, self._at_us = message.id, message.severity, now_us
@@ -52,11 +52,11 @@ class StatusTexts:
             said += self._finish(now_us)
         return said
 
-    def due(self, now_us: int) -> list[Said]:
+    def due(self, now_us: int) -> list[StatusText]:
         """The text whose end did not come in time."""
         return self._finish(now_us) if self.parts and now_us - self._at_us > CHUNK_US else []
 
-    def _finish(self, now_us: int) -> list[Said]:
+    def _finish(self, now_us: int) -> list[StatusText]:
         text = quoted("".join(self.parts).rstrip("\0\t\r\n "))
         self.parts = []
         if not text:
@@ -72,7 +72,7 @@ class StatusTexts:
         self._left -= 1
         if self._dropped:
             text, self._dropped = f"{text} ({self._dropped} texts before it were left out)", 0
-        return [Said(now_us, self._severity, text)]
+        return [StatusText(now_us, self._severity, text)]
 
 
 #: So many wait at most: what is older is left out.

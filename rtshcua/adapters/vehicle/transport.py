@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from typing import Final, Protocol
 
-from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.codec.stream import FrameStream, StreamCounts
 
 #: what is read at once
@@ -74,15 +74,15 @@ class Transport(Protocol):
 def open_transport(address: Address) -> Transport:
     """The transport of an address. Raises OSError where it cannot be had, for a reason that waiting does not mend."""
     match address.way:
-        case Way.UDP_IN:
+        case LinkCarrier.UDP_IN:
             return UdpTransport(address.host, address.port, begins=False)
-        case Way.UDP_OUT:
+        case LinkCarrier.UDP_OUT:
             return UdpTransport(address.host, address.port, begins=True)
-        case Way.TCP:
+        case LinkCarrier.TCP:
             return TcpTransport(address)
-        case Way.TCP_IN:
+        case LinkCarrier.TCP_IN:
             return TcpListener(address)
-        case Way.SERIAL:
+        case LinkCarrier.SERIAL:
             return SerialTransport(address)
 
 

@@ -13,7 +13,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedExecutor, IsolatedGate, OwnTime
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, EnforcementMode, Loaded, load
 from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed
 from rtshcua.wire import cose
 from rtshcua.wire.document import FLIGHT_BYTES
@@ -105,12 +105,12 @@ class Apart:
         """What is waited with, in this process: what leaves meanwhile, leaves by the boundary."""
         commands = Commands(base.bundle.policy, base.bundle.mission)
         executor = IsolatedExecutor(self._caller, commands, IsolatedGate(self._caller, commands))
-        return replace(base, executor=executor, mode=Mode.PROCESS)
+        return replace(base, executor=executor, mode=EnforcementMode.PROCESS)
 
     def load(self, bundle: bytes, now: Now) -> Loaded | Refusal:
         """Have it open a bundle, in place of the one before."""
         loaded = load(
-            bundle, root=self._root, vehicle=self._vehicle, now=now, mode=Mode.PROCESS,
+            bundle, root=self._root, vehicle=self._vehicle, now=now, mode=EnforcementMode.PROCESS,
             session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=False,
             settings=self._settings, caller=self._caller,
         )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any, Final
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.utc import UtcWatch, certain_from_us
 from rtshcua.adapters.vehicle import messages
-from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.app.fly.interrupts import Interrupts
@@ -28,12 +28,12 @@ SPEED_S = 10.0
 
 #: what to do where a link cannot be opened, by what carries it
 PORT_HELP: Final = {
-    Way.UDP_IN: "another program may listen there; a vehicle can be told to send to another port",
-    Way.UDP_OUT: "is it the address of a machine that this one reaches?",
-    Way.TCP: "is it the address of a machine that this one reaches?",
-    Way.TCP_IN: "another program may listen there; a vehicle can be told to connect to another port",
-    Way.SERIAL: "end the program that has it open (ModemManager, a ground station, a shell on the console); the group "
-    "`dialout` may open serial devices; `ls /dev/serial/by-id` shows which there are",
+    LinkCarrier.UDP_IN: "another program may listen there; a vehicle can be told to send to another port",
+    LinkCarrier.UDP_OUT: "is it the address of a machine that this one reaches?",
+    LinkCarrier.TCP: "is it the address of a machine that this one reaches?",
+    LinkCarrier.TCP_IN: "another program may listen there; a vehicle can be told to connect to another port",
+    LinkCarrier.SERIAL: "end the program that has it open (ModemManager, a ground station, a shell on the console); "
+    "the group `dialout` may open serial devices; `ls /dev/serial/by-id` shows which there are",
 }
 
 _NO_DEVICE: Final = "is it plugged in? `ls /dev/serial/by-id` shows which there are"
@@ -41,8 +41,8 @@ _NO_DEVICE: Final = "is it plugged in? `ls /dev/serial/by-id` shows which there 
 
 def unopened(link: Address, error: OSError) -> Refusal:
     """That a link cannot be opened, and what to do."""
-    verb = "listen at" if link.way in (Way.UDP_IN, Way.TCP_IN) else "open"
-    missing = link.way is Way.SERIAL and error.errno == ENOENT
+    verb = "listen at" if link.way in (LinkCarrier.UDP_IN, LinkCarrier.TCP_IN) else "open"
+    missing = link.way is LinkCarrier.SERIAL and error.errno == ENOENT
     help = _NO_DEVICE if missing else PORT_HELP[link.way]
     return Refusal("port", f"cannot {verb} `{link}`: {(error.strerror or str(error)).lower()}", help)
 

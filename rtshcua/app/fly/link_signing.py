@@ -5,7 +5,7 @@ from pathlib import Path
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.store.signing import IN_USE, LinkKeeper, LinkKeyError, LinkStore, fingerprint, read_link_key
 from rtshcua.mavlink.radio import UnsignedRadio
-from rtshcua.mavlink.signing import Counts, SignedLink, State, Verifier
+from rtshcua.mavlink.signing import Counts, FrameVerifier, SignedLink, SigningState
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.isolated import IsolatedGate
@@ -39,7 +39,7 @@ class Signing:
         *, unsigned_radio: bool, even_damaged: bool = False,
     ) -> None:  # fmt: skip
         self.damage: LinkKeyError | OSError | None = None
-        self.verifier: Verifier | None = None
+        self.verifier: FrameVerifier | None = None
         self.trouble: str | None = None
         self.notes: list[str] = []
         self.unheard: frozenset[int] = frozenset()
@@ -65,7 +65,7 @@ class Signing:
                 raise
             self.damage = error
         if link is None:
-            link = SignedLink(key, State(0, {}), now.utc_us, now.monotonic_us)
+            link = SignedLink(key, SigningState(0, {}), now.utc_us, now.monotonic_us)
         assert isinstance(frames, FrameSession)
         frames.sign_with(link)
         self._counts = link.counts
@@ -76,7 +76,7 @@ class Signing:
         self.name, self._counts = name, gate.counts
         self._hear(gate, policy, unsigned_radio=unsigned_radio)
 
-    def _hear(self, link: Verifier, policy: Policy, *, unsigned_radio: bool) -> None:
+    def _hear(self, link: FrameVerifier, policy: Policy, *, unsigned_radio: bool) -> None:
         self.verifier = UnsignedRadio(link) if unsigned_radio else link
         read = {source.message for signal in policy.signals for source in signal.sources}
         if not unsigned_radio:

@@ -5,10 +5,10 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.store.last_log import Earlier, LastLog
+from rtshcua.adapters.store.last_log import LastLog, PreviousLog
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
-from rtshcua.adapters.store.recovery import Signer, alone, look, recover
+from rtshcua.adapters.store.recovery import LogEnder, alone, look, recover
 from rtshcua.adapters.utc import UtcWatch
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.left import Left, left_by
@@ -27,7 +27,7 @@ class Past:
         """Without the log's key the log before stays without an end."""
         self._last = LastLog(state, vehicle)
         signer = None if log_key is None else signer_of(log_key)
-        self._earlier: Earlier = self._last.settle(look if signer is None else lambda path: recover(path, signer))
+        self._earlier: PreviousLog = self._last.settle(look if signer is None else lambda path: recover(path, signer))
         self._log: Path | None = None
         self._held = ExitStack()
 
@@ -84,7 +84,7 @@ class Past:
         self._held.close()
 
 
-def signer_of(log_key: SigningKey) -> Signer:
+def signer_of(log_key: SigningKey) -> LogEnder:
     """Who ends logs with this key, by this machine's clock, in no more time than a flight can wait."""
 
     def certify(text: bytes) -> bytes:
@@ -92,4 +92,4 @@ def signer_of(log_key: SigningKey) -> Signer:
 
     clock = SystemClock()
     UtcWatch(clock)  # the kernel may vouch for it; nobody else is there
-    return Signer(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), clock.now)
+    return LogEnder(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), clock.now)

@@ -21,7 +21,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Event, Opening
+from rtshcua.onboard.ports import Event, MissionOpening
 
 #: How long word of whether the vehicle is in the air is waited for, in seconds.
 AIR_S: Final = 5.0
@@ -40,20 +40,20 @@ def flown_before(state: Path, loaded: Loaded) -> str | None:
 def not_opened(state: Path, loaded: Loaded) -> Refusal | None:
     """Why the bundle would not be opened, if it would not be; nothing of it is used up."""
     opening = _looked_up(state, loaded)
-    return None if opening is Opening.OPENED else _not_opened(loaded, opening)
+    return None if opening is MissionOpening.OPENED else _not_opened(loaded, opening)
 
 
-def _looked_up(state: Path, loaded: Loaded) -> Opening:
+def _looked_up(state: Path, loaded: Loaded) -> MissionOpening:
     policy, digest = loaded.bundle.policy, loaded.bundle.mission_digest
     return looked_up(state, loaded.vehicle, digest, loaded.expires_us, policy.name, policy.version)
 
 
-def _not_opened(loaded: Loaded, opening: Opening) -> Refusal:
+def _not_opened(loaded: Loaded, opening: MissionOpening) -> Refusal:
     policy, vehicle = loaded.bundle.policy, loaded.vehicle
-    if opening is Opening.DAMAGED:
+    if opening is MissionOpening.DAMAGED:
         text = f"what is kept about the bundles that `{vehicle}` opened is damaged: this one may have flown"
         return Refusal(opening, text, _MEND)
-    if opening is Opening.OLD_POLICY:
+    if opening is MissionOpening.OLD_POLICY:
         text = f"a later version of `{policy.name}` than {policy.version} was in force on `{vehicle}`"
         help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
         return Refusal(opening, text, help)
@@ -90,13 +90,13 @@ def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: Lin
     unread: OSError | None = None
     try:
         opening = _looked_up(state, loaded)
-        if opening is Opening.OPENED:
+        if opening is MissionOpening.OPENED:
             FileReplayStore(state, loaded.vehicle).expect_room()
     except OSError as error:
-        opening, unread = Opening.DAMAGED, error
-    if opening is Opening.OPENED:
+        opening, unread = MissionOpening.DAMAGED, error
+    if opening is MissionOpening.OPENED:
         return False
-    if opening is Opening.OLD_POLICY:
+    if opening is MissionOpening.OLD_POLICY:
         raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
     if still_flies(vehicle, clock, events):
         return True
@@ -137,7 +137,7 @@ def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -
     except OSError:
         flight.refuse()
         raise
-    if opening is not Opening.OPENED:
+    if opening is not MissionOpening.OPENED:
         flight.refuse()
         raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
 

@@ -9,7 +9,7 @@ from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Effect
-from rtshcua.evidence.report import Report
+from rtshcua.evidence.report import LogReport
 
 #: the event of the effect
 SIMULATED: Final = "simulated"
@@ -26,7 +26,7 @@ def told(speed: float, *, own: bool) -> str | None:
     return f"a simulated vehicle, {pace}"
 
 
-def with_simulated(report: Report, log: Path) -> Report:
+def with_simulated(report: LogReport, log: Path) -> LogReport:
     """The report on a log whose beginning was verified, with what this says of its times."""
     detail = None if report.failure is not None else simulated(log)
     if detail is None:

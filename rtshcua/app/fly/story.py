@@ -2,7 +2,7 @@
 
 import msgspec
 
-from rtshcua.onboard.runtime.view import View
+from rtshcua.onboard.runtime.view import RuntimeView
 
 
 class Step(msgspec.Struct, frozen=True):
@@ -62,7 +62,7 @@ class Plan(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
 class Snapshot(msgspec.Struct, frozen=True, tag="view", tag_field="event"):
     """How things stand now; one that cannot be sent at once is not sent."""
 
-    view: View
+    view: RuntimeView
 
 
 class Happening(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -9,7 +9,7 @@ from rtshcua.app.fly.narrator import REPLACED, Teller
 from rtshcua.app.fly.story import Happened, Note, Plan, Snapshot
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Event
-from rtshcua.onboard.runtime.view import Stage, View
+from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 
 _SNAPSHOT_S = 0.1
 _WAITING_NOTE_S = 5.0
@@ -22,7 +22,7 @@ class Watching:
     """
 
     def __init__(
-        self, feed: LiveView, teller: Teller, view: Callable[[Now], View], unready: Callable[[], str | None], *,
+        self, feed: LiveView, teller: Teller, view: Callable[[Now], RuntimeView], unready: Callable[[], str | None], *,
         live: bool, replan: Callable[[], Plan] | None = None, agents: Agents | None = None,
     ) -> None:  # fmt: skip
         self._feed = feed
@@ -61,6 +61,6 @@ class Watching:
         if moment_s - self._waited_s >= _WAITING_NOTE_S:
             self._waited_s = moment_s
             unready = self._unready()
-            if view.stage is Stage.WAITING and unready is not None and unready != self._waited_for:
+            if view.stage is RunStage.WAITING and unready is not None and unready != self._waited_for:
                 self._waited_for = unready
                 self._feed.post(Note(f"waiting for the vehicle: {unready}"))

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.witness_link import Anchor, WitnessClient
 from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
@@ -14,7 +14,7 @@ from rtshcua.onboard.ports import Anchored, Event, Noted
 
 def addresses(texts: Sequence[str]) -> tuple[Address, ...]:
     """Where witnesses are. Raises AddressError."""
-    return tuple(address.parse(text, (Way.UDP_OUT,)) for text in texts)
+    return tuple(address.parse(text, (LinkCarrier.UDP_OUT,)) for text in texts)
 
 
 class Witnessing:

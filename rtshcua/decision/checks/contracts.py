@@ -9,7 +9,7 @@ from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.checks.zones import place
 from rtshcua.decision.contracts import cells, first_cell, misfit
 from rtshcua.decision.durability import recorded_as
-from rtshcua.decision.tree import Scope, parse, slots_read
+from rtshcua.decision.tree import CodeScope, parse, slots_read
 from rtshcua.model.durability import BUFFERED, WORDS
 from rtshcua.model.flat import limits
 from rtshcua.model.flat.code import Clause
@@ -28,14 +28,14 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import HIGHEST, LOWEST
 
 
-def clause(clause: Clause, scope: Scope) -> Iterator[str]:
+def clause(clause: Clause, scope: CodeScope) -> Iterator[str]:
     """What is wrong with a clause's code."""
     node = parse(clause.code, scope)
     if isinstance(node, str):
         yield node
 
 
-def contract(contract: Contract, policy: Policy, scope: Scope) -> Iterator[str]:
+def contract(contract: Contract, policy: Policy, scope: CodeScope) -> Iterator[str]:
     """What is wrong with a contract. Its links are `chain`'s: they speak of other contracts."""
     yield from _parameters(contract, policy)
     yield from _motion(contract)

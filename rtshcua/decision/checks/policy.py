@@ -6,7 +6,7 @@ from itertools import pairwise
 from rtshcua.decision.checks.contracts import chain, clause, contract, link
 from rtshcua.decision.checks.indexes import ascending, at, index, within
 from rtshcua.decision.checks.zones import zones
-from rtshcua.decision.tree import Scope, scope_of
+from rtshcua.decision.tree import CodeScope, scope_of
 from rtshcua.model.flat import limits
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import (
@@ -129,14 +129,14 @@ def _offsets(vehicle: Vehicle) -> Iterator[str]:
         yield "the moments at which its local time changes are not ascending"
 
 
-def monitors(policy: Policy, scope: Scope) -> Iterator[str]:
+def monitors(policy: Policy, scope: CodeScope) -> Iterator[str]:
     """What is wrong with a policy's monitors: each reads only those before it, so that one pass observes them all."""
     yield from within("number of monitors", len(policy.monitors), 0, limits.MAX_MONITORS)
     for number, one in enumerate(policy.monitors):
         yield from at(f"monitor {number}", _monitor(one, scope.inside_monitor(number)))
 
 
-def _monitor(monitor: Monitor, scope: Scope) -> Iterator[str]:
+def _monitor(monitor: Monitor, scope: CodeScope) -> Iterator[str]:
     yield from within("kind", monitor.kind, MonitorKind.FOR_LAST, MonitorKind.FALLING)
     low, high = (1, limits.MAX_WINDOW) if monitor.kind in (MonitorKind.FOR_LAST, MonitorKind.WITHIN_LAST) else (0, 0)
     yield from within("window", monitor.window_us, low, high)
@@ -150,7 +150,7 @@ def phases(policy: Policy) -> Iterator[str]:
         yield "two phase names are the same"
 
 
-def rules(policy: Policy, scope: Scope) -> Iterator[str]:
+def rules(policy: Policy, scope: CodeScope) -> Iterator[str]:
     """What is wrong with a policy's rules; its contracts are well-formed."""
     yield from within("number of rules", len(policy.rules), 0, limits.MAX_RULES)
     keys = sum((len(rule.skills) or 1) * (len(rule.roles) or 1) for rule in policy.rules)
@@ -159,7 +159,7 @@ def rules(policy: Policy, scope: Scope) -> Iterator[str]:
         yield from at(f"rule {number}", rule(one, policy, scope))
 
 
-def rule(rule: Rule, policy: Policy, scope: Scope) -> Iterator[str]:
+def rule(rule: Rule, policy: Policy, scope: CodeScope) -> Iterator[str]:
     """What is wrong with a rule."""
     yield from within("kind", rule.kind, RuleKind.FORBID, RuleKind.DEGRADE)
     yield from ascending("skill", rule.skills, len(policy.contracts))

@@ -14,18 +14,10 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.merkle_proofs import verify_consistency, verify_inclusion
 from rtshcua.evidence.note import Checkpoint
-from rtshcua.evidence.proofs.file import Extra, Kind, ProofFile, read_extra, read_proof
+from rtshcua.evidence.proofs.file import ProofFile, ProofKind, ProofMaterial, read_extra, read_proof
 from rtshcua.evidence.proofs.trust import Believed, believe
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import (
-    AnyRecord,
-    Close,
-    Decision,
-    Effect,
-    Genesis,
-    Recover,
-    Signed,
-)
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Signed
 
 
 class Proven(NamedTuple):
@@ -33,7 +25,7 @@ class Proven(NamedTuple):
     `older` the head that the log went on from (consistency), `record` the record that is in it (inclusion, record).
     """
 
-    kind: Kind
+    kind: ProofKind
     number: int
     believed: Believed
     checkpoint: Checkpoint
@@ -51,7 +43,7 @@ def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
     extra = read_extra(file.extra)
     if isinstance(extra, Flaw):
         return extra
-    if bool(extra.record) != (file.kind is Kind.INCLUSION):
+    if bool(extra.record) != (file.kind is ProofKind.INCLUSION):
         return Flaw("proof/extra", "it carries other parts than its kind has")
     signed = _record(extra.signed)
     record = _record(extra.record) if extra.record else None
@@ -69,7 +61,7 @@ def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
     flaw = _check_signed(signed, extra.signed, believed)
     if flaw is not None:
         return flaw
-    assert not isinstance(signed, Decision | Effect)
+    assert not isinstance(signed, DecisionRecord | Effect)
     proven = Proven(file.kind, file.number, believed, checkpoint, signed, record=record)
     # 4 what is proven
     return _CHECKS[file.kind](proven, file, extra)
@@ -82,7 +74,7 @@ def _record(line: bytes) -> AnyRecord | Flaw:
 
 def _check_signed(signed: AnyRecord, line: bytes, believed: Believed) -> Flaw | None:
     checkpoint = believed.checkpoints[-1]
-    if isinstance(signed, Decision | Effect) or signed.checkpoint is not None:
+    if isinstance(signed, DecisionRecord | Effect) or signed.checkpoint is not None:
         return Flaw("proof/signed", "the record that should carry the checkpoint is of a kind that carries none")
     if leaf_hash(line) != checkpoint.record:
         text = "the record that should carry the checkpoint is not the one that was signed with it"
@@ -94,7 +86,7 @@ def _check_signed(signed: AnyRecord, line: bytes, believed: Believed) -> Flaw | 
     return None
 
 
-def _inclusion(proven: Proven, file: ProofFile, extra: Extra) -> Proven | Flaw:
+def _inclusion(proven: Proven, file: ProofFile, extra: ProofMaterial) -> Proven | Flaw:
     record, checkpoint = proven.record, proven.checkpoint
     assert record is not None
     if record.seq != file.number:
@@ -105,7 +97,7 @@ def _inclusion(proven: Proven, file: ProofFile, extra: Extra) -> Proven | Flaw:
     return proven
 
 
-def _consistency(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
+def _consistency(proven: Proven, file: ProofFile, _: ProofMaterial) -> Proven | Flaw:
     older = next((head for head in proven.believed.checkpoints[:-1] if head.size == file.number), None)
     if older is None:
         return Flaw("proof/chain", f"it carries no earlier checkpoint of {file.number} records")
@@ -116,14 +108,14 @@ def _consistency(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
     return proven._replace(older=older)
 
 
-def _own(proven: Proven, file: ProofFile, _: Extra) -> Proven | Flaw:
+def _own(proven: Proven, file: ProofFile, _: ProofMaterial) -> Proven | Flaw:
     if file.path or file.number != proven.checkpoint.size:
         return Flaw("proof/record", "it shows another record than the one whose place it gives")
     return proven._replace(record=proven.signed)
 
 
 _CHECKS = {
-    Kind.INCLUSION: _inclusion,
-    Kind.CONSISTENCY: _consistency,
-    Kind.RECORD: _own,
+    ProofKind.INCLUSION: _inclusion,
+    ProofKind.CONSISTENCY: _consistency,
+    ProofKind.RECORD: _own,
 }

@@ -15,7 +15,7 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.merkle_proofs import root_from_inclusion
 from rtshcua.evidence.proofs.file import MAX_PROOF
-from rtshcua.evidence.proofs.trust import Name, name_of
+from rtshcua.evidence.proofs.trust import LogName, name_of
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord
 from rtshcua.evidence.rooted import may_not_sign, trusted_root
@@ -37,10 +37,10 @@ _HASH: Final = 32
 _ITEMS: Final = 128
 
 
-class Received(NamedTuple):
+class ReceiptClaim(NamedTuple):
     """What a receipt proves: record `number` is in the log of `name`, as the log key signed it at `size` records."""
 
-    name: Name
+    name: LogName
     number: int
     size: int
     record: AnyRecord
@@ -65,7 +65,7 @@ def make_receipt(
     return TAG_18 + cbor.encode((protected, unprotected, None, signer(_signed(protected, head))))
 
 
-def check_receipt(data: bytes, pinned: bytes) -> Received | Flaw:
+def check_receipt(data: bytes, pinned: bytes) -> ReceiptClaim | Flaw:
     """What the receipt proves under the pinned root key (32 bytes) or its name (16), or what is wrong with it."""
     try:
         value = cbor.decode(data[1:], limit=MAX_PROOF, items=_ITEMS) if data.startswith(TAG_18) else None
@@ -84,7 +84,7 @@ def check_receipt(data: bytes, pinned: bytes) -> Received | Flaw:
 
 def _check(
     protected: bytes, parts: tuple[cbor.Value, cbor.Value], line: bytes, root: bytes, signature: bytes, pinned: bytes
-) -> Received | Flaw:
+) -> ReceiptClaim | Flaw:
     match parts:
         case (
             {1: -19, 4: bytes(kid), 15: {1: str(origin), 2: str(subject), **no_claims}, 395: 1, **no_more},
@@ -105,7 +105,7 @@ def _check(
 def _verify(
     protected: bytes, kid: bytes, origin: str, proof: tuple[int, int, list[bytes]], line: bytes, root: bytes,
     signature: bytes, pinned: bytes,
-) -> Received | Flaw:  # fmt: skip
+) -> ReceiptClaim | Flaw:  # fmt: skip
     size, number, path = proof
     record = read(line) if line.endswith(b"\n") else Flaw("", "it is not a line")
     if isinstance(record, Flaw):
@@ -127,7 +127,7 @@ def _verify(
         return Flaw("proof/path", f"the path in it does not lead from record {record.seq} to a root")
     if not key.verify(signature, _signed(protected, head)):
         return Flaw("proof/signature", f"the log key did not sign a log in which this is record {number}")
-    return Received(name, number, size, record, key, trusted)
+    return ReceiptClaim(name, number, size, record, key, trusted)
 
 
 def _signed(protected: bytes, root: bytes) -> bytes:

@@ -32,7 +32,7 @@ _MOST_HASHES: Final = 128  # no tree of 2**53 leaves needs more
 _MOST_DIGITS: Final = 16
 
 
-class Kind(StrEnum):
+class ProofKind(StrEnum):
     """What a file proves; the value is its first line."""
 
     INCLUSION = "c2sp.org/tlog-proof@v1"  # a record is in the log
@@ -42,13 +42,13 @@ class Kind(StrEnum):
     @property
     def word(self) -> str:
         """What stands before the number."""
-        return "old" if self is Kind.CONSISTENCY else "index"
+        return "old" if self is ProofKind.CONSISTENCY else "index"
 
 
 class ProofFile(NamedTuple):
-    """A proof as it is written. `number` is a record's, or the size of the older tree; `extra` see `Extra`."""
+    """A proof as it is written. `number` is a record's, or the size of the older tree; `extra` see `ProofMaterial`."""
 
-    kind: Kind
+    kind: ProofKind
     extra: bytes
     number: int
     path: tuple[bytes, ...]
@@ -70,7 +70,7 @@ def read_proof(data: bytes) -> ProofFile | Flaw:
         return Flaw("proof/malformed", "it is not UTF-8")
     lines = head.split("\n", _MOST_HASHES + 3)
     try:
-        kind = Kind(lines[0])
+        kind = ProofKind(lines[0])
     except ValueError:
         return Flaw("proof/malformed", "it is not a proof: its first line names no kind that there is", lines[0][:80])
     if not blank or not 3 <= len(lines) <= _MOST_HASHES + 3:
@@ -85,7 +85,7 @@ def read_proof(data: bytes) -> ProofFile | Flaw:
     return file
 
 
-class Extra(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class ProofMaterial(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """`root` is the signed trust root. `chain` has the notes from one that the log key signed up to, and without, that
     of the proof: each names the key that signs the next. `signed` is the line of the record that carries the proof's
     checkpoint, with the checkpoint as null. `record` is the line that is shown.
@@ -101,10 +101,10 @@ class Extra(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
         return artefact.pack(names.PROOF, self)
 
 
-def read_extra(data: bytes) -> Extra | Flaw:
+def read_extra(data: bytes) -> ProofMaterial | Flaw:
     """The extra of a proof, or what is wrong with it."""
     try:
-        extra = msgspec.convert(artefact.unwrap(names.PROOF, data), Extra, builtin_types=(bytes,))
+        extra = msgspec.convert(artefact.unwrap(names.PROOF, data), ProofMaterial, builtin_types=(bytes,))
         if extra.encode() == data:
             return extra
     except (Untrusted, CborError, msgspec.ValidationError) as error:

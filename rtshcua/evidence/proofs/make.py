@@ -15,9 +15,19 @@ from rtshcua.evidence.merkle_proofs import Range, consistency_ranges, inclusion_
 from rtshcua.evidence.note import parse, split
 from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import check_receipt, make_receipt
-from rtshcua.evidence.proofs.file import Extra, Kind, ProofFile, read_extra, read_proof
+from rtshcua.evidence.proofs.file import ProofFile, ProofKind, ProofMaterial, read_extra, read_proof
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Close, Decision, Effect, Genesis, Recover, Signed, encode, is_signed, unsigned
+from rtshcua.evidence.records import (
+    Close,
+    DecisionRecord,
+    Effect,
+    Genesis,
+    Recover,
+    Signed,
+    encode,
+    is_signed,
+    unsigned,
+)
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.wire import cose
 from rtshcua.wire.cbor import CborError
@@ -30,7 +40,7 @@ _EVENT = b',"event":"%s"' % ANCHORED.encode()
 _MOST = 64  # lines that are tried as cosignatures
 
 
-class Found(NamedTuple):
+class ProofParts(NamedTuple):
     """What a proof is made of: the trust root, the notes that the log key and then epoch keys signed, up to that of
     `signed`, and the line that was asked for, if it is before it.
     """
@@ -43,7 +53,7 @@ class Found(NamedTuple):
 
 def find(
     lines: Iterable[bytes], number: int | None, at: int | None, *, since: int | None = None, closed: bool = False
-) -> Found | Flaw:
+) -> ProofParts | Flaw:
     """What a proof of record `number`, or of what follows the signed record `since`, is made of.
 
     The signed record is `at`; without it the first one after `number`, or the last one there is (`closed`, `since`).
@@ -82,7 +92,11 @@ class _Finder:
                 return record
             text = f"record {seq} of the log is none: {record.text}"
             return Flaw("proof/log" if seq else "proof/no-log", text, record.found, record.expected)
-        if isinstance(record, Decision | Effect) or isinstance(record, Genesis) != (seq == 0) or record.seq != seq:
+        if (
+            isinstance(record, DecisionRecord | Effect)
+            or isinstance(record, Genesis) != (seq == 0)
+            or record.seq != seq
+        ):
             return Flaw("proof/log", f"record {seq} of the log stands where it does not belong", record.type)
         if isinstance(record, Genesis):
             try:
@@ -102,7 +116,7 @@ class _Finder:
             return seq >= self._at
         return self._number is None or seq > self._number
 
-    def found(self, count: int) -> Found | Flaw:
+    def found(self, count: int) -> ProofParts | Flaw:
         number, signed = self._number, self._signed
         if signed is None:
             return Flaw("proof/no-log", "there is no whole record in it")
@@ -116,7 +130,7 @@ class _Finder:
         assert least is not None
         if signed.seq < least:
             return Flaw("proof/unsealed", f"nothing after record {least} is signed yet, and so nothing vouches for it")
-        return Found(self._root, tuple(self._notes), signed, self._line)
+        return ProofParts(self._root, tuple(self._notes), signed, self._line)
 
 
 def _whole(lines: Iterable[bytes]) -> Iterator[bytes]:
@@ -138,9 +152,9 @@ def prove_inclusion(lines: Lines, number: int, at: int | None = None) -> bytes |
         return found
     signed = found.signed
     if signed.seq == number:
-        return _made(Kind.RECORD, found, number, [])
+        return _made(ProofKind.RECORD, found, number, [])
     path = _path(inclusion_ranges(number, signed.seq), leaves(lines))
-    return path if isinstance(path, Flaw) else _made(Kind.INCLUSION, found, number, path, record=found.line)
+    return path if isinstance(path, Flaw) else _made(ProofKind.INCLUSION, found, number, path, record=found.line)
 
 
 def receipt_of(
@@ -159,7 +173,7 @@ def receipt_of(
     path = _path(inclusion_ranges(number, size), leaves(lines))
     if isinstance(path, Flaw):
         return path
-    checked = _made(Kind.INCLUSION, found, number, path, record=found.line)
+    checked = _made(ProofKind.INCLUSION, found, number, path, record=found.line)
     if isinstance(checked, Flaw):
         return checked
     origin = found.chain[-1].partition("\n")[0]
@@ -179,14 +193,14 @@ def prove_consistency(lines: Lines, old: int, at: int | None = None) -> bytes | 
     if size <= old:
         return Flaw("proof/number", f"the log has no signed record after record {old}", str(size))
     path = _path(consistency_ranges(old, size), leaves(lines))
-    return path if isinstance(path, Flaw) else _made(Kind.CONSISTENCY, found, old, path)
+    return path if isinstance(path, Flaw) else _made(ProofKind.CONSISTENCY, found, old, path)
 
 
-def _made(kind: Kind, found: Found, number: int, path: list[bytes], record: bytes = b"") -> bytes | Flaw:
+def _made(kind: ProofKind, found: ProofParts, number: int, path: list[bytes], record: bytes = b"") -> bytes | Flaw:
     signed = encode(unsigned(found.signed))
     *chain, note = found.chain
     try:
-        extra = Extra(tuple(chain), found.root, signed, record).encode()
+        extra = ProofMaterial(tuple(chain), found.root, signed, record).encode()
         pinned = cose.unverified(found.root).kid
     except (CborError, Untrusted) as error:
         return Flaw("proof/log", f"no proof can be made of this log: {error}")
@@ -245,5 +259,5 @@ def anchored(lines: Iterable[bytes]) -> Iterator[str]:
 
 def _own_pin(file: ProofFile) -> bytes:
     extra = read_extra(file.extra)
-    assert isinstance(extra, Extra)
+    assert isinstance(extra, ProofMaterial)
     return cose.unverified(extra.root).kid

@@ -16,7 +16,7 @@ from rtshcua.wire.keys import Duty, VerificationKey
 from rtshcua.wire.trust import TrustRoot
 
 
-class Name(NamedTuple):
+class LogName(NamedTuple):
     """Whose log it is."""
 
     origin: str
@@ -29,7 +29,7 @@ class Believed(NamedTuple):
     the last one, not the key of an epoch. `cosigned`: which witnesses that the root trusts cosigned the last one.
     """
 
-    name: Name
+    name: LogName
     checkpoints: tuple[Checkpoint, ...]
     certified: bool
     log_key: VerificationKey
@@ -83,7 +83,7 @@ def _cosigned(text: str, lines: list[str], witnesses: frozenset[bytes]) -> tuple
     return tuple(found.values())
 
 
-def _follow(notes: tuple[str, ...], name: Name, log_key: VerificationKey, root: TrustRoot) -> Believed | Flaw:
+def _follow(notes: tuple[str, ...], name: LogName, log_key: VerificationKey, root: TrustRoot) -> Believed | Flaw:
     checkpoints: list[Checkpoint] = []
     public, certified = log_key.public, True
     for note in notes:
@@ -105,17 +105,17 @@ def _follow(notes: tuple[str, ...], name: Name, log_key: VerificationKey, root: 
     return Believed(name, tuple(checkpoints), certified, log_key, root)
 
 
-def name_of(origin: str) -> Name | Flaw:
+def name_of(origin: str) -> LogName | Flaw:
     """The parts of the origin of a log."""
     parts = origin.split("/")
     if len(parts) == 4:
-        name = Name(origin, unquote(parts[2]), parts[3])
+        name = LogName(origin, unquote(parts[2]), parts[3])
         if origin == origin_of(name.vehicle, name.boot):
             return name
     return Flaw("proof/origin", "it is not of a log of this program", origin[:160], "rtshcua/log/<vehicle>/<boot>")
 
 
-def signer(root: TrustRoot, short: bytes, name: Name, now_us: int) -> VerificationKey | Flaw:
+def signer(root: TrustRoot, short: bytes, name: LogName, now_us: int) -> VerificationKey | Flaw:
     """The key for duty `log` that a note names by its four octets, and that may sign for the vehicle."""
     for key in root.keys_for(Duty.LOG).values():
         if key_id(name.origin, key.public) == short:

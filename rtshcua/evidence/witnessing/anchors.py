@@ -28,7 +28,7 @@ class Witnessed(NamedTuple):
     time_s: int
 
 
-class Anchored(NamedTuple):
+class AnchoredExtent(NamedTuple):
     """How far the threshold of witnesses saw the log.
 
     `records` counts the lines from the first on that are anchored: the tree that was cosigned, and the signed record
@@ -105,7 +105,7 @@ class Anchors:
         if note.startswith(self._origin + "\n"):
             self._rejected, self._first = self._rejected + 1, self._first or flaw.text
 
-    def finish(self, records: int) -> Anchored | Flaw:
+    def finish(self, records: int) -> AnchoredExtent | Flaw:
         """The outcome for a log of so many lines, once all its checkpoints and anchors were given."""
         if self._ahead:
             size = max(self._ahead)
@@ -117,7 +117,7 @@ class Anchors:
             return Flaw("anchor/root", text, "none", f"a signed record {size}")
         witnessed = tuple(sorted(self._seen.values(), key=lambda seen: (-seen.size, seen.public)))
         count = witnessed[self._threshold - 1].size + 1 if len(witnessed) >= self._threshold else 0
-        return Anchored(count, records - count, self._threshold, witnessed, self._rejected, self._first)
+        return AnchoredExtent(count, records - count, self._threshold, witnessed, self._rejected, self._first)
 
 
 def _compare(size: int, own: bytes, seen: bytes, witness: Cosignature) -> Flaw | None:

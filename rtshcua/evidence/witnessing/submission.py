@@ -11,13 +11,13 @@ from typing import Final, NamedTuple
 import msgspec
 
 from rtshcua.evidence.finding import Finding, Flaw
-from rtshcua.evidence.merkle import Tree, leaf_hash
+from rtshcua.evidence.merkle import MerkleTree, leaf_hash
 from rtshcua.evidence.merkle_proofs import StoredTree, consistency_ranges, proof_of
 from rtshcua.evidence.note import Checkpoint, parse, split
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Close, Decision, Effect, encode, is_signed, unsigned
+from rtshcua.evidence.records import Close, DecisionRecord, Effect, encode, is_signed, unsigned
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
-from rtshcua.evidence.witnessing.witness import Request
+from rtshcua.evidence.witnessing.witness import CosignRequest
 
 #: the most notes that go behind a checkpoint in one request; a witness that missed more is led on in several
 MOST_NOTES: Final = 32
@@ -74,11 +74,11 @@ class Submission:
         index = bisect_left(self._sizes, size)
         return self._sizes[index : index + 1] == [size]
 
-    def again(self, size: int) -> Request:
+    def again(self, size: int) -> CosignRequest:
         """To have the checkpoint of this size cosigned once more, by a witness whose answer was lost."""
-        return Request(size, (), self._notes[bisect_left(self._sizes, size)])
+        return CosignRequest(size, (), self._notes[bisect_left(self._sizes, size)])
 
-    def request(self, known: int | None, records: int) -> Request | None:
+    def request(self, known: int | None, records: int) -> CosignRequest | None:
         """What to send a witness that cosigned the tree of `known` leaves last, or is thought to know nothing, so that
         it cosigns the last checkpoint among the first `records` lines, or one on the way there.
 
@@ -94,7 +94,7 @@ class Submission:
             return None
         old = max(index, 0)
         proof = self._tree.consistency(self._sizes[old], self._sizes[aim])
-        return Request(self._sizes[old], tuple(proof), self._notes[aim], tuple(self._notes[index + 1 : aim]))
+        return CosignRequest(self._sizes[old], tuple(proof), self._notes[aim], tuple(self._notes[index + 1 : aim]))
 
 
 def anchor(note: str, answer: str, witnesses: Iterable[bytes]) -> str | None:
@@ -130,7 +130,7 @@ def survey(lines: Iterable[bytes]) -> Survey | Finding:
     A checkpoint that is not so is not worth anybody's signature, whatever proof comes with it: the leaves are computed
     here, and not believed.
     """
-    tree, after, closed = Tree(), None, False
+    tree, after, closed = MerkleTree(), None, False
     notes: dict[int, str] = {}
     for line in lines:
         if closed:
@@ -150,7 +150,7 @@ def survey(lines: Iterable[bytes]) -> Survey | Finding:
     return Survey(tree.size, notes)
 
 
-def _checked(line: bytes, note: str, tree: Tree, after: bytes | None) -> Checkpoint | Flaw:
+def _checked(line: bytes, note: str, tree: MerkleTree, after: bytes | None) -> Checkpoint | Flaw:
     """The checkpoint of a signed record that stands after the lines of the tree; its signature is looked at later."""
     checkpoint = parse(split(note)[0])
     if isinstance(checkpoint, Flaw):
@@ -163,7 +163,7 @@ def _checked(line: bytes, note: str, tree: Tree, after: bytes | None) -> Checkpo
     record = read(line)
     if isinstance(record, Flaw):
         return record
-    assert not isinstance(record, Decision | Effect), "these bear no checkpoint"
+    assert not isinstance(record, DecisionRecord | Effect), "these bear no checkpoint"
     own = leaf_hash(encode(unsigned(record)))
     if checkpoint.record != own:
         text = "the checkpoint is not that of the record that carries it: one of its fields was changed"
@@ -171,7 +171,7 @@ def _checked(line: bytes, note: str, tree: Tree, after: bytes | None) -> Checkpo
     return checkpoint
 
 
-def request_of(log: Survey, known: int | None, lines: Callable[[], Iterable[bytes]]) -> Request | Flaw:
+def request_of(log: Survey, known: int | None, lines: Callable[[], Iterable[bytes]]) -> CosignRequest | Flaw:
     """What to ask a witness that cosigned the tree of `known` leaves last (None: nothing) about the end of the log.
 
     `lines` gives the lines once more.
@@ -185,4 +185,4 @@ def request_of(log: Survey, known: int | None, lines: Callable[[], Iterable[byte
     proof = proof_of(consistency_ranges(old, size), map(leaf_hash, lines())) if 0 < old < size else []
     after = -1 if known is None else known
     chain = [note for place, note in log.notes.items() if after < place < size]
-    return Request(old, tuple(proof), log.notes[size], tuple(chain))
+    return CosignRequest(old, tuple(proof), log.notes[size], tuple(chain))

@@ -32,7 +32,7 @@ _STRANGER: Final = "it is not signed by the key that the record before names, no
 LogKeys = Callable[[str], Iterable[bytes]]
 
 
-class Request(NamedTuple):
+class CosignRequest(NamedTuple):
     """A checkpoint to be cosigned. `proof` shows that the tree of `old` leaves is its beginning.
 
     `chain` holds the notes of the signed records between the checkpoint of `old` leaves and this one, oldest first;
@@ -51,7 +51,7 @@ class Request(NamedTuple):
         return f"old {self.old}\n{proof}\n{self.note}{chain}".encode()
 
 
-class Seen(NamedTuple):
+class LastCosigned(NamedTuple):
     """What was cosigned last of a log: the text of its checkpoint, and the public key that the log signed it with."""
 
     text: str
@@ -70,12 +70,12 @@ class Declined(NamedTuple):
     size: int = 0
     contradiction: bool = False
 
-    def answer(self) -> "Answer":
+    def answer(self) -> "WitnessResponse":
         """What the sender is told: for a conflict the size, else why."""
-        return Answer(self.status, f"{self.size}\n" if self.status == CONFLICT else f"{self.text}\n")
+        return WitnessResponse(self.status, f"{self.size}\n" if self.status == CONFLICT else f"{self.text}\n")
 
 
-class Answer(NamedTuple):
+class WitnessResponse(NamedTuple):
     """What a witness answers: one of HTTP's numbers, and the body of c2sp.org/tlog-witness."""
 
     status: int
@@ -92,15 +92,15 @@ class Answer(NamedTuple):
         return int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _LONGEST_SIZE else None
 
 
-def decode_answer(data: bytes) -> Answer | None:
+def decode_answer(data: bytes) -> WitnessResponse | None:
     """The answer in these bytes; None when they are none."""
     status, newline, body = data.partition(b"\n")
     if not newline or len(status) != 3 or not status.isdigit():
         return None
-    return Answer(int(status), body.decode("utf-8", "replace"))
+    return WitnessResponse(int(status), body.decode("utf-8", "replace"))
 
 
-def decode(data: bytes) -> Request | Declined:
+def decode(data: bytes) -> CosignRequest | Declined:
     """The request in a body; never raises, whatever the bytes."""
     try:
         head, *parts = data.decode().split("\n\n")
@@ -114,13 +114,13 @@ def decode(data: bytes) -> Request | Declined:
     if not texts or len(parts) % 2 or not data.endswith(b"\n") or len(proof) > MOST_PROOF:
         return Declined(MALFORMED, "the request has not the form of one")
     texts[-1] = texts[-1][:-1]
-    request = Request(number, tuple(strict_base64(each) for each in proof), texts[0], tuple(texts[1:]))
+    request = CosignRequest(number, tuple(strict_base64(each) for each in proof), texts[0], tuple(texts[1:]))
     if {len(each) for each in request.proof} - {_HASH_BYTES} or request.encode() != data:
         return Declined(MALFORMED, "the request has not the form of one")
     return request
 
 
-def judge(request: Request, seen: Seen | None, log_keys: LogKeys) -> Seen | Declined:
+def judge(request: CosignRequest, seen: LastCosigned | None, log_keys: LogKeys) -> LastCosigned | Declined:
     """What may be cosigned, or why it may not. `seen` is what was cosigned last for this origin, if anything was."""
     text, lines = split(request.note)
     checkpoint = parse(text)
@@ -146,7 +146,7 @@ def judge(request: Request, seen: Seen | None, log_keys: LogKeys) -> Seen | Decl
     if not verify_consistency(size, root, checkpoint.size, checkpoint.root, request.proof):
         # Anyone can put a wrong proof to a right note: that alone is no contradiction.
         return Declined(INCONSISTENT, f"it is not shown that the tree begins with that of {size} records")
-    return Seen(text, signer)
+    return LastCosigned(text, signer)
 
 
 def vehicle_of(origin: str) -> str:
@@ -157,7 +157,7 @@ def vehicle_of(origin: str) -> str:
 
 
 def _follow(
-    request: Request, known: Checkpoint | None, seen: Seen | None, log_keys: tuple[bytes, ...]
+    request: CosignRequest, known: Checkpoint | None, seen: LastCosigned | None, log_keys: tuple[bytes, ...]
 ) -> bytes | Declined:
     """The key that signed the last note, if each is signed by the key that the one before it names, or by the log key,
     and goes on from there.

@@ -153,7 +153,7 @@ def query(
     """
 
     def work() -> ExitCode:
-        from rtshcua.adapters.archive.asking import Conditions, canned
+        from rtshcua.adapters.archive.asking import DecisionQuery, canned
 
         shape, asked = _shape(as_json, as_csv), canned()
         if sql is None and name is None:
@@ -179,7 +179,7 @@ def query(
         policy_name, _, version = (policy or "").partition("@")
         if version and not (version.isascii() and version.isdigit()):
             return fail(ExitCode.USAGE, f"`{policy}` names no version of a policy", "`bridge_inspection@7`")
-        conditions = Conditions(
+        conditions = DecisionQuery(
             vehicle, mission, skill, outcome, reason, rule, clause, policy_name or None,
             int(version) if version else None, times[0], times[1], witness,
         )  # fmt: skip
@@ -203,10 +203,10 @@ def stats(archive: Archive = _DEFAULT, as_json: Json = False, as_csv: Csv = Fals
 
 
 def _ask(where: Path, sql: str | None, conditions: object, limit: int | None, shape: Shape) -> ExitCode:
-    from rtshcua.adapters.archive.asking import Asker, Conditions
-    from rtshcua.adapters.archive.folder import Folder
+    from rtshcua.adapters.archive.asking import ArchiveReader, DecisionQuery
+    from rtshcua.adapters.archive.folder import ArchiveFolder
 
-    asker = Asker(Folder(where), conditions if isinstance(conditions, Conditions) else None)
+    asker = ArchiveReader(ArchiveFolder(where), conditions if isinstance(conditions, DecisionQuery) else None)
     try:
         answer = asker.ask(sql or "", limit)
     finally:

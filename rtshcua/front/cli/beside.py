@@ -7,7 +7,7 @@ from rtshcua.adapters.store.logs import read_anchors, read_named, unreadable
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.runs import BUNDLE, LOG, SUMMARY, TELEMETRY
 from rtshcua.evidence.finding import Claim
-from rtshcua.evidence.report import Report
+from rtshcua.evidence.report import LogReport
 from rtshcua.front.cli.raw_frames import RawFrames
 from rtshcua.wire.bundle import MAX_BUNDLE
 
@@ -35,7 +35,7 @@ def anchors_beside(log: Path, more: Iterable[Path]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def with_unread(report: Report, log: Path) -> Report:
+def with_unread(report: LogReport, log: Path) -> LogReport:
     """The report, with the files of anchors beside the log that hold none."""
     names = [] if report.failure is not None else [f"`{path.name}`" for path in unreadable(log)]
     if not names:
@@ -50,7 +50,7 @@ def raw_frames(log: Path) -> RawFrames | None:
     return None if folder is None else RawFrames(folder / TELEMETRY)
 
 
-def with_summary(report: Report, log: Path) -> Report:
+def with_summary(report: LogReport, log: Path) -> LogReport:
     """The report, with what it says of the summary in a run's folder."""
     folder = run_folder(log)
     if folder is None or report.failure is not None or not (folder / SUMMARY).exists():

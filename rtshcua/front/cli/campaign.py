@@ -39,7 +39,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario, Start
 from rtshcua.onboard.ports import Ending
-from rtshcua.simulation.config import Kind
+from rtshcua.simulation.config import AutopilotKind
 from rtshcua.virtual.flight import LATER_US
 
 app = typer.Typer(add_completion=False)
@@ -61,7 +61,7 @@ def campaign(
         list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
     ] = None,
     flavour: Annotated[
-        list[Kind] | None, typer.Option(help="this autopilot alone (repeatable) [default: both]")
+        list[AutopilotKind] | None, typer.Option(help="this autopilot alone (repeatable) [default: both]")
     ] = None,
     fault: Annotated[
         list[str] | None, typer.Option(metavar="KIND", help="faults of this kind alone (repeatable) [default: all]")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.boundary_process import program
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 
 _TIME = re.compile(r"(?P<number>[0-9]{1,9}(?:\.[0-9]{1,6})?) ?(?P<unit>ms|s|min)", re.ASCII)
 _US = {"ms": 1_000, "s": 1_000_000, "min": 60_000_000}
@@ -41,7 +41,7 @@ NoFence = Annotated[
     bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is; else it becomes the airspace")
 ]
 DecidesIn = Annotated[
-    Mode | None,
+    EnforcementMode | None,
     typer.Option(
         help="where decisions are made: in a process of their own (default with --connect, where its program was "
         "built) or in this one; `none` enforces nothing, in simulation",
@@ -55,14 +55,14 @@ UtcError = Annotated[
 ]
 
 
-def mode_of(mode: Mode | None, *, own: bool, named: bool) -> tuple[Mode, bool]:
+def mode_of(mode: EnforcementMode | None, *, own: bool, named: bool) -> tuple[EnforcementMode, bool]:
     """Where decisions are made, and whether that is in this process only because there is no program of the boundary.
     `own`: the vehicle is our simulated one; `named`: a boundary was asked for in another way than by `mode`.
     """
     if mode is not None or (own and not named):
-        return mode or Mode.SOFTWARE, False
+        return mode or EnforcementMode.SOFTWARE, False
     unbuilt = program() is None and not named
-    return (Mode.SOFTWARE if unbuilt else Mode.PROCESS), unbuilt
+    return (EnforcementMode.SOFTWARE if unbuilt else EnforcementMode.PROCESS), unbuilt
 
 
 def duration_us(text: str | None) -> int | None:

@@ -32,7 +32,7 @@ from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.owed import OwedParameters
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.signing import LinkKeyError
-from rtshcua.adapters.utc import TimeOfDay, kernel_error_us, vehicle_counts
+from rtshcua.adapters.utc import TimeSources, kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
@@ -68,10 +68,10 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.isolated import Caller
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
@@ -116,7 +116,7 @@ def doctor(
     if utc_error is not None and boundary_socket is not None:
         text = "`--utc-error` does not go with `--boundary-socket`: the boundary there is told in its own command line"
         return fail(ExitCode.USAGE, text)
-    if boundary_socket is not None and mode not in (None, Mode.PROCESS):
+    if boundary_socket is not None and mode not in (None, EnforcementMode.PROCESS):
         return fail(ExitCode.USAGE, f"`--boundary-socket` goes with `--mode process`, not with `{mode}`")
     decides, _ = mode_of(mode, own=False, named=boundary_socket is not None)
     try:
@@ -153,7 +153,9 @@ def doctor(
                 unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
             )
         keyed = signing_key is not None
-        time_of_day = _time_of_day(boundary_socket, duration_us(utc_error), keyed=keyed, apart=decides is Mode.PROCESS)
+        time_of_day = _time_of_day(
+            boundary_socket, duration_us(utc_error), keyed=keyed, apart=decides is EnforcementMode.PROCESS
+        )
         findings = _boundary(decides, boundary_socket) + agents + _settle(socket, vehicle, clock)
         findings += list(
             diagnose(
@@ -176,15 +178,15 @@ def doctor(
     return code
 
 
-def _boundary(mode: Mode, socket: Path | None = None) -> list[VehicleFinding]:
+def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[VehicleFinding]:
     """Where a run in this mode decides, or one that calls the boundary at this socket, and which measures that keep
     others out of a process of its own that would be without.
     """
     slug = "boundary/process"
-    if mode is Mode.NONE:
+    if mode is EnforcementMode.NONE:
         text, help = "a run with `--mode none` flies the simulated vehicle only", "without `--mode`"
         return [VehicleFinding(slug, MissionVerdict.STOP, text, "a process of its own", help)]
-    if mode is Mode.SOFTWARE:
+    if mode is EnforcementMode.SOFTWARE:
         built = program() is not None
         text, help = (_SOFTWARE, "without `--mode`") if built else (UNBUILT, UNBUILT_HELP)
         return [VehicleFinding(slug, MissionVerdict.WARN, text, "a process of its own", help)]
@@ -205,31 +207,31 @@ def _boundary(mode: Mode, socket: Path | None = None) -> list[VehicleFinding]:
     return found
 
 
-def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool, apart: bool) -> TimeOfDay:
+def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool, apart: bool) -> TimeSources:
     """What a run would take the time of day from: one as it begins by itself, with a boundary `apart` or in its own
     process, or one by the boundary that listens.
     """
     if socket is None:
-        return TimeOfDay(kernel_error_us(), vehicle_counts(apart=apart, keyed=keyed), stated_us)
+        return TimeSources(kernel_error_us(), vehicle_counts(apart=apart, keyed=keyed), stated_us)
     try:
         listening = ListeningBoundary(socket)
     except BoundaryError:  # nothing flies by it, and that was said
-        return TimeOfDay(kernel_error_us(), listens=True)
+        return TimeSources(kernel_error_us(), listens=True)
     try:
         has_key = listening.link_name is not None
         said = Caller(listening.call, signs=has_key).time(settle=True)
     finally:
         listening.close()
-    if isinstance(said, Refusal) or said.source is Source.SHARED:  # it has none of its own: that of the run counts
-        return TimeOfDay(kernel_error_us(), listens=True)
+    if isinstance(said, Refusal) or said.source is ClockSource.SHARED:  # it has none of its own: that of the run counts
+        return TimeSources(kernel_error_us(), listens=True)
     error_us, counts = said.now.utc_error_us, vehicle_counts(apart=True, keyed=has_key)
-    return TimeOfDay(
-        error_us if said.source is Source.KERNEL else None, counts,
-        error_us if said.source is Source.OPERATOR else None, listens=True,
+    return TimeSources(
+        error_us if said.source is ClockSource.KERNEL else None, counts,
+        error_us if said.source is ClockSource.OPERATOR else None, listens=True,
     )  # fmt: skip
 
 
-def _expired(policy: Policy, mission: Mission, now: Now, time: TimeOfDay) -> list[VehicleFinding]:
+def _expired(policy: Policy, mission: Mission, now: Now, time: TimeSources) -> list[VehicleFinding]:
     """That the mission is too old, where this machine's time of day is known well enough to say so."""
     error_us = time.stated_us if time.machine_us is None else time.machine_us
     known = Now(now.monotonic_us, now.utc_us, UTC_UNKNOWN_US if error_us is None else error_us)

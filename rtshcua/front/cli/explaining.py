@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from rtshcua.adapters.store.verification import Asked, verify_carefully
+from rtshcua.adapters.store.verification import VerificationInputs, verify_carefully
 from rtshcua.app.documents import no_log
 from rtshcua.app.pin import Pin
 from rtshcua.diagnostics.exits import ExitCode
@@ -35,7 +35,7 @@ def explained(
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(log_of(logs[0]), logs[0], NO_LOG_HELP))
     told = Told(number)
-    asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
+    asked = VerificationInputs(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
     revoked = RevokedKeys(roots)
 
     def each(record: AnyRecord) -> None:

@@ -6,12 +6,12 @@ from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.report import Report
+from rtshcua.evidence.report import LogReport
 
 _RECOVER = b',"type":"recover"'
 
 
-def lasted_us(report: Report, log: Path) -> int:
+def lasted_us(report: LogReport, log: Path) -> int:
     """From the first record of a verified log to the last one that the flight wrote, in us."""
     assert report.genesis is not None
     last_us = report.last_us

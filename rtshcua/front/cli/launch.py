@@ -22,7 +22,7 @@ from rtshcua.adapters.store.runs import BUNDLE, LOG, RunFolder
 from rtshcua.adapters.store.signing import LinkKeyError
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, make_folder
 from rtshcua.adapters.utc import UtcWatch, vehicle_counts
-from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
@@ -72,7 +72,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.frames import Gate
 from rtshcua.onboard.enforcement.isolated import IsolatedExecutor, IsolatedGate
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, EnforcementMode, Loaded, load
 from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
 from rtshcua.onboard.ports import Ending, Event
 from rtshcua.onboard.rehearsal import stranded
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
 _UNHURRIED = 5
 
 #: the mode of what is decided in this process, of the mode that was asked for
-_HERE = {Mode.PROCESS: Mode.SOFTWARE}
+_HERE = {EnforcementMode.PROCESS: EnforcementMode.SOFTWARE}
 _LOOPBACK = "127.0.0.1"
 _TOO_SLOW = "a faster link, or longer deadlines and times to stale in the policy; docs/flying/link.md counts octets"
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
@@ -134,7 +134,7 @@ class Launch:
     bundle: Path
     link: Address | None
     simulator: Sequence[str]
-    mode: Mode
+    mode: EnforcementMode
     speed: float
     vehicle: str | None
     roots: Sequence[Path]
@@ -426,7 +426,7 @@ def _apart(
         raise order.listening
     if order.listening is not None:
         return Apart(order.listening, loaded.vehicle, trust.root, order.settings)
-    if order.mode is not Mode.PROCESS or order.dry_run or trust.distrust is not None:
+    if order.mode is not EnforcementMode.PROCESS or order.dry_run or trust.distrust is not None:
         return None
     assert not isinstance(own_key, Elsewhere)
     try:
@@ -821,7 +821,7 @@ def _utc(order: Launch, clock: LinkClock) -> UtcWatch:
     takes what the boundary of a flight would take.
     """
     if order.link is not None and order.speed == 1:
-        apart = order.dry_run and order.mode is Mode.PROCESS
+        apart = order.dry_run and order.mode is EnforcementMode.PROCESS
         counts = vehicle_counts(apart=apart, keyed=order.signing_key is not None)
         return UtcWatch(clock, order.utc_error_us, vehicle=counts)
     return UtcWatch.simulated(clock)
@@ -1000,7 +1000,7 @@ def _open(order: Launch) -> Transport:
         return order.transport
     link = order.link
     if link is None:
-        link = Address(Way.UDP_IN, _LOOPBACK, 0)
+        link = Address(LinkCarrier.UDP_IN, _LOOPBACK, 0)
     try:
         return open_transport(link)
     except OSError as error:

@@ -11,7 +11,7 @@ from typing import Annotated, Final, NamedTuple
 import msgspec
 import typer
 
-from rtshcua.adapters.agent_socket import Answered, FlightFollower
+from rtshcua.adapters.agent_socket import FlightFollower, FlightReply
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.documents import Claimed
@@ -22,7 +22,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Close, Decision, Effect
+from rtshcua.evidence.records import Close, DecisionRecord, Effect
 from rtshcua.front.cli.document_options import ApprovalKey, AsJson, FlyingBundle, PassphraseFile, Person, SignedRoot
 from rtshcua.front.cli.documents import MOST_S, subject
 from rtshcua.front.cli.faults import refuse
@@ -251,25 +251,25 @@ class OperatorConsole:
         self._heard_s = time.monotonic()
         self._told_silence = False
         for line in lines:
-            if isinstance(line, Answered):
+            if isinstance(line, FlightReply):
                 self._answered(line)
                 continue
             record = read(line)
             if isinstance(record, Flaw):
                 self._meet(line)
-            elif isinstance(record, Decision | Effect):
+            elif isinstance(record, DecisionRecord | Effect):
                 names = self._names or Names(None)
                 names.follow(record)
                 self._replaced += isinstance(record, Effect) and record.event == REPLACED
                 self.tell(record.event if isinstance(record, Effect) else record.outcome, names.tell(record))
-                if isinstance(record, Decision) and record.reason == Reason.AWAITING_APPROVAL.value:
+                if isinstance(record, DecisionRecord) and record.reason == Reason.AWAITING_APPROVAL.value:
                     self._tell_whom(record, names)
             elif isinstance(record, Close):
                 self.tell("over", f"the flight is over: {record.ending}")
                 return True
         return False
 
-    def _tell_whom(self, record: Decision, names: Names) -> None:
+    def _tell_whom(self, record: DecisionRecord, names: Names) -> None:
         """Whom a step waits for, how long, and what they type: as `run` tells it."""
         ahead = record.utc_us > time.time_ns() // 1000 + _AHEAD_US
         # an agent's mission flies under the same policy, but its bundle lies elsewhere
@@ -289,7 +289,7 @@ class OperatorConsole:
         for line in asked(record.step, names.step(record.step) or "of another mission", whom, columns() - len(beneath)):
             self._output.tell(visible(f"{beneath}{line}"))
 
-    def _answered(self, answer: Answered) -> None:
+    def _answered(self, answer: FlightReply) -> None:
         accepted = answer.slug == "accepted"
         # one that was sent again finds the flight recalled by the first, whose answer was lost
         self._code = ExitCode.OK if accepted or answer.slug == "recalled" else ExitCode.REFUSED

@@ -7,7 +7,7 @@ from rtshcua.adapters.store.logs import START
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, lines_below, logs_of
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.report import LogReport, LogVerdict
 
 _MARK = b'"format":"rtshcua/log"'
 _HEAD = 1 << 26
@@ -67,10 +67,10 @@ def is_log(path: Path) -> bool:
     return not line or line.startswith(START) or _MARK in line
 
 
-def exit_code(report: Report) -> ExitCode:
+def exit_code(report: LogReport) -> ExitCode:
     """The exit code for a report."""
     if report.failure is None:
-        return ExitCode.OK if report.verdict is Verdict.VERIFIED else ExitCode.INCOMPLETE
+        return ExitCode.OK if report.verdict is LogVerdict.VERIFIED else ExitCode.INCOMPLETE
     return exit_code_of(report.failure.slug)
 
 

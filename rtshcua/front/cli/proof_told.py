@@ -11,13 +11,13 @@ from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Claim, Flaw
 from rtshcua.evidence.proofs.check import Proven
-from rtshcua.evidence.proofs.cose_receipt import Received
-from rtshcua.evidence.proofs.file import Kind
-from rtshcua.evidence.proofs.trust import Name
+from rtshcua.evidence.proofs.cose_receipt import ReceiptClaim
+from rtshcua.evidence.proofs.file import ProofKind
+from rtshcua.evidence.proofs.trust import LogName
 from rtshcua.evidence.records import encode
 from rtshcua.front.cli.claims import listed, write
 
-Told: TypeAlias = Proven | Received | Flaw
+Told: TypeAlias = Proven | ReceiptClaim | Flaw
 
 _SHOWN = 160
 _HELPS = {"trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key"}
@@ -39,7 +39,7 @@ def as_object(result: Told, path: Path, pinned: Pin, code: ExitCode) -> dict[str
         "kind": _kind(result),
         "log": {"origin": name.origin, "vehicle": name.vehicle, "boot": name.boot},
         "log_key": _key(result),
-        "size": result.size if isinstance(result, Received) else result.checkpoint.size,
+        "size": result.size if isinstance(result, ReceiptClaim) else result.checkpoint.size,
         "record": _record(result),
         "proven": [claim._asdict() for claim in claims(result)[0]],
         "not_proven": [claim._asdict() for claim in claims(result)[1]],
@@ -81,27 +81,27 @@ def as_text(result: Told, path: Path, pinned: Pin, *, kept: bool, first: bool) -
     write(lines)
 
 
-def claims(result: Proven | Received) -> tuple[list[Claim], list[Claim]]:
+def claims(result: Proven | ReceiptClaim) -> tuple[list[Claim], list[Claim]]:
     """What the proof proves, and what it does not."""
     key = f"log key {_key(result)}, which the trust root names for `{_name(result).vehicle}`"
     last = "that nothing was added, and what the other records say: `verify-log` proves a log"
     rewritten = "unanchored: too few witnesses vouch for it here, and the log key's holder could have written it anew"
     unproven = [Claim("rest", last), Claim("anchor", rewritten)]
-    if isinstance(result, Received):
+    if isinstance(result, ReceiptClaim):
         text = f"record {result.number} stands in the log of {many(result.size, 'record')} that {key}, signed on export"
         return [Claim("inclusion", text)], unproven
     size = many(result.checkpoint.size, "record")
     chain = Claim("signature", f"the log of {size} was signed in the chain of keys that begins with {key}")
     match result.kind:
-        case Kind.INCLUSION:
+        case ProofKind.INCLUSION:
             what = Claim("inclusion", f"record {result.number} stands in the log as it was signed at {size}")
-        case Kind.CONSISTENCY:
+        case ProofKind.CONSISTENCY:
             before = f"{many(result.number, 'record')} that {'was' if result.number == 1 else 'were'} signed before"
             text = f"the log of {size} begins with the {before}"
             more = f"what was added since record {result.number}, and what any record says: `verify-log` proves a log"
             unproven[0] = Claim("rest", more)
             what = Claim("consistency", f"{text}: none of those was changed, added or taken out")
-        case Kind.RECORD:
+        case ProofKind.RECORD:
             what = Claim("record", f"record {result.number} was signed itself, as it stands here")
     cosigned = result.believed.cosigned
     if not cosigned:
@@ -111,19 +111,19 @@ def claims(result: Proven | Received) -> tuple[list[Claim], list[Claim]]:
     return [what, chain, anchor], unproven[:-1] if result.believed.anchored else unproven
 
 
-def _kind(result: Proven | Received) -> str:
-    return "receipt" if isinstance(result, Received) else result.kind.name.lower()
+def _kind(result: Proven | ReceiptClaim) -> str:
+    return "receipt" if isinstance(result, ReceiptClaim) else result.kind.name.lower()
 
 
-def _name(result: Proven | Received) -> Name:
-    return result.name if isinstance(result, Received) else result.believed.name
+def _name(result: Proven | ReceiptClaim) -> LogName:
+    return result.name if isinstance(result, ReceiptClaim) else result.believed.name
 
 
-def _key(result: Proven | Received) -> str:
-    return (result.log_key if isinstance(result, Received) else result.believed.log_key).kid.hex()
+def _key(result: Proven | ReceiptClaim) -> str:
+    return (result.log_key if isinstance(result, ReceiptClaim) else result.believed.log_key).kid.hex()
 
 
-def _record(result: Proven | Received) -> dict[str, object] | None:
+def _record(result: Proven | ReceiptClaim) -> dict[str, object] | None:
     """The fields of the record that is proven."""
     if result.record is None:
         return None
@@ -131,7 +131,7 @@ def _record(result: Proven | Received) -> dict[str, object] | None:
     return fields
 
 
-def _fields(result: Proven | Received) -> list[tuple[str, str]]:
+def _fields(result: Proven | ReceiptClaim) -> list[tuple[str, str]]:
     record = _record(result)
     lines = []
     for key, value in (record or {}).items():

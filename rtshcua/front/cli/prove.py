@@ -16,7 +16,7 @@ from rtshcua.adapters.store.writing import replace_inside
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.cose_receipt import TAG_18
-from rtshcua.evidence.proofs.file import MAX_PROOF, Kind
+from rtshcua.evidence.proofs.file import MAX_PROOF, ProofKind
 from rtshcua.evidence.proofs.make import (
     Lines,
     anchored,
@@ -36,7 +36,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
-_BEGINNINGS = tuple(f"{kind}\n".encode() for kind in Kind)
+_BEGINNINGS = tuple(f"{kind}\n".encode() for kind in ProofKind)
 _IN_RECEIPT = b"rtshcua/record"
 _TRIED = 16  # checkpoints with notes of witnesses, of which the log may be read for each
 _UNANCHORED = "  not anchored: too few witnesses cosigned the checkpoint that vouches for it; `--at` takes another"

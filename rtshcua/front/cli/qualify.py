@@ -15,7 +15,7 @@ from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.doctor.diagnosis import settings_told
 from rtshcua.adapters.doctor.standing import unflown
 from rtshcua.adapters.qualification.checks import ends_after, judge
-from rtshcua.adapters.qualification.missions import NAME, Trial, source_of, trials
+from rtshcua.adapters.qualification.missions import NAME, SortiePlan, source_of, trials
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie, TakeoverKind
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
 from rtshcua.adapters.store.folders import data_folder, state_folder
@@ -24,7 +24,7 @@ from rtshcua.adapters.store.qualifications import keep_record, read_record
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError
-from rtshcua.adapters.vehicle.bounds import Reach
+from rtshcua.adapters.vehicle.bounds import FlightReach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.app.exit_codes import code_of, exit_code, untrusted
@@ -48,7 +48,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import Gate
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Ending, Event
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import policy_digest, policy_payload
@@ -152,7 +152,8 @@ def qualify(
         plan.prepare()
         with tempfile.TemporaryDirectory(prefix="rtshcua-") as folder:
             order = Launch(
-                bundle=Path(folder), link=link, simulator=(), mode=Mode.SOFTWARE, speed=speed, vehicle=vehicle,
+                bundle=Path(folder), link=link, simulator=(), mode=EnforcementMode.SOFTWARE, speed=speed,
+                vehicle=vehicle,
                 roots=(), log_key=None, passphrase_file=passphrase_file, data=data_folder(),
                 state=state_folder(), runs=runs,
                 style="json" if as_json else "lines", fence=not no_fence, signing_key=signing_key,
@@ -255,7 +256,7 @@ class Qualifying:
     missing: dict[str, str]
     pilot: str
     passphrase_file: Path | None
-    trial: Trial | None = None
+    trial: SortiePlan | None = None
     keys: dict[Duty, SigningKey] = field(default_factory=dict)
     flown: list[_Flown] = field(default_factory=list)
 
@@ -338,12 +339,12 @@ class Qualifying:
         except Untrusted:
             return False
 
-    def _refused(self, trial: Trial) -> Compiled | None:
+    def _refused(self, trial: SortiePlan) -> Compiled | None:
         """The first of the missions that does not compile; those with a leg are tried before the others."""
         legs = sorted(self.sorties, key=lambda each: MotionKind.FLY not in each.steps)
         return next((each for sortie in legs if (each := self._compiled(sortie, trial)).mission is None), None)
 
-    def _compiled(self, sortie: Sortie, trial: Trial) -> Compiled:
+    def _compiled(self, sortie: Sortie, trial: SortiePlan) -> Compiled:
         by_pilot = sortie is BY_PILOT
         try:
             text = source_of(sortie, trial, self.source.name, self.policy, self.mission, by_pilot=by_pilot)
@@ -377,7 +378,7 @@ class Qualifying:
             flavour.mode_within_us * self.flown[0].slack,
             max((each for each in trips if each is not None), default=None),
             sorties,
-            tuple(settings_told(flavour.name, questions.values.values, self.policy, Reach())),
+            tuple(settings_told(flavour.name, questions.values.values, self.policy, FlightReach())),
             self.missing,
         )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim, Finding
-from rtshcua.evidence.report import Report
+from rtshcua.evidence.report import LogReport
 from rtshcua.ground.audit.frames import OTHERS, Frames
 from rtshcua.mavlink import tlog
 
@@ -29,13 +29,13 @@ class RawFrames:
             except tlog.DamagedTlog as damaged:
                 self._damaged = damaged.offset
 
-    def unread(self, report: Report) -> Report:
+    def unread(self, report: LogReport) -> LogReport:
         """The report, where nobody looked at these frames."""
         if report.failure is not None or not self._path.exists():
             return report
         return _unproven(report, f"the raw frames: `{self._path.name}` was not read: without `--fast`")
 
-    def judged(self, report: Report, *, followed: bool) -> Report:
+    def judged(self, report: LogReport, *, followed: bool) -> LogReport:
         """The report, with what it says of these frames; `followed` says that an audit has followed them."""
         close = report.close
         if close is None or report.failure is not None:
@@ -54,7 +54,7 @@ class RawFrames:
         report = report._replace(proven=(*report.proven, Claim("telemetry", f"`{name}` is the one that was signed")))
         return self._followed(report) if followed else report
 
-    def _followed(self, report: Report) -> Report:
+    def _followed(self, report: LogReport) -> LogReport:
         found, count = self.frames.over(), self.frames.count
         if found is not None and not (found.slug == OTHERS and self._damaged is not None):
             return report._replace(failure=found)
@@ -68,5 +68,5 @@ class RawFrames:
         return _unproven(report._replace(proven=(*report.proven, claim)), text)
 
 
-def _unproven(report: Report, text: str) -> Report:
+def _unproven(report: LogReport, text: str) -> LogReport:
     return report._replace(unproven=(*report.unproven, Claim("telemetry", text)))

@@ -9,12 +9,12 @@ import typer
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.last_log import known_end
-from rtshcua.adapters.store.recovery import InUse, Recovered, Signer, examine, recover
+from rtshcua.adapters.store.recovery import InUse, LogEnder, Recovered, examine, recover
 from rtshcua.app.documents import no_log
 from rtshcua.app.fly.previous_log import signer_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
-from rtshcua.evidence.recovery import RECOVERABLE, Examined, State
+from rtshcua.evidence.recovery import RECOVERABLE, FoundLog, LogState
 from rtshcua.front.cli.faults import fail, of_each, tell
 from rtshcua.front.cli.outcome import is_log, logs_meant
 from rtshcua.front.cli.stdout import out, out_json
@@ -24,18 +24,18 @@ from rtshcua.wire.keys import Duty
 app = typer.Typer(add_completion=False)
 
 _CODES = {
-    State.CLOSED: ExitCode.OK,
-    State.WHOLE: ExitCode.INCOMPLETE,
-    State.TORN: ExitCode.INCOMPLETE,
-    State.UNBEGUN: ExitCode.EVIDENCE,
-    State.TAMPERED: ExitCode.EVIDENCE,
-    State.FOREIGN: ExitCode.UNTRUSTED,
+    LogState.CLOSED: ExitCode.OK,
+    LogState.WHOLE: ExitCode.INCOMPLETE,
+    LogState.TORN: ExitCode.INCOMPLETE,
+    LogState.UNBEGUN: ExitCode.EVIDENCE,
+    LogState.TAMPERED: ExitCode.EVIDENCE,
+    LogState.FOREIGN: ExitCode.UNTRUSTED,
 }
 _KEPT = "nothing was changed: every byte of it is where it was"
 _HELPS = {
-    State.TAMPERED: f"{_KEPT}; `rtshcua verify-log` says more",
-    State.FOREIGN: f"{_KEPT}; `--log-key` takes the key that the flight was made with",
-    State.UNBEGUN: f"{_KEPT}; the flight broke off before it began",
+    LogState.TAMPERED: f"{_KEPT}; `rtshcua verify-log` says more",
+    LogState.FOREIGN: f"{_KEPT}; `--log-key` takes the key that the flight was made with",
+    LogState.UNBEGUN: f"{_KEPT}; the flight broke off before it began",
 }
 
 
@@ -64,7 +64,7 @@ def recover_logs(
     return of_each(logs_meant(logs), lambda path, _: _recover(path, signer, state, as_json=as_json))
 
 
-def _recover(path: Path, signer: Signer | None, state: Path, *, as_json: bool) -> ExitCode:
+def _recover(path: Path, signer: LogEnder | None, state: Path, *, as_json: bool) -> ExitCode:
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(path, path, _KEPT))
     try:
@@ -81,7 +81,7 @@ def _recover(path: Path, signer: Signer | None, state: Path, *, as_json: bool) -
     code = ExitCode.OK if done.done else _code(done.found)
     if as_json:
         out_json(json.dumps(_object(path, done, code), ensure_ascii=False), flush=True)
-    elif done.done or done.found.state in (*RECOVERABLE, State.CLOSED):
+    elif done.done or done.found.state in (*RECOVERABLE, LogState.CLOSED):
         out(*_told(path, done), flush=True)
     if done.found.state in _HELPS:
         return tell(code, f"`{path}`: {_why(done.found)}", _HELPS[done.found.state])
@@ -98,27 +98,27 @@ def _cut(path: Path, state: Path) -> Recovered | None:
         return None
     text = "it was closed once, and what stands at its end now is not that: its end was cut off or written anew"
     reason = Finding("close/missing", found.records, text, found.head.prev, end, found.kept)
-    return Recovered(found._replace(state=State.TAMPERED, reason=reason), False, None, found.head.prev)
+    return Recovered(found._replace(state=LogState.TAMPERED, reason=reason), False, None, found.head.prev)
 
 
-def _code(found: Examined) -> ExitCode:
+def _code(found: FoundLog) -> ExitCode:
     slug = "" if found.reason is None else found.reason.slug
     if slug == "genesis/format":
         return ExitCode.UNTRUSTED
     if slug.startswith("anchor/"):
         return ExitCode.ANCHOR
-    if found.state is State.UNBEGUN and slug.startswith("record/"):
+    if found.state is LogState.UNBEGUN and slug.startswith("record/"):
         return ExitCode.INPUT  # a whole line, and none of ours
     return _CODES[found.state]
 
 
-def _why(found: Examined) -> str:
+def _why(found: FoundLog) -> str:
     reason = found.reason
     where = "" if reason is None else f"record {reason.record}, octet {reason.offset}: {reason.text}"
     match found.state:
-        case State.TAMPERED:
+        case LogState.TAMPERED:
             return f"this was no crash, and it is not signed: {where}"
-        case State.FOREIGN:
+        case LogState.FOREIGN:
             return "its flight was made with another log key"
         case _:
             none = "it is not a log of this program" if _code(found) is ExitCode.INPUT else ""
@@ -127,7 +127,7 @@ def _why(found: Examined) -> str:
 
 def _told(path: Path, done: Recovered) -> list[str]:
     found = done.found
-    if found.state is State.CLOSED:
+    if found.state is LogState.CLOSED:
         return [f"{path}: closed, {_many(found.records)}; nothing to recover"]
     loose = found.records - found.sealed
     said = [f"{path}: {'recovered' if done.done else 'can be recovered'}, {_many(found.records)} kept"]

@@ -15,7 +15,7 @@ import typer
 
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import Address, AddressError, Way
+from rtshcua.adapters.vehicle.address import Address, AddressError, LinkCarrier
 from rtshcua.adapters.vehicle.transport import Transport, open_transport
 from rtshcua.app.fly import witnesses as witnessed
 from rtshcua.app.fly.refused import Refused
@@ -35,8 +35,8 @@ from rtshcua.front.cli.connection import (
 )
 from rtshcua.front.cli.faults import fail, misaddressed
 from rtshcua.front.cli.refused import say_refused
-from rtshcua.onboard.enforcement.load import Mode
-from rtshcua.simulation.config import Kind
+from rtshcua.onboard.enforcement.load import EnforcementMode
+from rtshcua.simulation.config import AutopilotKind
 
 if TYPE_CHECKING:
     from rtshcua.app.fly.incidents import Incidents
@@ -221,7 +221,7 @@ def _listening(link: Address | None, stack: ExitStack) -> Transport | None:
     """The port at which a vehicle is heard, until the stack is closed, if it can be had; else whoever flies opens it,
     and says why not.
     """
-    if link is None or link.way is not Way.UDP_IN:
+    if link is None or link.way is not LinkCarrier.UDP_IN:
         return None
     try:
         transport = open_transport(link)
@@ -231,7 +231,7 @@ def _listening(link: Address | None, stack: ExitStack) -> Transport | None:
     return transport
 
 
-def _incidents(text: str, flavour: Kind | None, seed: int | None) -> "Incidents":
+def _incidents(text: str, flavour: AutopilotKind | None, seed: int | None) -> "Incidents":
     from rtshcua.app.fly.incidents import Incidents
     from rtshcua.front.cli.scenario_option import chosen  # compiles sources, which no other run does
 
@@ -276,11 +276,11 @@ def _misplaced(*, wait: bool, timed: bool, socket: bool, never: bool) -> str | N
     return None
 
 
-def _not_with_socket(given: Mapping[str, object], *, own: bool, mode: Mode | None) -> str:
+def _not_with_socket(given: Mapping[str, object], *, own: bool, mode: EnforcementMode | None) -> str:
     """What is wrong about `--boundary-socket` on a command line with these options; empty for nothing."""
     if own:
         return "`--boundary-socket` goes with `--connect`"
-    if mode not in (None, Mode.PROCESS):
+    if mode not in (None, EnforcementMode.PROCESS):
         return f"`--boundary-socket` goes with `--mode process`, not with `{mode}`"
     found = next((name for name, value in given.items() if value), None)
     if found is None:
@@ -288,9 +288,9 @@ def _not_with_socket(given: Mapping[str, object], *, own: bool, mode: Mode | Non
     return f"`{found}` does not go with `--boundary-socket`: {_OWN_TIME if found == _UTC_ERROR else _OWN}"
 
 
-def _boundary_user(name: str | None, mode: Mode) -> tuple[int, int] | str | None:
+def _boundary_user(name: str | None, mode: EnforcementMode) -> tuple[int, int] | str | None:
     """The ids of the user and group that the boundary's process runs as; what is wrong, in words."""
-    if mode is not Mode.PROCESS:
+    if mode is not EnforcementMode.PROCESS:
         return None if name is None else "`--boundary-user` goes with `--mode process`"
     if name is None:
         return None

@@ -13,18 +13,18 @@ from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.utc import kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import AddressError, Way
+from rtshcua.adapters.vehicle.address import AddressError, LinkCarrier
 from rtshcua.app.exit_codes import code_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import simulated
 from rtshcua.front.cli.faults import fail, misaddressed
 from rtshcua.front.cli.stdout import out, out_json
-from rtshcua.simulation.config import Answers, Boot, Estimate, Kind
+from rtshcua.simulation.config import Answers, AutopilotKind, Boot, Estimate
 
 PORT = 14_550
 _FIRST_STEPS = {
-    Kind.PX4: ("arm throttle", "long NAV_TAKEOFF -1 0 0 nan nan nan nan", "long NAV_RETURN_TO_LAUNCH"),
-    Kind.ARDUPILOT: ("mode GUIDED", "arm throttle", "takeoff 10", "mode RTL"),
+    AutopilotKind.PX4: ("arm throttle", "long NAV_TAKEOFF -1 0 0 nan nan nan nan", "long NAV_RETURN_TO_LAUNCH"),
+    AutopilotKind.ARDUPILOT: ("mode GUIDED", "arm throttle", "takeoff 10", "mode RTL"),
 }
 """What to type in MAVProxy for a first flight. For PX4, `takeoff 10` would be 10 m above the sea: no climb at all; and
 MAVProxy cannot pack PX4's modes (`mode RTL`)."""
@@ -80,7 +80,7 @@ def sim(
         return fail(ExitCode.USAGE, "`--port` and `--connect` say the same thing: give one")
     if connect is not None:
         try:
-            link = address.parse(connect, (Way.UDP_OUT,))
+            link = address.parse(connect, (LinkCarrier.UDP_OUT,))
         except AddressError as error:
             return misaddressed("--connect", error)
         if not link.is_loopback:
@@ -137,7 +137,7 @@ def _options(signing_key: Path | None, speed: float) -> str:
 
 def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None, speed: float) -> list[str]:
     """What was started, and what a person types to fly it."""
-    flavour = Kind(ready["flavour"])
+    flavour = AutopilotKind(ready["flavour"])
     more = _options(signing_key, speed)
     finds = "start it: it listens on this port by itself"
     adds = f"Application Settings, Comm Links, Add: type UDP, port {port}"

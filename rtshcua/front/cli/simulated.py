@@ -7,7 +7,7 @@ import typer
 
 from rtshcua.model.faults import WindStep
 from rtshcua.model.flat.policy import Policy
-from rtshcua.simulation.config import Kind
+from rtshcua.simulation.config import AutopilotKind
 from rtshcua.simulation.fault_syntax import OF_VEHICLE, parse_fault
 
 _BARE = re.compile(r"\d+(\.\d+)?", re.ASCII)
@@ -57,7 +57,7 @@ def _faults(texts: list[str] | None) -> list[str] | None:
     return texts
 
 
-Flavour = Annotated[Kind | None, typer.Option(help="which autopilot the simulated vehicle is (px4)")]
+Flavour = Annotated[AutopilotKind | None, typer.Option(help="which autopilot the simulated vehicle is (px4)")]
 Battery = Annotated[float | None, typer.Option(min=0, max=100, metavar="PERCENT", help="its charge at the start (100)")]
 Wind = Annotated[
     str | None,
@@ -80,7 +80,7 @@ Seed = Annotated[int | None, typer.Option(help="of its noise and gusts: the same
 
 def arguments(
     *,
-    flavour: Kind | None,
+    flavour: AutopilotKind | None,
     battery: float | None,
     wind: str | None,
     faults: list[str] | None,

@@ -2,7 +2,7 @@
 
 from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.records import AnyRecord, Effect
-from rtshcua.evidence.report import Report
+from rtshcua.evidence.report import LogReport
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 from rtshcua.wire.request import STEP
 
@@ -25,7 +25,7 @@ class UnconfirmedFallbacks:
         if isinstance(record, Effect) and is_unconfirmed(record.kind, record.detail):
             self._records.append(record.seq)
 
-    def told(self, report: Report) -> Report:
+    def told(self, report: LogReport) -> LogReport:
         """The report of a log without failure, with what is not shown."""
         if not self._records or report.failure is not None:
             return report

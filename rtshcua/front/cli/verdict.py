@@ -9,7 +9,7 @@ from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.gaps import seconds
-from rtshcua.evidence.report import Report, Verdict, cosigned
+from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
 from rtshcua.front.cli.claims import listed, write
 from rtshcua.front.cli.flown import lasted_us
 from rtshcua.ground.audit.audit import Audit
@@ -66,9 +66,9 @@ HELPS = {
 
 _SHOWN = 160
 _TITLES = {
-    Verdict.VERIFIED: ("VERIFIED", "bold green"),
-    Verdict.INCOMPLETE: ("INCOMPLETE", "bold yellow"),
-    Verdict.FAILED: ("FAILED", "bold red"),
+    LogVerdict.VERIFIED: ("VERIFIED", "bold green"),
+    LogVerdict.INCOMPLETE: ("INCOMPLETE", "bold yellow"),
+    LogVerdict.FAILED: ("FAILED", "bold red"),
 }
 _SIGNED = {"genesis", "seal", "recover", "close"}
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
@@ -140,7 +140,7 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
     write(lines)
 
 
-def _flight(report: Report, path: Path) -> list[tuple[str, str]]:
+def _flight(report: LogReport, path: Path) -> list[tuple[str, str]]:
     genesis, close = report.genesis, report.close
     if genesis is None:
         return []
@@ -163,7 +163,7 @@ def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
         yield "", f"  help      {HELPS[finding.slug]}"
 
 
-def _gapped(report: Report) -> str:
+def _gapped(report: LogReport) -> str:
     """That nothing was recorded for a while, for how long, and who says so."""
     longest = max(gap.us for gap in report.gaps)
     both = all(gap.boundary is not None for gap in report.gaps)
@@ -178,14 +178,14 @@ def meaning_of(slug: str, *, failed: bool) -> str:
     return _OF_SLUG.get(slug) or (MEANINGS if failed else _SHORT)[slug.partition("/")[0]]
 
 
-def _anchored(report: Report) -> str:
+def _anchored(report: LogReport) -> str:
     if not report.anchored:
         return (report.outside and cosigned(report.outside)) or "unanchored"
     tail = report.records - report.anchored
     return f"anchored but for the last {_many(tail, 'record')}" if tail else "anchored to its end"
 
 
-def _counts(report: Report) -> Iterable[tuple[str, str]]:
+def _counts(report: LogReport) -> Iterable[tuple[str, str]]:
     counts = report.counts
     if not counts:
         return

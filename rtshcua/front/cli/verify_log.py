@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from rtshcua.adapters.store.keystore import read_root
-from rtshcua.adapters.store.verification import Asked, Progress, verify_carefully, verify_quickly
+from rtshcua.adapters.store.verification import Progress, VerificationInputs, verify_carefully, verify_quickly
 from rtshcua.app.documents import no_log
 from rtshcua.app.fly.simulated_flight import with_simulated
 from rtshcua.app.pin import Pin, pin
@@ -18,7 +18,7 @@ from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.records import AnyRecord
-from rtshcua.evidence.report import Report, Verdict, cosigned
+from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
 from rtshcua.front.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
 from rtshcua.front.cli.faults import distrust, fail, of_each, say
 from rtshcua.front.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_and_others
@@ -122,7 +122,7 @@ def _verify(
     path = log_of(given)
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(path, given, NO_LOG_HELP))
-    asked = Asked(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
+    asked = VerificationInputs(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
     raw = raw_frames(path)
     unconfirmed, revoked = UnconfirmedFallbacks(), RevokedKeys(wanted.roots)
 
@@ -151,9 +151,9 @@ def _verify(
     return code
 
 
-def _required(report: Report) -> Report:
+def _required(report: LogReport) -> LogReport:
     """The report of a log that must be anchored to its end."""
-    if report.verdict is not Verdict.VERIFIED or report.anchored == report.records:
+    if report.verdict is not LogVerdict.VERIFIED or report.anchored == report.records:
         return report
     text = "witnesses did not see the log to its end, as was asked for"
     few = "" if report.outside is None else cosigned(report.outside)

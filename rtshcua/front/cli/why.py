@@ -29,7 +29,7 @@ from rtshcua.ground.why.given import given, settings
 from rtshcua.ground.why.nominal import nominal
 from rtshcua.ground.why.trace import trace
 from rtshcua.mavlink import dialect
-from rtshcua.model.flat.situation import Approval, Context, Now
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now
 from rtshcua.model.step_number import index_of, number_of
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 from rtshcua.wire.binding import bind
@@ -160,10 +160,10 @@ def _by_hand(
     return shown
 
 
-def _approvals(invocation: PreparedInvocation) -> tuple[Approval, ...]:
+def _approvals(invocation: PreparedInvocation) -> tuple[ConfirmAnswer, ...]:
     """A grant of each role that a `confirm` asks, by as many people."""
     return tuple(
-        Approval(confirm.number, role, 1, 0, person)
+        ConfirmAnswer(confirm.number, role, 1, 0, person)
         for confirm in invocation.candidates.confirms
         for person, role in enumerate((confirm.rule.approver, confirm.rule.second))
         if role != -1

@@ -15,7 +15,7 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.gaps import STALLED
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.front.cli.faults import fail
 from rtshcua.front.cli.outcome import CUT_AT_FIRST
 from rtshcua.front.cli.showing.link import show_link
@@ -63,7 +63,7 @@ class _Log:
 
     def __init__(self, path: Path, number: int | None) -> None:
         self.start_us = 0
-        self.chosen: Decision | Effect | Close | Recover | Seal | None = None
+        self.chosen: DecisionRecord | Effect | Close | Recover | Seal | None = None
         self.what = ""  # that record in one line
         self.subject: Subject | None = None  # the mission in force when the chosen record was written
         self.aloft = False  # something was sent before the chosen record that may have lifted it off
@@ -118,7 +118,7 @@ class _Log:
             return None
         if isinstance(record, Effect):
             self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
-        if isinstance(record, Decision):
+        if isinstance(record, DecisionRecord):
             if record.kind != STEP:
                 self.ended.append(self._tell(record))
         elif isinstance(record, Close | Recover):
@@ -134,13 +134,13 @@ class _Log:
             self._in_force = newer
         return None
 
-    def _find_cause(self, record: Decision | Effect | Close | Recover | Seal) -> None:
+    def _find_cause(self, record: DecisionRecord | Effect | Close | Recover | Seal) -> None:
         """The last thing that turned the mission away from its steps, before a link flew: a step that is admitted
         later says that it went on all the same. What is not known because the computer stood still, that caused.
         """
         if self._caused_by == STOOD_STILL and _for_unknown(record):
             return
-        if isinstance(record, Decision):
+        if isinstance(record, DecisionRecord):
             if record.kind != STEP:
                 self._falls = True
             elif record.outcome == "allow":
@@ -157,30 +157,30 @@ class _Log:
         elif isinstance(record, Close) and record.ending == "completed":
             self.cause = None
 
-    def _tell(self, record: Decision | Effect | Close | Recover | Seal) -> _Told:
+    def _tell(self, record: DecisionRecord | Effect | Close | Recover | Seal) -> _Told:
         return _Told(record.seq, record.at_us, self._names.tell(record))
 
-    def _choose(self, record: Decision | Effect | Close | Recover | Seal) -> None:
+    def _choose(self, record: DecisionRecord | Effect | Close | Recover | Seal) -> None:
         if self._number is not None:
             if record.seq == self._number:
                 self._hold(record)
             return
-        if not isinstance(record, Decision) or record.kind != STEP:
+        if not isinstance(record, DecisionRecord) or record.kind != STEP:
             return
         held = self.chosen
-        if not isinstance(held, Decision) or held.outcome == "allow" or record.outcome != "allow":
+        if not isinstance(held, DecisionRecord) or held.outcome == "allow" or record.outcome != "allow":
             self._hold(record)
         elif held.step == record.step:
             self.allowed = self._tell(record)
 
-    def _hold(self, record: Decision | Effect | Close | Recover | Seal) -> None:
+    def _hold(self, record: DecisionRecord | Effect | Close | Recover | Seal) -> None:
         self.chosen, self.subject, self.aloft = record, self._in_force, self._flown
         self.what, self.allowed = self._names.tell(record), None
 
 
-def _for_unknown(record: Decision | Effect | Close | Recover | Seal) -> bool:
+def _for_unknown(record: DecisionRecord | Effect | Close | Recover | Seal) -> bool:
     """Whether it says that something failed for want of what is known."""
-    if isinstance(record, Decision):
+    if isinstance(record, DecisionRecord):
         return record.kind == STEP and record.reason in _FOR_UNKNOWN
     return isinstance(record, Effect) and record.event == "violated" and _UNKNOWN in record.detail
 
@@ -200,10 +200,10 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
     cause = log.cause if number is None else None
     if cause is not None and cause.seq != chosen.seq:
         _list(page, "The cause: why it ended early", [cause], log.start_us)
-        denied = isinstance(chosen, Decision) and chosen.outcome != "allow"
+        denied = isinstance(chosen, DecisionRecord) and chosen.outcome != "allow"
         page.head(f"Before that, the last decision on a step{' that was not `allow`' if denied else ''}")
     page.text(f"record {chosen.seq} of {path}, {utc(chosen.utc_us)} (not verified)", indent=0)
-    if isinstance(chosen, Decision):
+    if isinstance(chosen, DecisionRecord):
         shown = _decision(page, chosen, subject, log.aloft, log.people)
     else:
         shown = _effect(page, chosen, log)
@@ -211,7 +211,7 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
         return shown
     allowed = [] if log.allowed is None else [log.allowed]
     _list(page, "After it, the same step was allowed", allowed, log.start_us)
-    answers = [told for step, told in log.answers if isinstance(chosen, Decision) and step == chosen.step]
+    answers = [told for step, told in log.answers if isinstance(chosen, DecisionRecord) and step == chosen.step]
     _list(page, "What was answered about this step", answers, log.start_us)
     _list(page, "When the computer stood still: nothing was read, judged or sent", log.stalls, log.start_us)
     _list(
@@ -231,7 +231,7 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
 
 
 def _decision(
-    page: Page, chosen: Decision, subject: Subject, aloft: bool, people: People
+    page: Page, chosen: DecisionRecord, subject: Subject, aloft: bool, people: People
 ) -> dict[str, object] | ExitCode:
     state = state_of(chosen)
     if len(state.values) != subject.policy.policy.slots or len(state.ages) != len(state.values):

@@ -13,13 +13,13 @@ from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore, read_root
 from rtshcua.adapters.store.witness import Cosigned, FileWitness, NotCosigned, WitnessError, WitnessStore, drop, logs_in
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import AddressError, Way
+from rtshcua.adapters.vehicle.address import AddressError, LinkCarrier
 from rtshcua.adapters.witness_link import WitnessLink
 from rtshcua.app.exit_codes import exit_code_of, untrusted
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
+from rtshcua.evidence.witnessing.witness import CosignRequest, Declined, WitnessResponse
 from rtshcua.front.cli.faults import as_json as saying_json
 from rtshcua.front.cli.faults import distrust, fail, misaddressed, refuse
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
@@ -64,7 +64,7 @@ def witness(
     if watch is not None and not paths:
         return fail(ExitCode.USAGE, "`--watch` goes with a folder")
     try:
-        link = None if connect is None else address.parse(connect, (Way.UDP_IN,))
+        link = None if connect is None else address.parse(connect, (LinkCarrier.UDP_IN,))
     except AddressError as error:
         return misaddressed("--connect", error)
     for path in paths or ():
@@ -196,10 +196,10 @@ class _Desk:
         self._refused("log", str(found.log), found.slug, found.text, found.contradiction, found.proof)
         return ExitCode.ANCHOR if found.contradiction else ExitCode.EVIDENCE
 
-    def _consider(self, request: Request) -> Answer | Declined:
+    def _consider(self, request: CosignRequest) -> WitnessResponse | Declined:
         origin, size = request.note.split("\n", 2)[:2]
         found = self._witness.consider(request)
-        if isinstance(found, Answer):
+        if isinstance(found, WitnessResponse):
             said: dict[str, object] = {"event": "cosigned", "origin": origin, "size": int(size)}
             self._say(said, f"{origin}: cosigned {many(int(size) + 1, 'record')}")
             return found

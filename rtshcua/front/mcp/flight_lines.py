@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 
 import msgspec
 
-from rtshcua.evidence.records import Decision
+from rtshcua.evidence.records import DecisionRecord
 
 _Count = Annotated[int, msgspec.Meta(ge=0, lt=1 << 53)]
 _Step = Annotated[int, msgspec.Meta(ge=-1, lt=1 << 31)]
@@ -66,7 +66,7 @@ _TYPES: Final[Mapping[str, type[msgspec.Struct]]] = {
     "waiting": _Waiting,
     "vehicle": _Vehicle,
     "mission": _Mission,
-    "decision": Decision,
+    "decision": DecisionRecord,
     "effect": _Effect,
     "seal": _Sealing,
     "recover": _Sealing,
@@ -84,6 +84,6 @@ def understood(told: Any) -> dict[str, Any]:
     if fields is None:
         return {}
     msgspec.convert(found, fields)
-    if fields is Decision:
+    if fields is DecisionRecord:
         msgspec.convert(found, _Decided)
     return found

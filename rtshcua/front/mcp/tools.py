@@ -19,7 +19,7 @@ from rtshcua.adapters.agent_socket import hand_in
 from rtshcua.decision.nearest import Nearest
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.records import Decision
+from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.mcp.flight import Following
 from rtshcua.front.mcp.missions import Answer, Missions
 from rtshcua.ground.why.reads import reads
@@ -377,7 +377,7 @@ def _explained(chosen: Mapping[str, Any], policy: Policy, mission: Mission) -> d
     step = chosen.get("step", -1)
     if isinstance(ready, Refusal) or isinstance(invocations, Refusal) or not 0 <= step < len(invocations):
         return {}
-    record = msgspec.convert(dict(chosen), Decision)
+    record = msgspec.convert(dict(chosen), DecisionRecord)
     state, invocation = state_of(record), invocations[step]
     if not len(state.values) == len(state.ages) == policy.slots or len(state.monitors) != len(policy.monitors):
         return {}  # it is of another policy

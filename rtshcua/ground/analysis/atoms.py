@@ -50,7 +50,7 @@ def whether_there(box: Box, cells: tuple[Cell, ...]) -> list[Box]:
 class Linear(Atom):
     """A sum is in `low`..`high`; one of a single cell is about that cell, any other about a form."""
 
-    def __init__(self, terms: tuple[tree.Term, ...], low: int, high: int) -> None:
+    def __init__(self, terms: tuple[tree.LinearTerm, ...], low: int, high: int) -> None:
         self._cells: tuple[Cell, ...] = tuple((term.argument, term.at) for term in terms)
         moving = sorted(term for term in terms if term.factor)
         self._cell: Cell | None = None

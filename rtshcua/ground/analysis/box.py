@@ -2,13 +2,13 @@
 
 from typing import Final, TypeAlias
 
-from rtshcua.decision.tree import Term
+from rtshcua.decision.tree import LinearTerm
 from rtshcua.decision.values import ABSENT, PRESENT, Span, Truth, Value
 
 #: an argument cell (True) or a state slot (False), by its index
 Cell: TypeAlias = tuple[bool, int]
 #: a sum of several cells and slots: ascending, without a common factor, the first factor above zero
-Form: TypeAlias = tuple[Term, ...]
+Form: TypeAlias = tuple[LinearTerm, ...]
 #: what is a place: the vehicle, or the argument cell of a place's x
 Who: TypeAlias = int
 VEHICLE: Final[Who] = -1

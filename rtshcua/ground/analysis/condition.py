@@ -62,7 +62,7 @@ def over_boxes(node: tree.Node, space: Space, box: Box) -> Condition:
             return Pair(over_boxes(left, space, box), over_boxes(right, space, box), both=True)
         case tree.Either(left, right):
             return Pair(over_boxes(left, space, box), over_boxes(right, space, box), both=False)
-        case tree.Not(operand):
+        case tree.Negation(operand):
             return Negation(over_boxes(operand, space, box))
         case _:
             atom = _atom(node, space)
@@ -78,17 +78,17 @@ def _atom(node: tree.Node, space: Space) -> Atom:
             return Linear(terms, value, value)
         case tree.Member(argument, index, members):
             return Chosen((argument, index), space.tables.sets[members])
-        case tree.Known(slot):
+        case tree.SlotKnown(slot):
             return There(slot, space)
-        case tree.Inside(zone):
+        case tree.InsideZone(zone):
             return VehicleIn(zone, space)
         case tree.InsideArgument(cell, table):
             return VehicleInArgument(cell, space.tables.tables[table], space)
         case tree.PointInside(cell, zone):
             return PointIn(cell, zone, space)
-        case tree.InPhase(members):
+        case tree.PhaseIn(members):
             return Phase(space.tables.sets[members])
-        case tree.Monitored(monitor):
+        case tree.MonitorSays(monitor):
             return Monitor(monitor)
         case tree.InWindow() | tree.InWeek():
             return Local(node, space)

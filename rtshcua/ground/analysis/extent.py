@@ -48,7 +48,7 @@ def alternatives(node: tree.Node) -> tuple[Conjunction, ...]:
 def _alternatives(node: tree.Node, *, holds: bool) -> list[Conjunction] | None:
     """The alternatives of a condition, or of its `not`; None where there are too many."""
     match node:
-        case tree.Not(operand):
+        case tree.Negation(operand):
             return _alternatives(operand, holds=not holds)
         case tree.Both(left, right) | tree.Either(left, right):
             one, other = _alternatives(left, holds=holds), _alternatives(right, holds=holds)
@@ -59,7 +59,7 @@ def _alternatives(node: tree.Node, *, holds: bool) -> list[Conjunction] | None:
             else:
                 found = [Conjunction(_overlap(a.bounds, b.bounds), a.others | b.others) for a in one for b in other]
             return found if len(found) <= _PARTS else None
-    written = node if holds else tree.Not(node)
+    written = node if holds else tree.Negation(node)
     interval = _interval(written)
     if interval is None:
         return [Conjunction({}, frozenset((Other(repr(written), written),)))]
@@ -83,7 +83,7 @@ class Extents:
 
     def _parts(self, node: tree.Node, *, holds: bool) -> list[Bounds]:
         match node:
-            case tree.Not(operand):
+            case tree.Negation(operand):
                 return self._parts(operand, holds=not holds)
             case tree.Both(left, right) | tree.Either(left, right):
                 one, other = self._parts(left, holds=holds), self._parts(right, holds=holds)
@@ -98,12 +98,12 @@ class Extents:
                 return [*_linear(terms, -FAR, value - 1), *_linear(terms, value + 1, FAR)]
             case tree.Member(argument, at, members) if holds:
                 return [_hull((argument, at), self._tables.sets[members])]
-            case tree.InPhase(members) if holds:
+            case tree.PhaseIn(members) if holds:
                 return [_hull(PHASE, self._tables.sets[members])]
             case tree.PointInside(cell, zone) if holds:
                 west, south, east, north = self._box(zone)
                 return [{(True, cell): (west, east), (True, cell + 1): (south, north)}]
-            case tree.Inside(zone) if holds:
+            case tree.InsideZone(zone) if holds:
                 west, south, east, north = self._box(zone)
                 known = self._tables.known
                 return [{(False, known.x): (west, east), (False, known.y): (south, north)}]
@@ -136,7 +136,7 @@ def _interval(node: tree.Node) -> tuple[Cell, int, int] | None:
     match node:
         case tree.AtMost(terms, bound) if len(terms) == 1 and terms[0].factor:
             return _solved(terms[0], -FAR, bound)
-        case tree.Not(tree.AtMost(terms, bound)) if len(terms) == 1 and terms[0].factor:
+        case tree.Negation(tree.AtMost(terms, bound)) if len(terms) == 1 and terms[0].factor:
             return _solved(terms[0], bound + 1, FAR)
         case tree.Equal(terms, value) if len(terms) == 1 and terms[0].factor:
             return _solved(terms[0], value, value)
@@ -144,7 +144,7 @@ def _interval(node: tree.Node) -> tuple[Cell, int, int] | None:
             return None
 
 
-def _linear(terms: tuple[tree.Term, ...], low: int, high: int) -> list[Bounds]:
+def _linear(terms: tuple[tree.LinearTerm, ...], low: int, high: int) -> list[Bounds]:
     """The bounds of a sum in `low`..`high`; any, where it is of several cells."""
     moving = [term for term in terms if term.factor]
     if len(moving) != 1:
@@ -153,7 +153,7 @@ def _linear(terms: tuple[tree.Term, ...], low: int, high: int) -> list[Bounds]:
     return [{cell: (least, most)}] if least <= most else []
 
 
-def _solved(term: tree.Term, low: int, high: int) -> tuple[Cell, int, int]:
+def _solved(term: tree.LinearTerm, low: int, high: int) -> tuple[Cell, int, int]:
     """The cell of a term, and between what its value is where the term is in `low`..`high`."""
     size = abs(term.factor)
     if term.factor < 0:

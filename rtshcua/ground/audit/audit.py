@@ -24,9 +24,9 @@ from typing import NamedTuple
 from rtshcua.evidence.attested import BoundaryEvidence
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.log_writer import origin_of
-from rtshcua.evidence.records import AnyRecord, Decision, Effect, Genesis
-from rtshcua.evidence.report import Report, claims, with_anchors, with_boundary
-from rtshcua.evidence.verify import Verifier
+from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis
+from rtshcua.evidence.report import LogReport, claims, with_anchors, with_boundary
+from rtshcua.evidence.verify import LogVerifier
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 from rtshcua.ground.audit.frames import Frames
 from rtshcua.ground.audit.meaning import Meaning
@@ -39,7 +39,7 @@ _NOT_DERIVED = "that decisions follow from what they record, and commands from t
 class Audit(NamedTuple):
     """A report whose claims say what the pinned key proves, with what the log rests on where that was trusted."""
 
-    report: Report
+    report: LogReport
     basis: Basis | None
     derived: int
     dispatches: int
@@ -63,7 +63,7 @@ class Auditor:
         self._derive = derive
         self._given = anchors
         self._frames = frames
-        self._verifier = Verifier()
+        self._verifier = LogVerifier()
         self._basis: Basis | None = None
         self._meaning: Meaning | None = None
         self._anchors: Anchors | None = None
@@ -118,7 +118,7 @@ class Auditor:
 
     def _witnessed(self, record: AnyRecord) -> Flaw | None:
         assert self._anchors is not None
-        if isinstance(record, Decision):
+        if isinstance(record, DecisionRecord):
             return None
         if isinstance(record, Effect):
             return self._anchors.anchor(record.detail) if record.event == ANCHORED else None
@@ -133,7 +133,7 @@ class Auditor:
             return Audit(report, self._basis, 0, 0)
         return Audit(report, self._basis, meaning.derived, meaning.dispatches)
 
-    def _judged(self, report: Report) -> Report:
+    def _judged(self, report: LogReport) -> LogReport:
         if self._untrusted is not None:
             return failing(report, self._untrusted)
         if report.failure is not None:
@@ -150,7 +150,7 @@ class Auditor:
             return failing(report, self._suspect)
         return self._claimed(with_anchors(report, anchored))
 
-    def _claimed(self, report: Report) -> Report:
+    def _claimed(self, report: LogReport) -> LogReport:
         assert self._basis is not None
         assert self._boundary is not None
         report = with_boundary(report, self._boundary.gaps)
@@ -167,7 +167,7 @@ class Auditor:
         return trusted(report, self._basis)
 
 
-def trusted(report: Report, basis: Basis) -> Report:
+def trusted(report: LogReport, basis: Basis) -> LogReport:
     """The report with what the pinned key vouches for, of a log that was trusted."""
     assert report.genesis is not None
     proven, unproven = of_trust(report.genesis, basis)
@@ -180,7 +180,7 @@ def anchors_of(basis: Basis, genesis: Genesis) -> Anchors:
     return Anchors(origin, root.witnesses(genesis.vehicle, genesis.utc_us), root.witness_threshold)
 
 
-def failing(report: Report, failure: Finding) -> Report:
+def failing(report: LogReport, failure: Finding) -> LogReport:
     """The report with a failure that its log's own chain and seals do not show."""
     proven, unproven = claims(report.records, 0, 0, report.genesis, None, failure)
     return report._replace(failure=failure, shortfall=None, proven=proven, unproven=unproven)

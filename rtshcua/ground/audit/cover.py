@@ -1,7 +1,7 @@
 """Evidence before effect: nothing was dispatched without an earlier record that permits it (design 4.5, 6)."""
 
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.records import Decision, Effect
+from rtshcua.evidence.records import DecisionRecord, Effect
 from rtshcua.ground.audit.named import ref_words
 from rtshcua.model.step_number import step_words
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
@@ -23,7 +23,7 @@ class Cover:
         self._until_us: dict[Ref, int] = {}
         self._standing: set[int] = set()
 
-    def decided(self, record: Decision) -> None:
+    def decided(self, record: DecisionRecord) -> None:
         """Takes note of a decision that was derived again."""
         key = record.ref
         if record.outcome != "allow":

@@ -6,7 +6,7 @@ from rtshcua.decision.durability import durability_of
 from rtshcua.decision.session import Session
 from rtshcua.decision.situation import SINGLE
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.records import DECIDED, Decision, in_words
+from rtshcua.evidence.records import DECIDED, DecisionRecord, in_words
 from rtshcua.ground.audit.named import ref_words
 from rtshcua.ground.audit.observed import Observed
 from rtshcua.ground.audit.trust import Basis
@@ -39,7 +39,7 @@ class Deriver:
         self._session = session
         self._observed = Observed(basis.policy)
 
-    def check(self, record: Decision) -> Flaw | None:
+    def check(self, record: DecisionRecord) -> Flaw | None:
         """What is wrong with a decision, or None when it derives again."""
         decided = self._derived(record)
         if isinstance(decided, Flaw):
@@ -51,7 +51,7 @@ class Deriver:
                 return Flaw(f"decision/{field.replace('_', '-')}", text, str(found), str(expected))
         return self._durable(record)
 
-    def _durable(self, record: Decision) -> Flaw | None:
+    def _durable(self, record: DecisionRecord) -> Flaw | None:
         """What is wrong with how durable a record that derived again says it was."""
         if record.kind == STEP:
             contract = self._basis.invocations[record.step].invocation.contract
@@ -64,7 +64,7 @@ class Deriver:
         text = "its record was not as durable as the contract and the risk ask, or more"
         return Flaw("decision/durability", text, _class(record.durability), _class(asked))
 
-    def _derived(self, record: Decision) -> Decided | Flaw:
+    def _derived(self, record: DecisionRecord) -> Decided | Flaw:
         state = State(record.state.values, record.state.ages, record.state.monitors)
         now = Now(record.at_us, record.utc_us, record.utc_error_us)
         ref = record.ref
@@ -76,7 +76,7 @@ class Deriver:
         binding = _octets(record.binding) or b""  # what is no binding at all is not the right one
         return self._session.decide_link(ref, binding, state, now)
 
-    def _inputs(self, record: Decision, state: State, now: Now) -> Flaw | None:
+    def _inputs(self, record: DecisionRecord, state: State, now: Now) -> Flaw | None:
         """What is wrong with the situation that a decision was made in."""
         policy = self._basis.policy
         slots, monitors = policy.policy.slots, len(policy.monitors)
@@ -95,7 +95,7 @@ class Deriver:
             return Flaw("decision/approvals", "a link of a chain is decided without approvals")
         return flaw
 
-    def _turn(self, record: Decision, ref: Ref) -> Flaw | None:
+    def _turn(self, record: DecisionRecord, ref: Ref) -> Flaw | None:
         """Why the boundary would not have decided on this then."""
         refused = self._session.refusal(ref)
         if refused is Status.UNKNOWN_STEP:
@@ -123,7 +123,7 @@ class Deriver:
         current = f"{step_words(self._session.current)} or the next"
         return Flaw("decision/not-current", text, step_words(ref.step), current)
 
-    def _step(self, record: Decision, state: State, now: Now) -> Decided | Flaw:
+    def _step(self, record: DecisionRecord, state: State, now: Now) -> Decided | Flaw:
         given = record.context
         approvals = self._basis.in_force.approvals(self._basis.invocations[record.step].invocation, now)
         if given.approvals != tuple(astuple(each) for each in approvals):

@@ -2,7 +2,7 @@
 
 from rtshcua.decision.session import Session
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.records import AnyRecord, Decision, Effect
+from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect
 from rtshcua.ground.audit.cover import Cover
 from rtshcua.ground.audit.derive import Deriver
 from rtshcua.ground.audit.documents import Documents
@@ -48,13 +48,13 @@ class Meaning:
 
     def check(self, record: AnyRecord) -> Flaw | None:
         """What is wrong with the next record, or None."""
-        if isinstance(record, Decision):
+        if isinstance(record, DecisionRecord):
             return self._decided(record)
         if isinstance(record, Effect):
             return self._happened(record)
         return None
 
-    def _decided(self, record: Decision) -> Flaw | None:
+    def _decided(self, record: DecisionRecord) -> Flaw | None:
         if record.mode != self.mode:
             text = "the decision was made in another mode than the log began in"
             return Flaw("decision/mode", text, record.mode, self.mode)

@@ -20,7 +20,7 @@ from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Effect, Genesis
-from rtshcua.evidence.report import Report, utc_of
+from rtshcua.evidence.report import LogReport, utc_of
 from rtshcua.ground.audit.audit import Audit, failing
 from rtshcua.ground.audit.documents import KINDS
 from rtshcua.wire import cose
@@ -127,7 +127,7 @@ class RevokedKeys:
         return Finding("trust/root-revoked-key", 0, text, kid.hex())
 
     def _told(
-        self, report: Report, genesis: Genesis, own: TrustRoot, revoked: Mapping[bytes, Revocation]
+        self, report: LogReport, genesis: Genesis, own: TrustRoot, revoked: Mapping[bytes, Revocation]
     ) -> tuple[list[Claim], list[Finding]]:
         """What was revoked after it signed, and what may have been revoked before."""
         later: list[Claim] = []
@@ -194,7 +194,7 @@ def _after(uses: Iterable[Use], revoked: Mapping[bytes, Revocation]) -> Iterator
             yield Finding(slug, use.record, text, use.kid.hex())
 
 
-def _witnessed_us(report: Report, own: TrustRoot, revoked: Mapping[bytes, Revocation]) -> int | None:
+def _witnessed_us(report: LogReport, own: TrustRoot, revoked: Mapping[bytes, Revocation]) -> int | None:
     """When the threshold of witnesses, revoked ones apart, had seen a log to its end; None where it had not."""
     if report.outside is None:
         return None

@@ -10,7 +10,7 @@ from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import COUNT, EXAMPLES, number
 from rtshcua.ground.checker.values import typed
-from rtshcua.model.faults import KINDS, SIGNED, WORD_TYPES, Fault, Mode, Parameter, Voice, Way, parameters
+from rtshcua.model.faults import KINDS, SIGNED, WORD_TYPES, Direction, Fault, FaultField, FlightMode, Voice, parameters
 from rtshcua.model.ir.expression import Reference, Value
 from rtshcua.model.ir.scenarios import FaultCall
 from rtshcua.model.ir.skills import ArgumentValue
@@ -44,7 +44,7 @@ def fault_of(context: Context, call: FaultCall) -> Fault | None:
     return kind(at_us=0, **values) if len(context.report.found) == before else None
 
 
-def example(parameter: Parameter) -> str:
+def example(parameter: FaultField) -> str:
     """What would be accepted for a parameter."""
     if parameter.words:
         return parameter.words[0]
@@ -54,7 +54,7 @@ def example(parameter: Parameter) -> str:
     return EXAMPLES[dimension]
 
 
-def _given(context: Context, call: FaultCall, known: dict[str, Parameter]) -> dict[str, ArgumentValue]:
+def _given(context: Context, call: FaultCall, known: dict[str, FaultField]) -> dict[str, ArgumentValue]:
     """The arguments that have the name of a parameter, each once."""
     report, given = context.report, dict[str, ArgumentValue]()
     takes = f"it takes {listed(known)}" if known else "it takes nothing"
@@ -90,7 +90,7 @@ def _given(context: Context, call: FaultCall, known: dict[str, Parameter]) -> di
     return given
 
 
-def _value(context: Context, call: FaultCall, parameter: Parameter, value: Value) -> Any:
+def _value(context: Context, call: FaultCall, parameter: FaultField, value: Value) -> Any:
     """The value as the kind has it; anything after a finding."""
     if parameter.words:
         return _word(context, call, parameter, value)
@@ -99,7 +99,9 @@ def _value(context: Context, call: FaultCall, parameter: Parameter, value: Value
     return _number(context, parameter, value)
 
 
-def _word(context: Context, call: FaultCall, parameter: Parameter, value: Value) -> Mode | Way | Voice | bool | None:
+def _word(
+    context: Context, call: FaultCall, parameter: FaultField, value: Value
+) -> FlightMode | Direction | Voice | bool | None:
     word = value.name if isinstance(value, Reference) else None
     if word not in parameter.words:
         words = parameter.words
@@ -116,7 +118,7 @@ def _word(context: Context, call: FaultCall, parameter: Parameter, value: Value)
     return WORD_TYPES[parameter.name](word)
 
 
-def _name(context: Context, parameter: Parameter, value: Value) -> str | None:
+def _name(context: Context, parameter: FaultField, value: Value) -> str | None:
     if not isinstance(value, Reference):
         context.report.add(
             codes.WRONG_TYPE,
@@ -137,7 +139,7 @@ def _name(context: Context, parameter: Parameter, value: Value) -> str | None:
     return value.name
 
 
-def _number(context: Context, parameter: Parameter, value: Value) -> int | None:
+def _number(context: Context, parameter: FaultField, value: Value) -> int | None:
     """A number in the unit of its field."""
     unit = parameter.unit
     dimension = Dimension.COUNT if unit is None else unit.dimension or Dimension.COUNT
@@ -169,7 +171,7 @@ def _number(context: Context, parameter: Parameter, value: Value) -> int | None:
     return whole // canonical if _fits(context, parameter, value, whole // canonical, dimension) else None
 
 
-def _fits(context: Context, parameter: Parameter, value: Value, least: int, dimension: Dimension) -> bool:
+def _fits(context: Context, parameter: FaultField, value: Value, least: int, dimension: Dimension) -> bool:
     """Whether a number is one that such a fault can have; reports it where it is not."""
     written = context.report.text(value.span)
     if least < 0 and parameter.name not in SIGNED:

@@ -19,7 +19,7 @@ from rtshcua.ground.editor.syntax import Token, inside_comment_or_text
 from rtshcua.ground.editor.targets import Sort
 from rtshcua.ground.language.build.literals import DAYS
 from rtshcua.mavlink.dialect import Dialect
-from rtshcua.model.faults import Parameter as FaultParameter
+from rtshcua.model.faults import FaultField as FaultParameter
 from rtshcua.model.faults import parameters
 from rtshcua.model.ir.skills import Parameter, SkillDecl
 from rtshcua.model.quantity import UNITS, Dimension

@@ -14,7 +14,7 @@ from typing import TypeAlias
 from rtshcua.decision.outline import Box, rings
 from rtshcua.decision.prepare import PreparedAirspace
 from rtshcua.decision.values import AND, FALSE, NOT, TRUE, Truth
-from rtshcua.decision.zones import Place, PreparedZone, Sweep
+from rtshcua.decision.zones import PlaceSet, PreparedZone, Sweep
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import CIRCLE, Zone, unproject
 from rtshcua.model.quantity import Dimension, display
@@ -186,7 +186,7 @@ def _height(value: int) -> str:
     return display(value, Dimension.ALTITUDE)
 
 
-def keeps(place: Place, airspace: PreparedAirspace) -> Truth:
+def keeps(place: PlaceSet, airspace: PreparedAirspace) -> Truth:
     """Whether a place is in the airspace, as if all its zones existed."""
     truth = TRUE
     for zone in airspace.inside:

@@ -110,11 +110,11 @@ def _at_time(proof: ProofContext, node: tree.Node, hope: bool, time: _Moment) ->
             return tree.Both(_at_time(proof, left, hope, time), _at_time(proof, right, hope, time))
         case tree.Either(left, right):
             return tree.Either(_at_time(proof, left, hope, time), _at_time(proof, right, hope, time))
-        case tree.Not(operand):
-            return tree.Not(_at_time(proof, operand, not hope, time))
+        case tree.Negation(operand):
+            return tree.Negation(_at_time(proof, operand, not hope, time))
         case tree.InWindow() | tree.InWeek() if time.known is TimeKnowledge.NOTHING:
             return ALWAYS if hope else NEVER
-        case tree.Inside(number) if time.span is not None and _only_dates(policy.zones[number]):
+        case tree.InsideZone(number) if time.span is not None and _only_dates(policy.zones[number]):
             zone = policy.zones[number]
             return ALWAYS if zone.dates[0] <= time.span[0] <= zone.dates[1] else NEVER
         case tree.PointInside(cell, number) if time.leaves_open(policy.zones[number]):

@@ -59,9 +59,11 @@ def _nowhere(proof: ProofContext) -> None:
     if declared is None:
         return
     zones = proof.lowered.zones
-    inside = [(name, tree.Inside(zones.zone(name.text, 0, smaller=True, span=name.span))) for name in declared.inside]
+    inside = [
+        (name, tree.InsideZone(zones.zone(name.text, 0, smaller=True, span=name.span))) for name in declared.inside
+    ]
     outside = [
-        (name, tree.Not(tree.Inside(zones.zone(name.text, 0, smaller=False, span=name.span))))
+        (name, tree.Negation(tree.InsideZone(zones.zone(name.text, 0, smaller=False, span=name.span))))
         for name in declared.outside
     ]
     parts = [
@@ -128,9 +130,9 @@ def _airspace(proof: ProofContext) -> Iterator[Conjunct]:
     if airspace is None:
         return
     for zone in airspace.inside:
-        yield Conjunct("airspace", proof.span(airspace), tree.Inside(zone))
+        yield Conjunct("airspace", proof.span(airspace), tree.InsideZone(zone))
     for zone in airspace.outside:
-        yield Conjunct("airspace", proof.span(airspace), tree.Not(tree.Inside(zone)))
+        yield Conjunct("airspace", proof.span(airspace), tree.Negation(tree.InsideZone(zone)))
 
 
 def _together(

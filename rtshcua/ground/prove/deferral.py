@@ -169,12 +169,12 @@ def _unpermitted(proof: ProofContext, step: Step, invocation: PreparedInvocation
 def _needed(proof: ProofContext, at: Environment, node: tree.Node, wanted: bool) -> int:
     """How long must have been observed at least for a condition to be true (or false, where that is wanted)."""
     match node:
-        case tree.Not(operand):
+        case tree.Negation(operand):
             return _needed(proof, at, operand, not wanted)
         case tree.Both(left, right) | tree.Either(left, right):
             each = _needed(proof, at, left, wanted), _needed(proof, at, right, wanted)
             return max(each) if isinstance(node, tree.Both) == wanted else min(each)
-        case tree.Monitored(number):
+        case tree.MonitorSays(number):
             monitor = proof.policy.monitors[number]
             kind = MonitorKind.FOR_LAST if wanted else MonitorKind.WITHIN_LAST
             return monitor.window_us if monitor.kind == kind else 0

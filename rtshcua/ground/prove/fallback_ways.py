@@ -18,7 +18,7 @@ from rtshcua.decision.contracts import first_cell, longest
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation, PreparedLink
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.volume import SHORT, across, near_home
-from rtshcua.decision.zones import Place as Places
+from rtshcua.decision.zones import PlaceSet as Places
 from rtshcua.decision.zones import PreparedZone, Sweep
 from rtshcua.diagnostics import codes
 from rtshcua.ground.prove.airspace_keeping import HullSweep, Landmarks, Leg, Point, breach_text, disc, keeps, path_legs

@@ -82,7 +82,7 @@ class ArgumentLine(NamedTuple):
         goals: list[Goal] = []
         for one, other in pairwise(self.moving):
             rise, run = self.other[other] - self.one[other], self.other[one] - self.one[one]
-            terms = (tree.Term(True, one, rise), tree.Term(True, other, -run))
+            terms = (tree.LinearTerm(True, one, rise), tree.LinearTerm(True, other, -run))
             goals.append((tree.Equal(terms, rise * self.one[one] - run * self.one[other]), TRUE))
         return tuple(goals)
 

@@ -38,18 +38,18 @@ def optimistic(node: tree.Node, hope: bool, fixed: frozenset[int] | None = None)
             return tree.Both(optimistic(left, hope, fixed), optimistic(right, hope, fixed))
         case tree.Either(left, right):
             return tree.Either(optimistic(left, hope, fixed), optimistic(right, hope, fixed))
-        case tree.Not(operand):
-            return tree.Not(optimistic(operand, not hope, fixed))
+        case tree.Negation(operand):
+            return tree.Negation(optimistic(operand, not hope, fixed))
         case tree.AtMost(terms, _) | tree.Equal(terms, _):
             known = all(term.argument or term.at in (fixed or ()) for term in terms)
         case tree.Member(argument, index, _):
             known = argument or index in (fixed or ())
-        case tree.Known(index):
+        case tree.SlotKnown(index):
             known = index in (fixed or ())
-        case tree.Inside() | tree.InsideArgument():
+        case tree.InsideZone() | tree.InsideArgument():
             known = fixed is not None
         case _:
-            known = isinstance(node, tree.PointInside | tree.InWindow | tree.InWeek | tree.InPhase)
+            known = isinstance(node, tree.PointInside | tree.InWindow | tree.InWeek | tree.PhaseIn)
     return node if known else ALWAYS if hope else NEVER
 
 

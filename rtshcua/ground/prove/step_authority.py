@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from rtshcua.decision.decide import PASS, authority
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.nearest import Changes, Offer, offer
+from rtshcua.decision.nearest import ChangeSearch, Offer, offer
 from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
@@ -83,7 +83,7 @@ def _degraded(proof: ProofContext, step: Step, invocation: PreparedInvocation, a
 def _help_against(proof: ProofContext, invocation: PreparedInvocation, at: Environment, rule: Rule) -> str:
     """The nearest arguments for which a rule does not hold; where there are none, what else to change."""
     node = proof.prepared.compiler.when(rule)
-    changes = Changes(at, proof.prepared.tables)
+    changes = ChangeSearch(at, proof.prepared.tables)
     wanted = None if node is None else changes.find(optimistic(node, False), False)
     contract, policy = invocation.invocation.contract, proof.policy
     offers = [offer(change, contract, policy, at) for change in wanted or ()]
@@ -183,7 +183,7 @@ def _failed_clauses(
     if declared is None or node is None:
         return []
     contract, policy = invocation.invocation.contract, proof.policy
-    changes = Changes(at, proof.prepared.tables)
+    changes = ChangeSearch(at, proof.prepared.tables)
     parameters = {parameter.name for parameter in contract.parameters}
     found: list[_FailedClause] = []
     for clause, part in conjuncts(declared, node):

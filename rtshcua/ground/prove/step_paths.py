@@ -17,7 +17,7 @@ from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import EVERYWHERE, FALSE, TRUE
 from rtshcua.decision.values import Span as Utc
 from rtshcua.decision.volume import Volume
-from rtshcua.decision.zones import Place as Places
+from rtshcua.decision.zones import PlaceSet as Places
 from rtshcua.decision.zones import Sweep
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span

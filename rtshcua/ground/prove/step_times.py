@@ -15,7 +15,7 @@ from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.times import Window, daily, weekly, windows_of
 from rtshcua.decision.values import FALSE, TRUE, Span
-from rtshcua.decision.zones import Place, PreparedZone
+from rtshcua.decision.zones import PlaceSet, PreparedZone
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span as Where
 from rtshcua.ground.analysis.daytime import Asked, arcs_where
@@ -115,7 +115,7 @@ class StepTime:
         if not self.issued_at_us:
             yield from (each for each in airspace.outside if not self._present(each, further))
 
-    def labels(self, airspace: PreparedAirspace, place: Place, further: int) -> list[tuple[Where, str]]:
+    def labels(self, airspace: PreparedAirspace, place: PlaceSet, further: int) -> list[tuple[Where, str]]:
         """Which of the zones to stay out of that a place is not clear of exist at some times only."""
         zones = (each for each in airspace.outside if each.times is not None and place.inside(each) != FALSE)
         return [

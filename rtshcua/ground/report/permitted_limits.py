@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from rtshcua.decision.prepare import Compiler
-from rtshcua.decision.tree import AtMost, Node, Not
+from rtshcua.decision.tree import AtMost, Negation, Node
 from rtshcua.ground.analysis.extent import FAR, Bounds, Extents, alternatives
 from rtshcua.ground.report.model import PermittedLimit
 from rtshcua.ground.report.rights import rule_names
@@ -89,7 +89,7 @@ class _Permitted:
             {(True, each.cell): (each.low, each.high) for each in contract.parameters if each.kind != PLACE}
         ]
         needed = [self._parts(self._compiler.node(clause, contract)) for clause in contract.require]
-        some = [self._parts(self._nodes[way.permit]), *(self._parts(Not(self._nodes[at])) for at in way.forbids)]
+        some = [self._parts(self._nodes[way.permit]), *(self._parts(Negation(self._nodes[at])) for at in way.forbids)]
         for narrower in [*some, *needed]:
             if any(not bounds for bounds in narrower):
                 continue  # it bounds nothing by itself
@@ -111,7 +111,7 @@ class _Permitted:
                 and one.bounds.get(cell, (-FAR, FAR))[1] >= high
                 for one in alternatives(node)
             )
-            for node in (self._nodes[way.permit], *(Not(self._nodes[at]) for at in way.forbids))
+            for node in (self._nodes[way.permit], *(Negation(self._nodes[at]) for at in way.forbids))
             if node is not _ALWAYS
         )
 

@@ -20,7 +20,7 @@ from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.testing.case import PolicyUnderTest
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
 from rtshcua.model.flat.signal import POSITION, Signal
-from rtshcua.model.flat.situation import Approval, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Now, State
 from rtshcua.model.ir.expression import Condition, Coordinates, Edge, ForLast, Near, Reference, WithinLast
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.tests import Answer, Cell, Named, OverTime, Subject
@@ -147,13 +147,13 @@ class Situations:
                 monitors[number] = truth
         return State(state.values, state.ages, tuple(monitors))
 
-    def approvals(self, answers: Iterable[Answer], at_us: int) -> tuple[Approval, ...]:
+    def approvals(self, answers: Iterable[Answer], at_us: int) -> tuple[ConfirmAnswer, ...]:
         """What people answered to the `confirm` rules that wait for them, at monotonic times before `at_us`.
 
         Each answer is another person's.
         """
         under = self._policy.lowered
-        found: list[Approval] = []
+        found: list[ConfirmAnswer] = []
         for person, answer in enumerate(answers):
             role = under.roles.get(answer.role.text)
             rules = [
@@ -165,7 +165,7 @@ class Situations:
                 self._unasked(answer)
                 continue
             moment = at_us - (0 if answer.ago is None else answer.ago.value)
-            found += [Approval(number, role, int(answer.granted), moment, person) for number in rules]
+            found += [ConfirmAnswer(number, role, int(answer.granted), moment, person) for number in rules]
         return tuple(found)
 
     def missing(self, reads: Iterable[int], said: Iterable[SubjectValue]) -> list[str]:

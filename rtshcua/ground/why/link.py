@@ -11,7 +11,7 @@ from rtshcua.decision.fallbacks import DEGRADE, choose_fallback, link_admissible
 from rtshcua.decision.prepare import PreparedInvocation, PreparedLink, PreparedPolicy
 from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.values import EVERYWHERE
-from rtshcua.evidence.records import Decision
+from rtshcua.evidence.records import DecisionRecord
 from rtshcua.ground.why.recorded import now_of, state_of
 from rtshcua.ground.why.trace import Check, Tried
 from rtshcua.model.flat.policy import Rule
@@ -30,7 +30,9 @@ class LinkTrace(NamedTuple):
     chain: tuple[Tried, ...]
 
 
-def trace_link(record: Decision, invocation: PreparedInvocation | None, policy: PreparedPolicy) -> LinkTrace | None:
+def trace_link(
+    record: DecisionRecord, invocation: PreparedInvocation | None, policy: PreparedPolicy
+) -> LinkTrace | None:
     """The decision once more, from what its record holds; None for a link that the bundle does not have.
 
     `invocation` is the step whose fallback it is, None for a link of the contingency.
@@ -57,6 +59,6 @@ def trace_link(record: Decision, invocation: PreparedInvocation | None, policy: 
     return LinkTrace(link, rule, checks, link_admissible(link, state, policy, now, phase), tried)
 
 
-def of_contingency(record: Decision) -> bool:
+def of_contingency(record: DecisionRecord) -> bool:
     """Whether a decision is about a link of the contingency, and so about no step."""
     return record.kind == CONTINGENCY_LINK

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from rtshcua.decision.nearest import Changes, nearest_in
+from rtshcua.decision.nearest import ChangeSearch, nearest_in
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
 from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.temporal import lasting
@@ -84,7 +84,7 @@ def _content(
     sets = situation(_state(values), policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     node = policy.compiler.node(clause, invocation.invocation.contract)
-    for change in Changes(at, policy.tables, signals_only=True).find(node, True) or ():
+    for change in ChangeSearch(at, policy.tables, signals_only=True).find(node, True) or ():
         if change.argument or change.at is None or change.at in fixed:
             continue
         choices = change.choices

@@ -31,7 +31,7 @@ class Now(Flat, frozen=True):
     utc_error_us: int
 
 
-class Approval(Flat, frozen=True):
+class ConfirmAnswer(Flat, frozen=True):
     """A person's verified answer to a `confirm` rule: `granted` 1 or 0, at a monotonic time in us.
 
     `person` is a number: the same for all answers of one person, another for each other.
@@ -60,4 +60,4 @@ class Context(Flat, frozen=True):
     released_us: int
     phase: int
     remaining_us: int
-    approvals: tuple[Approval, ...]
+    approvals: tuple[ConfirmAnswer, ...]

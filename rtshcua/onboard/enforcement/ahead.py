@@ -15,7 +15,7 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, with_flags
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT
 from rtshcua.mavlink.signing import LEAD, timestamp_in
 from rtshcua.onboard.enforcement.allow_list import Frame, read_frame
-from rtshcua.onboard.enforcement.executor import Ahead, Commands
+from rtshcua.onboard.enforcement.executor import Commands, SignedAhead
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import FALLBACK_LINK
 
@@ -34,7 +34,7 @@ NO_COPY: Final = Refusal("frame/not-ahead", "the boundary is lost, and no copy i
 #: makes the frames that a command is flown by, each as often as it may have to be sent
 Encode = Callable[[Command], Sequence[bytes]]
 #: has the frames of a link signed: the standing permit, kind and number of the link, its frames, and the time
-Sign = Callable[[bytes, int, int, Sequence[bytes], int], Ahead | Refusal]
+Sign = Callable[[bytes, int, int, Sequence[bytes], int], SignedAhead | Refusal]
 
 # what differs between two frames that do the same of one command: where home is taken to lie, how often one was sent,
 # and our time

@@ -9,7 +9,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire import boundary_chain
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.statement import Statement, sign
 
@@ -55,6 +55,6 @@ class Attestation:
         said = Statement(
             self._flight, key.session, key.before, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
             chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside,
-            Source.SHARED, now.monotonic_us, now.utc_us, now.utc_error_us, final,
+            ClockSource.SHARED, now.monotonic_us, now.utc_us, now.utc_error_us, final,
         )  # fmt: skip
         return sign(said, self._signs)

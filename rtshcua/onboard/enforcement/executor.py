@@ -50,7 +50,7 @@ UNSENT: Final = Refusal(WITHDRAWN, "nothing was sent by it, and nothing will be:
 SENT: Final = Refusal("permit/sent", "something may have been sent by it, or it is not the turn of its step any more")
 
 
-class Ahead(NamedTuple):
+class SignedAhead(NamedTuple):
     """A link, signed ahead: the token of its command, and the signature of each frame, empty where there is no key."""
 
     token: int
@@ -241,7 +241,7 @@ class Executor:
             serial = next((each for each in again if each not in self._used), serial + AGAIN)
         return Permit(kind, step, link, serial, 0, 0, ALWAYS)
 
-    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> SignedAhead | Refusal:
         """Sign the frames of a link ahead, to be sent when no boundary is there any more: as far as the standing permit
         of a step that was sent would let the link be flown now, and each frame would pass. Nothing is sent or opened.
         """
@@ -257,7 +257,7 @@ class Executor:
             if isinstance(signature, Refusal):
                 return signature
             signatures.append(signature)
-        return Ahead(permit.serial, tuple(signatures))
+        return SignedAhead(permit.serial, tuple(signatures))
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
         """What may be set of the vehicle from now on, by a preparation permit, or why nothing may. It is good once, on

@@ -20,10 +20,10 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import executor, frames, preparation
 from rtshcua.onboard.enforcement.ahead import NOT_AHEAD, Encode, FramesAhead
 from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
-from rtshcua.onboard.enforcement.executor import Ahead, Commands, Made
+from rtshcua.onboard.enforcement.executor import Commands, Made, SignedAhead
 from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire.boundary_chain import START
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT
 from rtshcua.wire.preparation import MAC_BYTES, Preparation
 from rtshcua.wire.preparation import decode as decode_preparation
@@ -61,7 +61,7 @@ class OwnTime(NamedTuple):
     wants back from the vehicle in TIMESYNC, 0 for none.
     """
 
-    source: Source
+    source: ClockSource
     now: Now
     number: int
 
@@ -115,7 +115,7 @@ class Caller:
                 return answer
         return None
 
-    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> SignedAhead | Refusal:
         """Have the frames of a link signed ahead: as `Executor.ahead`."""
         listed = (len(frame).to_bytes(2) + frame for frame in frames)
         answer = self(AHEAD, _STANDING.pack(now_us, kind, link), sealed, *listed)
@@ -125,7 +125,7 @@ class Caller:
         if len(answer) != _SERIAL_BYTES + each * len(frames):
             return self.lose()
         begins = (_SERIAL_BYTES + each * number for number in range(len(frames)))
-        return Ahead(int.from_bytes(answer[:_SERIAL_BYTES]), tuple(answer[at : at + each] for at in begins))
+        return SignedAhead(int.from_bytes(answer[:_SERIAL_BYTES]), tuple(answer[at : at + each] for at in begins))
 
     def load(self, bundle: bytes, now: Now) -> bytes | Refusal:
         """Hand a bundle over: the id of its flight, which the boundary draws."""
@@ -149,7 +149,7 @@ class Caller:
             return answer
         try:
             source, monotonic_us, utc_us, error_us, number = _TOLD.unpack(answer)
-            return OwnTime(Source(source), Now(monotonic_us, utc_us, error_us), number)
+            return OwnTime(ClockSource(source), Now(monotonic_us, utc_us, error_us), number)
         except (struct_error, ValueError):
             return self.lose()
 
@@ -377,7 +377,7 @@ class IsolatedExecutor:
         self._caller(RELEASE)
         self.frames.ahead.close()
 
-    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+    def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> SignedAhead | Refusal:
         """Have the frames of a link signed ahead: as `Executor.ahead`."""
         return self._caller.ahead(sealed, kind, link, frames, now_us)
 

@@ -38,7 +38,7 @@ from rtshcua.wire.untrusted import Untrusted
 SESSION_KEY_BYTES: Final = 32
 
 
-class Mode(StrEnum):
+class EnforcementMode(StrEnum):
     """How `enforce` is kept apart from the runtime. `NONE` enforces nothing: for measuring, in simulation only."""
 
     NONE = "none"
@@ -56,7 +56,7 @@ class Loaded(msgspec.Struct, frozen=True):
     in_force: InForce
     policy: PreparedPolicy
     vehicle: str
-    mode: Mode
+    mode: EnforcementMode
     preparation: PreparationIssuer | IsolatedIssuer
     attestation: Attestation | IsolatedAttestation
 
@@ -89,7 +89,7 @@ def load(
     root: TrustRoot,
     vehicle: str,
     now: Now,
-    mode: Mode,
+    mode: EnforcementMode,
     session_key: bytes,
     flight: bytes,
     peer_is_own_simulator: bool,
@@ -110,7 +110,7 @@ def load(
         raise ValueError(f"a session key has {SESSION_KEY_BYTES} bytes, not {len(session_key)}")
     if len(flight) != FLIGHT_BYTES:
         raise ValueError(f"the id of a flight has {FLIGHT_BYTES} bytes, not {len(flight)}")
-    if mode is Mode.NONE and not peer_is_own_simulator:
+    if mode is EnforcementMode.NONE and not peer_is_own_simulator:
         return Refusal("mode-refused", "mode `none` flies nothing but the simulated vehicle that this run started")
     try:
         opened = open_bundle(bundle, root=root, vehicle=vehicle, now_us=now.utc_us)
@@ -142,13 +142,18 @@ def load(
 
 
 def session(
-    in_force: InForce, mode: Mode, session_key: bytes, issuer: PreparationIssuer | None = None, *, bundle: bytes = b""
+    in_force: InForce,
+    mode: EnforcementMode,
+    session_key: bytes,
+    issuer: PreparationIssuer | None = None,
+    *,
+    bundle: bytes = b"",
 ) -> Loaded:
     """A session of a verified and prepared bundle, nothing of it decided yet. Without an `issuer` nothing is set, and
     without the octets of the bundle nothing that it signs fits a log.
     """
     commands = Commands(in_force.bundle.policy, in_force.bundle.mission)
-    enforced = mode is not Mode.NONE
+    enforced = mode is not EnforcementMode.NONE
     chain = BoundaryChain()
     boundary = SoftwareBoundary(in_force, commands, session_key, chain, enforced=enforced)
     give_back = boundary.give_back if enforced else never

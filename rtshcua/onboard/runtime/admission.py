@@ -9,7 +9,7 @@ from rtshcua.decision.durability import confirmed, durability_of
 from rtshcua.model.decision import Decision
 from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.mission import Invocation, Mission
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
@@ -134,7 +134,7 @@ class Admission:
         self._repeated = 0
 
     def _told(
-        self, asked: Request, ref: Ref, of: Invocation | None, answer: Decision, approvals: tuple[Approval, ...]
+        self, asked: Request, ref: Ref, of: Invocation | None, answer: Decision, approvals: tuple[ConfirmAnswer, ...]
     ) -> Iterable[Action]:
         """An answer as it is shown, announced and recorded; `of` is the step asked about, or whose link it is."""
         now, clause, subject = asked.now, answer.clause, self._subject(ref, of)

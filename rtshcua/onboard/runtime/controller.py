@@ -20,17 +20,17 @@ from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.onboard.enforcement import frames
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import WITHHELD, AirState, End, Ending, Expect, Failed, LinkLost
+from rtshcua.onboard.ports import WITHHELD, AirState, CommandFailed, End, Ending, Expect, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.aftermath import MAY_FLY, may_fly
 from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.link import STOOD_STILL, LinkState, LinkSupervision, Silence
+from rtshcua.onboard.runtime.link import STOOD_STILL, LinkSilence, LinkState, LinkSupervision
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
-from rtshcua.onboard.runtime.view import Stage, View
+from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 
 #: what is recorded where another step is asked for, in place of one that is not admitted
@@ -42,7 +42,7 @@ _LATE: Final = ("late", frames.LATE.slug)
 #: what ends a run matters more the further down it stands
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 _UP = LinkState.UP  # an enumeration's attributes are slow to find
-_WAITING, _DECIDING, _RUNNING, _FALLING, _ENDED = Stage
+_WAITING, _DECIDING, _RUNNING, _FALLING, _ENDED = RunStage
 
 
 class MissionController:
@@ -141,7 +141,7 @@ class MissionController:
             limit_us += self._policy.vehicle.endurance_us
         return self.link.waited_us(now_us) > limit_us
 
-    def _heard_again(self, now: Now, silence: Silence) -> None:
+    def _heard_again(self, now: Now, silence: LinkSilence) -> None:
         """State is judged again after a silence. One that was too long ends the mission, if the policy says so."""
         policy, waited = self._policy, f"after {silence.awaited_us // 1_000} ms"
         if silence.missing:
@@ -321,7 +321,7 @@ class MissionController:
         elif active.homeward:
             self.down(now)
 
-    def failed(self, now: Now, event: Failed) -> None:
+    def failed(self, now: Now, event: CommandFailed) -> None:
         """A command was refused, its effect did not come, or it was not sent."""
         if self.dispatcher.flying(event.token) is None:
             return
@@ -355,7 +355,7 @@ class MissionController:
             self.dispatcher.end(now, "released")
             self._end(now, self._cause or Ending.ABORTED)
 
-    def _why_failed(self, event: Failed) -> str:
+    def _why_failed(self, event: CommandFailed) -> str:
         """As the log has it."""
         text = LATE if event.reason in _LATE and not event.text else event.text
         why = f"{event.reason}: {text}" if text else event.reason
@@ -533,12 +533,12 @@ class MissionController:
 
     # -------------------------------------------------------- what a display may show
 
-    def view(self, at_us: int) -> View:
+    def view(self, at_us: int) -> RuntimeView:
         """The run as it is at a monotonic time."""
         mission, vehicle = self._loaded.bundle.mission, self.vehicle
         active, current = self.dispatcher.active, self.queue.current
         contract = current.contract.name if current is not None else ""
-        return View(
+        return RuntimeView(
             at_us,
             self.stage,
             mission.phases[self.queue.phase],

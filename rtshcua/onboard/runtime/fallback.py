@@ -2,7 +2,7 @@
 
 import msgspec
 
-from rtshcua.decision.fallbacks import START, Choice, choose_contingency, choose_fallback
+from rtshcua.decision.fallbacks import START, LinkChoice, choose_contingency, choose_fallback
 from rtshcua.model.flat.contract import Link, MotionKind
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.enforcement.load import Loaded
@@ -110,7 +110,7 @@ class Fallback:
     def _holds(self, link: Link) -> bool:
         return self._policy.contracts[link.skill].motion.kind == MotionKind.HOLD
 
-    def _choose(self, state: State, now: Now) -> Choice | None:
+    def _choose(self, state: State, now: Now) -> LinkChoice | None:
         policy, chain = self._loaded.policy, self._chain
         if chain.kind == CONTINGENCY_LINK:
             return choose_contingency(state, policy, now, chain.after)

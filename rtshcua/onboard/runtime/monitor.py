@@ -10,7 +10,7 @@ from rtshcua.decision.values import UNKNOWN
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
-from rtshcua.onboard.runtime.view import Reading
+from rtshcua.onboard.runtime.view import SignalReading
 from rtshcua.wire.request import MAX_AGE_US
 
 
@@ -115,14 +115,14 @@ class StateMonitor:
         self._state = (now_us, state)
         return state
 
-    def readings(self, at_us: int) -> tuple[Reading, ...]:
+    def readings(self, at_us: int) -> tuple[SignalReading, ...]:
         """The policy's signals at a monotonic time, for a display."""
         state = self.state(at_us)
         readings = []
         for signal in self._policy.policy.signals:
             values = tuple(state.values[slot] for slot in signal.slots)
             age_us = max(state.ages[slot] for slot in signal.slots)
-            readings.append(Reading(signal.name, values, age_us, age_us > signal.stale_us))
+            readings.append(SignalReading(signal.name, values, age_us, age_us > signal.stale_us))
         return tuple(readings)
 
 

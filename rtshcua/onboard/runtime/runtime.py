@@ -19,7 +19,7 @@ from rtshcua.onboard.ports import Action, Command, Crashed, Ending, Event, Readi
 from rtshcua.onboard.runtime.controller import MissionController
 from rtshcua.onboard.runtime.journal import Journal
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.view import Stage, View
+from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 from rtshcua.wire import names
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, UNKNOWN, Receipt, decode
@@ -32,8 +32,8 @@ MOST_SAID: Final = 200
 REFUSED_EVERY_US: Final = 1_000_000
 
 #: what is taken over before a crash or a takeover: it changes no stage, and tells how it came to that
-_TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.Said, ports.Noted, ports.Hindered)
-_RUNNING, _ENDED = Stage.RUNNING, Stage.ENDED  # an enumeration's attributes are slow to find
+_TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.StatusText, ports.Noted, ports.Hindered)
+_RUNNING, _ENDED = RunStage.RUNNING, RunStage.ENDED  # an enumeration's attributes are slow to find
 
 
 class Runtime:
@@ -135,7 +135,7 @@ class Runtime:
         """Whether the command that flies brings the vehicle home or down, and its link is not lost."""
         return self._controller.dispatcher.homeward and self.linked
 
-    def view(self, now: Now) -> View:
+    def view(self, now: Now) -> RuntimeView:
         """What a display may show."""
         return self._controller.view(now.monotonic_us)
 
@@ -188,7 +188,7 @@ class EventHandler:
                 controller.dispatcher.sent(event.token, event.at_us)
             case ports.Succeeded():
                 controller.succeeded(now, event.token)
-            case ports.Failed():
+            case ports.CommandFailed():
                 controller.failed(now, event)
             case TakenOver() | Crashed():
                 self._ended(now, event)
@@ -196,7 +196,7 @@ class EventHandler:
                 controller.link_lost(now, event)
             case ports.LinkBack():
                 controller.link_back(now)
-            case ports.Answering():
+            case ports.VehicleAnswers():
                 controller.link.answering(now.monotonic_us, answers=event.answers)
             case ports.Interrupted():
                 self._journal.effect(now, "interrupted")
@@ -213,11 +213,11 @@ class EventHandler:
     def _record(self, now: Now, event: Event) -> None:
         """Record what changes nothing at once."""
         match event:
-            case ports.Unfit():
+            case ports.VehicleUnfit():
                 self._controller.unfit(event.why)
             case ports.ClockStepped():
                 self._journal.effect(now, "clock-stepped", detail=f"{event.by_us:+d} us")
-            case ports.Said():
+            case ports.StatusText():
                 self._journal.effect(now, "said", detail=f"{event.severity}: {event.text[:MOST_SAID]}")
             case ports.Noted():
                 self._journal.note(now, event.text)
@@ -264,7 +264,7 @@ class EventHandler:
         document = event.document
         if event.refused is not None:
             return Receipt(UNKNOWN, *event.refused)
-        if self._controller.stage is Stage.FALLING and not _recalls(document):
+        if self._controller.stage is RunStage.FALLING and not _recalls(document):
             return Receipt(UNKNOWN, "falling-back", "the mission is over: the vehicle falls back")
         receipt = decode(self._boundary.present(document, now, self._controller.released))
         return Receipt(UNKNOWN, "unanswered", receipt.text) if isinstance(receipt, Refusal) else receipt

@@ -5,7 +5,7 @@ from enum import StrEnum
 from rtshcua.onboard.ports import Ending, Frozen
 
 
-class Stage(StrEnum):
+class RunStage(StrEnum):
     """Where a run stands."""
 
     WAITING = "waiting"  # for the vehicle to be ready
@@ -15,7 +15,7 @@ class Stage(StrEnum):
     ENDED = "ended"
 
 
-class Reading(Frozen):
+class SignalReading(Frozen):
     """A signal's canonical value (None: unknown, a position has two), its age in us, and whether it is stale."""
 
     name: str
@@ -34,7 +34,7 @@ class Decided(Frozen):
     clause: str
 
 
-class View(Frozen):
+class RuntimeView(Frozen):
     """A snapshot at a monotonic time.
 
     `contract` names the skill that flies or is being decided; `left_us` counts down to its deadline while deciding,
@@ -42,7 +42,7 @@ class View(Frozen):
     """
 
     at_us: int
-    stage: Stage
+    stage: RunStage
     phase: str
     step: int
     steps: int
@@ -51,6 +51,6 @@ class View(Frozen):
     armed: bool | None
     airborne: bool | None
     linked: bool
-    signals: tuple[Reading, ...]
+    signals: tuple[SignalReading, ...]
     decisions: tuple[Decided, ...]
     ending: Ending | None

@@ -5,9 +5,9 @@ from math import isfinite, radians
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Handler
-from rtshcua.simulation.command import Command, whole
+from rtshcua.simulation.command import VehicleCommand, whole
 from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, arm_disarm, shared
 from rtshcua.simulation.place import Point
 from rtshcua.simulation.plans import AMSL_FRAMES, RELATIVE_FRAMES
@@ -25,33 +25,33 @@ def above_home(a: Autopilot, frame: int | None, altitude: float) -> float | None
     return altitude if frame in _RELATIVE_FRAMES else None
 
 
-def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _takeoff(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """Needs a relative frame, and to be armed, landed and in GUIDED; in LOITER it is accepted and does nothing."""
     if command.frame not in _RELATIVE_FRAMES:
         return (DENIED,)
     vehicle, up = a.vehicle, command.altitude
     if not vehicle.armed or vehicle.in_air or not isfinite(up) or up <= vehicle.body.up:
         return (FAILED,)
-    if vehicle.mode is Mode.LOITER:
+    if vehicle.mode is FlightMode.LOITER:
         return (ACCEPTED,)
-    if vehicle.mode is not Mode.GUIDED:
+    if vehicle.mode is not FlightMode.GUIDED:
         return (FAILED,)
     vehicle.takeoff_up = up
     vehicle.climb()
     return (ACCEPTED,)
 
 
-def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _reposition(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     up = above_home(a, command.frame, command.altitude)
     if command.latitude is None or command.longitude is None or up is None:
         return (DENIED,)
     vehicle, target = a.vehicle, Point(*a.home.local(command.latitude, command.longitude), up)
-    if vehicle.mode is not Mode.GUIDED:
+    if vehicle.mode is not FlightMode.GUIDED:
         if whole(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE == 0:
             return (DENIED,)
-        if not a.can_enter(Mode.GUIDED):
+        if not a.can_enter(FlightMode.GUIDED):
             return (FAILED,)
-        vehicle.set_mode(Mode.GUIDED)
+        vehicle.set_mode(FlightMode.GUIDED)
     if not a.fence.allows(target):
         return (FAILED,)
     vehicle.go_to(target)
@@ -60,12 +60,12 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-def _pause(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _pause(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """DO_PAUSE_CONTINUE, in GUIDED (`ModeGuided::pause`): a target that comes while it stands is kept for later.
 
     AUTO, which the real one pauses too, is left out.
     """
-    if a.vehicle.mode is not Mode.GUIDED:
+    if a.vehicle.mode is not FlightMode.GUIDED:
         return (FAILED,)
     if whole(command.p1) == 0:
         a.vehicle.pause()
@@ -76,10 +76,10 @@ def _pause(a: Autopilot, command: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-def _yaw(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _yaw(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """Parameter 4: whether the angle is from north, or from where the nose points; then parameter 3 says which way."""
     vehicle = a.vehicle
-    if vehicle.mode is not Mode.GUIDED:
+    if vehicle.mode is not FlightMode.GUIDED:
         return (FAILED,)
     if isfinite(command.p1):
         relative = command.p4 == 1
@@ -88,7 +88,7 @@ def _yaw(a: Autopilot, command: Command) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-def _set_mode(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _set_mode(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     if whole(command.p1) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED == 0:
         return (DENIED,)
     return enter_number(a, whole(command.p2))
@@ -107,21 +107,21 @@ def enter_number(a: Autopilot, number: int) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
-def _mission_start(a: Autopilot, _: Command) -> tuple[int, ...]:
+def _mission_start(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
     """Enters AUTO and lets the mission leave the ground; as recorded, its first item is told twice. It does not arm."""
-    if not a.can_enter(Mode.MISSION) or not a.mission.start():
+    if not a.can_enter(FlightMode.MISSION) or not a.mission.start():
         return (FAILED,)
     if a.vehicle.armed:
         a.mission.tell_current()
-    a.vehicle.set_mode(Mode.MISSION)
+    a.vehicle.set_mode(FlightMode.MISSION)
     return (ACCEPTED,)
 
 
-def _set_current(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _set_current(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     return (ACCEPTED,) if a.mission.select(whole(command.p1)) else (FAILED,)
 
 
-def _fence_enable(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _fence_enable(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """DO_FENCE_ENABLE: the same as setting FENCE_ENABLE."""
     if whole(command.p1) not in (0, 1):
         return (FAILED,)

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation import plans
 from rtshcua.simulation.answers import Delays, Lanes
 from rtshcua.simulation.ardupilot.commands import COMMANDS, above_home, enter_number
@@ -21,14 +21,14 @@ from rtshcua.simulation.ardupilot.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.ardupilot.telemetry import BUILDERS, DEFAULT, GROUPS
 from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
-from rtshcua.simulation.fence import Area, Breach, Circle, FenceLimits, FenceRules
+from rtshcua.simulation.fence import Breach, FenceArea, FenceCircle, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
-from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plans import Item
+from rtshcua.simulation.place import HomePosition, Point
+from rtshcua.simulation.plans import PlanItem
 from rtshcua.simulation.sensors import BootPlan
 from rtshcua.simulation.transfer import TransferRules
-from rtshcua.simulation.vehicle import Event, Vehicle
+from rtshcua.simulation.vehicle import Multirotor, VehicleEvent
 
 _CRITICAL, _INFO = mavlink.MAV_SEVERITY_CRITICAL, mavlink.MAV_SEVERITY_INFO
 _GUIDED = enums.MAV_MODE_FLAG_GUIDED_ENABLED
@@ -54,7 +54,7 @@ _GIVE_UP_M = 100.0
 _VEL_LIMIT = 2
 
 
-def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
+def _limits(value: Callable[[str], float], area: FenceArea) -> FenceLimits | None:
     """The fence that FENCE_* parameters and the upload make."""
     kinds = int(value("FENCE_TYPE"))
     if value("FENCE_ENABLE") < 1:
@@ -62,18 +62,18 @@ def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
     included = area.included if kinds & _POLYGON else ()
     excluded = area.excluded if kinds & _POLYGON else ()
     if kinds & _CIRCLE:
-        included = (*included, Circle((0.0, 0.0), value("FENCE_RADIUS")))
+        included = (*included, FenceCircle((0.0, 0.0), value("FENCE_RADIUS")))
     ceiling = value("FENCE_ALT_MAX") if kinds & _CEILING else inf
     floor = value("FENCE_ALT_MIN") if kinds & _FLOOR else -inf
     # `ModeRTL::compute_return_target` takes a return down to `get_safe_alt_max`
-    return FenceLimits(Area(included, excluded, every=True), ceiling, floor, ceiling - value("FENCE_MARGIN"))
+    return FenceLimits(FenceArea(included, excluded, every=True), ceiling, floor, ceiling - value("FENCE_MARGIN"))
 
 
 def _name(limits: FenceLimits, point: Point) -> str:
     if point.up > limits.ceiling:
         return "Max Alt"
     for shape in limits.area.included:
-        if isinstance(shape, Circle) and shape.centre == (0.0, 0.0) and not shape.holds(point.north, point.east):
+        if isinstance(shape, FenceCircle) and shape.centre == (0.0, 0.0) and not shape.holds(point.north, point.east):
             return "Circle"
     return "Polygon"
 
@@ -88,11 +88,13 @@ _NAMES = {
 }
 
 
-def _judge(items: tuple[Item, ...], _vehicle: Vehicle, _home: Home, _allows: Callable[[Point], bool]) -> bool:
+def _judge(
+    items: tuple[PlanItem, ...], _vehicle: Multirotor, _home: HomePosition, _allows: Callable[[Point], bool]
+) -> bool:
     return len(items) > 1
 
 
-def _may_enter(items: tuple[Item, ...], vehicle: Vehicle) -> bool:
+def _may_enter(items: tuple[PlanItem, ...], vehicle: Multirotor) -> bool:
     """Armed and on the ground, only a mission whose first item that takes time is a takeoff."""
     on_ground = vehicle.armed and not vehicle.in_air
     return not on_ground or next((item.command for item in items[1:] if item.command in _NAMES), None) == plans.TAKEOFF
@@ -108,19 +110,23 @@ class ArduCopter(Flavour):
     autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     modes = ModeTable(
         numbers={
-            Mode.MANUAL: CopterMode.STABILIZE,
-            Mode.ALTITUDE: CopterMode.ALT_HOLD,
-            Mode.MISSION: CopterMode.AUTO,
-            Mode.GUIDED: CopterMode.GUIDED,
-            Mode.LOITER: CopterMode.LOITER,
-            Mode.RETURN: CopterMode.RTL,
-            Mode.LAND: CopterMode.LAND,
-            Mode.POSITION: CopterMode.POSHOLD,
-            Mode.BRAKE: CopterMode.BRAKE,
+            FlightMode.MANUAL: CopterMode.STABILIZE,
+            FlightMode.ALTITUDE: CopterMode.ALT_HOLD,
+            FlightMode.MISSION: CopterMode.AUTO,
+            FlightMode.GUIDED: CopterMode.GUIDED,
+            FlightMode.LOITER: CopterMode.LOITER,
+            FlightMode.RETURN: CopterMode.RTL,
+            FlightMode.LAND: CopterMode.LAND,
+            FlightMode.POSITION: CopterMode.POSHOLD,
+            FlightMode.BRAKE: CopterMode.BRAKE,
         },
-        base={mode: _BASE | (_GUIDED if mode in NEEDS_POSITION or mode is Mode.LAND else 0) for mode in Mode},
-        start=Mode.MANUAL,
-        armable=frozenset({Mode.MANUAL, Mode.ALTITUDE, Mode.GUIDED, Mode.LOITER, Mode.POSITION}),
+        base={
+            mode: _BASE | (_GUIDED if mode in NEEDS_POSITION or mode is FlightMode.LAND else 0) for mode in FlightMode
+        },
+        start=FlightMode.MANUAL,
+        armable=frozenset(
+            {FlightMode.MANUAL, FlightMode.ALTITUDE, FlightMode.GUIDED, FlightMode.LOITER, FlightMode.POSITION}
+        ),
         blind=_GUIDED,
         stands_by=True,
         names=COPTER_NAMES,
@@ -178,11 +184,11 @@ class ArduCopter(Flavour):
     )
     texts = MappingProxyType(
         {
-            Event.ARMED: "Arming motors",
-            Event.DISARMED: "Disarming motors",
-            Event.TOUCHED: "SIM Hit ground at {speed:f} m/s",
-            Event.CRASHED: "Crash: Disarming: AngErr=80>30, Accel=1.0<3.0",
-            Event.AUTO_DISARMED: "Disarming motors",
+            VehicleEvent.ARMED: "Arming motors",
+            VehicleEvent.DISARMED: "Disarming motors",
+            VehicleEvent.TOUCHED: "SIM Hit ground at {speed:f} m/s",
+            VehicleEvent.CRASHED: "Crash: Disarming: AngErr=80>30, Accel=1.0<3.0",
+            VehicleEvent.AUTO_DISARMED: "Disarming motors",
         }
     )
     texts_need_ground_station = False
@@ -244,9 +250,11 @@ class ArduCopter(Flavour):
         """Anything on the first channel, taken for USB, as recorded; radios elsewhere."""
         return a.usb or name in _UNSIGNED
 
-    def home_item(self, home: Home) -> Item | None:
+    def home_item(self, home: HomePosition) -> PlanItem | None:
         """Slot 0 of every mission."""
-        return Item(plans.WAYPOINT, mavlink.MAV_FRAME_GLOBAL, x=home.latitude, y=home.longitude, z=home.amsl_mm / 1000)
+        return PlanItem(
+            plans.WAYPOINT, mavlink.MAV_FRAME_GLOBAL, x=home.latitude, y=home.longitude, z=home.amsl_mm / 1000
+        )
 
     def on_setup_signing(self, a: Autopilot, message: Message) -> None:
         """Never while armed, as recorded; not even to switch it off."""
@@ -263,7 +271,7 @@ class ArduCopter(Flavour):
         """Flown to in GUIDED and in the air, ignored in silence else; so is a velocity without a place."""
         self._fly_at(a, message)
         up = above_home(a, message.coordinate_frame, message.alt)
-        if a.vehicle.mode is Mode.GUIDED and up is not None and not message.type_mask & 0b111:
+        if a.vehicle.mode is FlightMode.GUIDED and up is not None and not message.type_mask & 0b111:
             target = Point(*a.home.local(message.lat_int, message.lon_int), up)
             if a.fence.allows(target):
                 a.vehicle.go_to(target)
@@ -273,14 +281,14 @@ class ArduCopter(Flavour):
         self._fly_at(a, message)
         if message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED and not message.type_mask & 0b111:
             target = Point(message.x, message.y, -message.z)
-            if a.vehicle.mode is Mode.GUIDED and a.fence.allows(target):
+            if a.vehicle.mode is FlightMode.GUIDED and a.fence.allows(target):
                 a.vehicle.go_to(target)
 
     @staticmethod
     def _fly_at(a: Autopilot, message: Message) -> None:
         """At a velocity, where it names no place (ArduCopter: `handle_message_set_position_target_local_ned`)."""
         mask = message.type_mask
-        if a.vehicle.mode is Mode.GUIDED and mask & _PLACE == _PLACE and not mask & _VELOCITY:
+        if a.vehicle.mode is FlightMode.GUIDED and mask & _PLACE == _PLACE and not mask & _VELOCITY:
             a.vehicle.fly_at(message.vx, message.vy, -message.vz)
 
     def on_data_stream(self, a: Autopilot, stream: int, rate_hz: int) -> None:
@@ -300,7 +308,7 @@ class ArduCopter(Flavour):
     def on_sticks(self, a: Autopilot, for_us: int) -> None:
         """LAND_REPOSITION: moves it aside while it lands, and in the modes that the sticks fly."""
         vehicle = a.vehicle
-        if vehicle.mode in (Mode.LOITER, Mode.POSITION) or vehicle.descends:
+        if vehicle.mode in (FlightMode.LOITER, FlightMode.POSITION) or vehicle.descends:
             vehicle.shift_east(_REPOSITION_M_S * for_us / 1_000_000)
 
     def on_breach(self, a: Autopilot, breach: Breach) -> None:
@@ -316,11 +324,11 @@ class ArduCopter(Flavour):
         if action == _REPORT:
             return
         if action == _LAND or breach.by > _GIVE_UP_M:
-            vehicle.set_mode(Mode.LAND)
+            vehicle.set_mode(FlightMode.LAND)
         elif action == _BRAKE:
-            vehicle.set_mode(Mode.BRAKE)
+            vehicle.set_mode(FlightMode.BRAKE)
         else:
-            vehicle.set_mode(Mode.RETURN)
+            vehicle.set_mode(FlightMode.RETURN)
 
     def on_mode_in_breach(self, a: Autopilot) -> None:
         """A new mode while the fence is breached counts as the pilot bringing it back."""

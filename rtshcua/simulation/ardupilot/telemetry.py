@@ -6,7 +6,7 @@ from math import atan2, degrees, hypot
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message, maker
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS, autopilot_version, extended_sys_state
 
@@ -27,7 +27,11 @@ def _position_target(a: Autopilot) -> Message | None:
     """
     vehicle = a.vehicle
     target, mode = vehicle.destination, vehicle.mode
-    has_one = vehicle.sent if mode in (Mode.GUIDED, Mode.MISSION) else mode is Mode.RETURN and not vehicle.descends
+    has_one = (
+        vehicle.sent
+        if mode in (FlightMode.GUIDED, FlightMode.MISSION)
+        else mode is FlightMode.RETURN and not vehicle.descends
+    )
     if target is None or not has_one:
         return None
     latitude, longitude = a.home.globe(target.north, target.east)

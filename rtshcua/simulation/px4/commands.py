@@ -6,9 +6,9 @@ from math import isfinite
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.mavlink.modes import Px4Mode
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Handler
-from rtshcua.simulation.command import Command, whole
+from rtshcua.simulation.command import VehicleCommand, whole
 from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, arm_disarm, shared
 from rtshcua.simulation.place import Point
 
@@ -23,24 +23,24 @@ _KEPT_US = 500_000
 """How long what it named is good for, for whoever enters Hold (`Loiter::on_activation`)."""
 
 
-def _takeoff(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _takeoff(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """Accepted while disarmed too: then arming starts the climb. The place is not looked at: it climbs straight up."""
-    if not a.can_enter(Mode.TAKEOFF):
+    if not a.can_enter(FlightMode.TAKEOFF):
         return (TEMPORARILY_REJECTED,)
     vehicle = a.vehicle
     up = command.altitude - a.home.amsl_mm / 1000
     vehicle.takeoff_up = up if isfinite(up) else vehicle.body.up + vehicle.handling.takeoff_up
     if vehicle.in_air and vehicle.takeoff_up <= vehicle.body.up:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Already higher than takeoff altitude")
-        vehicle.set_mode(Mode.LOITER)
-    elif vehicle.mode is Mode.TAKEOFF:
+        vehicle.set_mode(FlightMode.LOITER)
+    elif vehicle.mode is FlightMode.TAKEOFF:
         vehicle.climb()  # in takeoff already: to the new height
     else:
-        vehicle.set_mode(Mode.TAKEOFF)
+        vehicle.set_mode(FlightMode.TAKEOFF)
     return (ACCEPTED,)
 
 
-def _target(a: Autopilot, command: Command) -> Point:
+def _target(a: Autopilot, command: VehicleCommand) -> Point:
     """The place and the height that it names, each that of the vehicle where it does not."""
     here, up = a.here, command.altitude - a.home.amsl_mm / 1000
     north, east = here.north, here.east
@@ -49,7 +49,7 @@ def _target(a: Autopilot, command: Command) -> Point:
     return Point(north, east, up if isfinite(up) else here.up)
 
 
-def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _reposition(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """As `Navigator::run` and `Commander::handle_command` of v1.16 do it. The ACK is for the mode alone.
 
     Without the flag that changes the mode the commander does not know it, but the navigator keeps what it named for
@@ -57,14 +57,14 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
     it is answered for what it does (PX4-Autopilot pull request 27563).
     """
     vehicle, changes = a.vehicle, bool(whole(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
-    if not changes and vehicle.mode is not Mode.LOITER:
+    if not changes and vehicle.mode is not FlightMode.LOITER:
         if vehicle.armed and a.release < _ANSWERS_BY_MODE:
             a.kept = a.now_us + a.since_us + _KEPT_US, command
         return (UNSUPPORTED if a.release < _ANSWERS_BY_MODE else TEMPORARILY_REJECTED,)
-    if not a.can_enter(Mode.LOITER):
+    if not a.can_enter(FlightMode.LOITER):
         return (TEMPORARILY_REJECTED,)
-    kept, taking_off = vehicle.destination, vehicle.mode is Mode.TAKEOFF
-    vehicle.set_mode(Mode.LOITER)
+    kept, taking_off = vehicle.destination, vehicle.mode is FlightMode.TAKEOFF
+    vehicle.set_mode(FlightMode.LOITER)
     result = (ACCEPTED if changes or a.release >= _ANSWERS_BY_MODE else UNSUPPORTED,)
     if not vehicle.in_air:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Reposition ignored: not flying")
@@ -76,11 +76,11 @@ def _reposition(a: Autopilot, command: Command) -> tuple[int, ...]:
 def fly_kept(a: Autopilot) -> None:
     """In Hold now: to what was named without the flag that changes the mode, if that is not too long ago."""
     kept, a.kept = a.kept, None
-    if kept is not None and a.vehicle.mode is Mode.LOITER and a.now_us + a.since_us < kept[0]:
+    if kept is not None and a.vehicle.mode is FlightMode.LOITER and a.now_us + a.since_us < kept[0]:
         _fly(a, kept[1], a.vehicle.destination, taking_off=False)
 
 
-def _fly(a: Autopilot, command: Command, kept: Point | None, *, taking_off: bool) -> None:
+def _fly(a: Autopilot, command: VehicleCommand, kept: Point | None, *, taking_off: bool) -> None:
     """Fly to what the command names. Without a place, keep the target it has (`kept`), at the height that is given, or
     here; without a place, a height and a heading, stop ("pause").
     """
@@ -105,29 +105,29 @@ def _fly(a: Autopilot, command: Command, kept: Point | None, *, taking_off: bool
         vehicle.turn_to(command.p4)
 
 
-def _change_altitude(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _change_altitude(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """On its way it stops, and climbs there, as recorded."""
     up = command.p1 - a.home.amsl_mm / 1000
-    if not isfinite(up) or not a.can_enter(Mode.LOITER):
+    if not isfinite(up) or not a.can_enter(FlightMode.LOITER):
         return (TEMPORARILY_REJECTED,)
-    a.vehicle.set_mode(Mode.LOITER)
+    a.vehicle.set_mode(FlightMode.LOITER)
     a.vehicle.hold(up)
     return (ACCEPTED,)
 
 
-def _orbit(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _orbit(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """Around the place it names, or around where the vehicle is. As recorded, nobody looks at the fence."""
     vehicle = a.vehicle
-    if not a.can_enter(Mode.ORBIT) or not vehicle.in_air:
+    if not a.can_enter(FlightMode.ORBIT) or not vehicle.in_air:
         return (TEMPORARILY_REJECTED,)
-    vehicle.set_mode(Mode.ORBIT)
+    vehicle.set_mode(FlightMode.ORBIT)
     if command.p2 > 0:
         vehicle.speed = command.p2
     vehicle.circle(_target(a, command), command.p1 if isfinite(command.p1) and command.p1 else _ORBIT_M)
     return (ACCEPTED,)
 
 
-def _set_mode(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _set_mode(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """Acknowledged twice: the first ACK is of the message, only the second of the mode; a bogus main mode gets 0, 0."""
     main, sub = whole(command.p2), whole(command.p3)
     if main not in {number >> 16 & 0xFF for number in a.flavour.modes.numbers.values()}:
@@ -141,23 +141,23 @@ def enter_number(a: Autopilot, number: int) -> bool:
     mode = a.flavour.modes.mode(number)
     if mode is None or not a.can_enter(mode):
         return False
-    if mode is Mode.GUIDED and (a.last_target_us is None or a.now_us - a.last_target_us > _STREAM_US):
+    if mode is FlightMode.GUIDED and (a.last_target_us is None or a.now_us - a.last_target_us > _STREAM_US):
         a.say(mavlink.MAV_SEVERITY_WARNING, "Offboard denied: no offboard signal")
         return False
     vehicle = a.vehicle
-    if mode is Mode.TAKEOFF and vehicle.takeoff_up is None:
+    if mode is FlightMode.TAKEOFF and vehicle.takeoff_up is None:
         vehicle.takeoff_up = vehicle.body.up + vehicle.handling.takeoff_up
     vehicle.set_mode(mode)
     return True
 
 
-def _mission_start(a: Autopilot, command: Command) -> tuple[int, ...]:
+def _mission_start(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     """Also arms. Denied while the mission was not judged, or judged not to be flyable; there is no reason given."""
     if not a.mission.start(whole(command.p1) if command.p1 > 0 else None):
         return (DENIED,)
-    if not a.can_enter(Mode.MISSION) or not (a.vehicle.armed or a.ready):
+    if not a.can_enter(FlightMode.MISSION) or not (a.vehicle.armed or a.ready):
         return (TEMPORARILY_REJECTED,)
-    a.vehicle.set_mode(Mode.MISSION)
+    a.vehicle.set_mode(FlightMode.MISSION)
     a.vehicle.arm()
     return (ACCEPTED,)
 

@@ -13,27 +13,29 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Message
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import PX4_NAMES, Px4Mode
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.answers import Delays, Lanes
 from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
-from rtshcua.simulation.fence import Area, Breach, FenceLimits, FenceRules
+from rtshcua.simulation.fence import Breach, FenceArea, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
-from rtshcua.simulation.place import Home, Point
-from rtshcua.simulation.plans import AMSL_FRAMES, FENCE_ITEMS, NAVIGATION, RELATIVE_FRAMES, RETURN_POINT, Item
+from rtshcua.simulation.place import HomePosition, Point
+from rtshcua.simulation.plans import AMSL_FRAMES, FENCE_ITEMS, NAVIGATION, RELATIVE_FRAMES, RETURN_POINT, PlanItem
 from rtshcua.simulation.px4.commands import COMMANDS, enter_number, fly_kept
 from rtshcua.simulation.px4.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.px4.telemetry import BUILDERS, CONSTANT, DEFAULT, LEAST_US, ONLY_STREAMED
 from rtshcua.simulation.sensors import BootPlan
 from rtshcua.simulation.transfer import ERROR, TransferRules
-from rtshcua.simulation.vehicle import Event, Vehicle
+from rtshcua.simulation.vehicle import Multirotor, VehicleEvent
 
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 _ORBITS = enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | enums.MAV_MODE_FLAG_STABILIZE_ENABLED
 _BY_PILOT = _ORBITS | enums.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 _BY_ITSELF = _ORBITS | enums.MAV_MODE_FLAG_AUTO_ENABLED | enums.MAV_MODE_FLAG_GUIDED_ENABLED
-_AUTOMATIC = frozenset({Mode.TAKEOFF, Mode.LOITER, Mode.MISSION, Mode.RETURN, Mode.LAND, Mode.ORBIT})
+_AUTOMATIC = frozenset(
+    {FlightMode.TAKEOFF, FlightMode.LOITER, FlightMode.MISSION, FlightMode.RETURN, FlightMode.LAND, FlightMode.ORBIT}
+)
 
 _RECORDED = 1, 16
 _SIGNS_BY_PARAMETER = 1, 17
@@ -47,15 +49,15 @@ _BY_RECEIVER = frozenset({mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_M
 
 _WARN, _HOLD, _RETURN, _TERMINATE, _LAND = 1, 2, 3, 4, 5
 """GF_ACTION; 0 is nothing."""
-_LATE: dict[float, Mode] = {_RETURN: Mode.RETURN, _LAND: Mode.LAND}
+_LATE: dict[float, FlightMode] = {_RETURN: FlightMode.RETURN, _LAND: FlightMode.LAND}
 
 
-def _limits(value: Callable[[str], float], area: Area) -> FenceLimits | None:
+def _limits(value: Callable[[str], float], area: FenceArea) -> FenceLimits | None:
     """The fence that GF_* parameters and the upload make."""
     if value("GF_ACTION") == 0:
         return None
     across, high = value("GF_MAX_HOR_DIST"), value("GF_MAX_VER_DIST")
-    if area == Area() and not across > 0 and not high > 0:
+    if area == FenceArea() and not across > 0 and not high > 0:
         return None
     # all of them count: `Geofence::checkPointAgainstAllGeofences`
     return FenceLimits(area, high if high > 0 else inf, across=across if across > 0 else inf)
@@ -70,7 +72,9 @@ FARTHEST_FIRST_M = 10_000.0
 """MIS_DIST_1WP: farther than this from home the first waypoint may not be."""
 
 
-def _judge(items: tuple[Item, ...], _vehicle: Vehicle, home: Home, allows: Callable[[Point], bool]) -> bool:
+def _judge(
+    items: tuple[PlanItem, ...], _vehicle: Multirotor, home: HomePosition, allows: Callable[[Point], bool]
+) -> bool:
     """The feasibility check: every place inside the fence, the first one not too far; else the mission is not flown."""
     first = True
     for item in items:
@@ -92,22 +96,22 @@ class Px4(Flavour):
     autopilot = mavlink.MAV_AUTOPILOT_PX4
     modes = ModeTable(
         numbers={
-            Mode.MANUAL: Px4Mode.MANUAL,
-            Mode.ALTITUDE: Px4Mode.ALTITUDE,
-            Mode.POSITION: Px4Mode.POSITION,
-            Mode.ORBIT: Px4Mode.ORBIT,
-            Mode.TAKEOFF: Px4Mode.TAKEOFF,
-            Mode.LOITER: Px4Mode.HOLD,
-            Mode.MISSION: Px4Mode.MISSION,
-            Mode.RETURN: Px4Mode.RETURN,
-            Mode.LAND: Px4Mode.LAND,
-            Mode.GUIDED: Px4Mode.OFFBOARD,
+            FlightMode.MANUAL: Px4Mode.MANUAL,
+            FlightMode.ALTITUDE: Px4Mode.ALTITUDE,
+            FlightMode.POSITION: Px4Mode.POSITION,
+            FlightMode.ORBIT: Px4Mode.ORBIT,
+            FlightMode.TAKEOFF: Px4Mode.TAKEOFF,
+            FlightMode.LOITER: Px4Mode.HOLD,
+            FlightMode.MISSION: Px4Mode.MISSION,
+            FlightMode.RETURN: Px4Mode.RETURN,
+            FlightMode.LAND: Px4Mode.LAND,
+            FlightMode.GUIDED: Px4Mode.OFFBOARD,
         },
-        base=dict.fromkeys(Mode, _BY_ITSELF)
-        | dict.fromkeys((Mode.MANUAL, Mode.ALTITUDE, Mode.POSITION), _BY_PILOT)
-        | {Mode.ORBIT: _ORBITS},
-        start=Mode.LOITER,
-        armable=frozenset(Mode) - {Mode.RETURN, Mode.LAND},
+        base=dict.fromkeys(FlightMode, _BY_ITSELF)
+        | dict.fromkeys((FlightMode.MANUAL, FlightMode.ALTITUDE, FlightMode.POSITION), _BY_PILOT)
+        | {FlightMode.ORBIT: _ORBITS},
+        start=FlightMode.LOITER,
+        armable=frozenset(FlightMode) - {FlightMode.RETURN, FlightMode.LAND},
         names=PX4_NAMES,
     )
     boot = BootPlan(
@@ -141,15 +145,15 @@ class Px4(Flavour):
     )
     texts = MappingProxyType(
         {
-            Event.ARMED: "Armed by external command\t",
-            Event.DISARMED: "Disarmed by external command\t",
-            Event.TAKEOFF: "Takeoff detected\t",
-            Event.RETURN: "Returning to launch\t",
-            Event.RETURN_CLIMB: "RTL: start return at {amsl} m ({up} m above destination)\t",
-            Event.HOME: "RTL: land at destination\t",
-            Event.LANDED: "Landing detected\t",
-            Event.TIPPED: "Attitude failure detected\t",
-            Event.AUTO_DISARMED: "Disarmed by landing\t",
+            VehicleEvent.ARMED: "Armed by external command\t",
+            VehicleEvent.DISARMED: "Disarmed by external command\t",
+            VehicleEvent.TAKEOFF: "Takeoff detected\t",
+            VehicleEvent.RETURN: "Returning to launch\t",
+            VehicleEvent.RETURN_CLIMB: "RTL: start return at {amsl} m ({up} m above destination)\t",
+            VehicleEvent.HOME: "RTL: land at destination\t",
+            VehicleEvent.LANDED: "Landing detected\t",
+            VehicleEvent.TIPPED: "Attitude failure detected\t",
+            VehicleEvent.AUTO_DISARMED: "Disarmed by landing\t",
         }
     )
     texts_need_ground_station = True
@@ -179,7 +183,7 @@ class Px4(Flavour):
         judge=_judge,
         judged_us=150_000,
         return_is_mode=True,
-        after=Mode.LOITER,
+        after=FlightMode.LOITER,
         tells_all=True,
     )
     fence = FenceRules(limits=_limits, name=lambda _limits, _point: "Geofence", every=False, critical=_acts)
@@ -245,7 +249,7 @@ class Px4(Flavour):
         if message.type_mask & 0b111 or not isfinite(up):
             return
         a.last_target_us = a.now_us
-        if a.vehicle.mode is Mode.GUIDED:
+        if a.vehicle.mode is FlightMode.GUIDED:
             # how far it flies past such a target was not recorded
             a.vehicle.go_to(Point(*a.home.local(message.lat_int, message.lon_int), up), past=False)
 
@@ -253,7 +257,7 @@ class Px4(Flavour):
         """COM_RC_OVERRIDE: sticks leave an automatic mode for Position, or for Altitude without a position."""
         vehicle = a.vehicle
         if vehicle.armed and vehicle.mode in _AUTOMATIC:
-            vehicle.set_mode(Mode.POSITION if a.can_enter(Mode.POSITION) else Mode.ALTITUDE)
+            vehicle.set_mode(FlightMode.POSITION if a.can_enter(FlightMode.POSITION) else FlightMode.ALTITUDE)
 
     def on_breach(self, a: Autopilot, breach: Breach) -> None:
         """Does what GF_ACTION asks for, once; whoever then commands something else is obeyed, as recorded.
@@ -271,18 +275,18 @@ class Px4(Flavour):
             a.delayed = a.now_us + round(waits_s * 1e6), _LATE[action]
         elif action == _RETURN:
             a.say(_CRITICAL, "Failsafe activated: switching to Return\t")
-            vehicle.set_mode(Mode.RETURN)
+            vehicle.set_mode(FlightMode.RETURN)
         elif action == _TERMINATE:
             a.say(mavlink.MAV_SEVERITY_EMERGENCY, "Failsafe activated: terminating\t")
             vehicle.disarm()
         elif action == _LAND:
             a.say(_CRITICAL, "Failsafe activated: switching to Land\t")
-            vehicle.set_mode(Mode.LAND)
+            vehicle.set_mode(FlightMode.LAND)
         else:
             a.say(_CRITICAL, "Failsafe activated: switching to Hold\t")
             self._hold(vehicle)
 
     @staticmethod
-    def _hold(vehicle: Vehicle) -> None:
-        vehicle.set_mode(Mode.LOITER)
+    def _hold(vehicle: Multirotor) -> None:
+        vehicle.set_mode(FlightMode.LOITER)
         vehicle.go_to(Point(vehicle.body.north, vehicle.body.east, vehicle.body.up))

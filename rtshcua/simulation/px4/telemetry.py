@@ -6,7 +6,7 @@ from math import nan
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message, maker
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.telemetry import (
     COMMON,
@@ -22,7 +22,7 @@ _ESTIMATOR_STATUS = maker(mavlink.MAVLink_estimator_status_message)
 _WIND_COV = maker(mavlink.MAVLink_wind_cov_message)
 _TIMESYNC = maker(mavlink.MAVLink_timesync_message)
 
-_NAVIGATED = frozenset({Mode.TAKEOFF, Mode.LOITER, Mode.MISSION, Mode.RETURN, Mode.LAND})
+_NAVIGATED = frozenset({FlightMode.TAKEOFF, FlightMode.LOITER, FlightMode.MISSION, FlightMode.RETURN, FlightMode.LAND})
 """The modes in which the navigator sets one; a pilot's modes, OFFBOARD and circling have none."""
 
 
@@ -35,7 +35,7 @@ def _position_target(a: Autopilot) -> Message | None:
     if target is None or mode not in _NAVIGATED or not vehicle.armed:
         return None
     latitude, longitude = a.home.globe(target.north, target.east)
-    amsl = 0.0 if mode is Mode.LAND else a.home.amsl_mm / 1000 + target.up
+    amsl = 0.0 if mode is FlightMode.LAND else a.home.amsl_mm / 1000 + target.up
     body = vehicle.body
     velocity = (body.v_north, body.v_east, -body.v_up)
     return _POSITION_TARGET_GLOBAL_INT(

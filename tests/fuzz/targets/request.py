@@ -22,14 +22,14 @@ def worlds() -> tuple[Loaded, ...]:
     from virtual import case
 
     data = shipped("one_bridge")
-    from rtshcua.onboard.enforcement.load import Mode, load
+    from rtshcua.onboard.enforcement.load import EnforcementMode, load
 
     standard = load(
         data,
         root=case.root()[0],
         vehicle="quad-07",
         now=Now(500 * board.S, flat.ISSUED + board.S, 0),
-        mode=Mode.SOFTWARE,
+        mode=EnforcementMode.SOFTWARE,
         session_key=reference.SESSION_KEY,
         flight=reference.FLIGHT,
         peer_is_own_simulator=False,

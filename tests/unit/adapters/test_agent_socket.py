@@ -21,8 +21,8 @@ from rtshcua.adapters.agent_socket import (
     MOST_READERS,
     MOST_WAITING,
     AgentSocket,
-    Answered,
     FlightFollower,
+    FlightReply,
     Peer,
     SocketTaken,
     flight_at,
@@ -302,7 +302,7 @@ def test_a_client_that_finds_no_place_tries_again(folder: Path) -> None:
             client.join()
         for each in waiting:
             each.close()
-    assert found == [Answered("accepted", "at last")]
+    assert found == [FlightReply("accepted", "at last")]
     with pytest.raises(ConnectionRefusedError):
         hand_in(path, b"paper", patience_s=5)
 
@@ -443,13 +443,13 @@ def test_a_follower_hears_what_came_with_the_first_line_and_a_long_line_in_piece
     hello = b'{"type":"hello","flight":"' + b"ab" * 16 + b'"}\n'
     long = b'{"type":"mission","x":"' + b"x" * 300_000 + b'"}\n'
     answer = b'{"type":"answer","id":1,"slug":"accepted","text":"well"}\n'
-    heard: list[bytes | Answered] = []
+    heard: list[bytes | FlightReply] = []
     says = (hello[:9], hello[9:] + long[:1000], long[1000:], answer + answer[:9])
     with listener(folder, *says, every_s=0.01) as path, FlightFollower(path) as follower:
         assert follower.flight == b"\xab" * 16
         while len(heard) < 3:
             heard += follower.receive() or []
-    assert heard == [hello, long, Answered("accepted", "well")]
+    assert heard == [hello, long, FlightReply("accepted", "well")]
 
 
 def test_a_client_of_nobody(folder: Path) -> None:

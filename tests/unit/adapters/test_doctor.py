@@ -21,18 +21,18 @@ from rtshcua.adapters.doctor.diagnosis import (
 )
 from rtshcua.adapters.doctor.examination import ExaminingDriver
 from rtshcua.adapters.doctor.settings import SETTINGS
-from rtshcua.adapters.utc import TimeOfDay
-from rtshcua.adapters.vehicle.bounds import Reach
+from rtshcua.adapters.utc import TimeSources
+from rtshcua.adapters.vehicle.bounds import FlightReach
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.parameters import bits_of
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 from rtshcua.model.faults import GpsLoss, LinkLoss, MessageSilence
 from rtshcua.model.flat.policy import Policy, Speeds
 from rtshcua.model.flat.signal import CELL, DRAIN, NUMBER, Signal, SignalSource
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.rehearsal import unheard
-from rtshcua.simulation.config import EQUIPPED, Boot, Extra, Kind, OtherBattery, Purpose, SimulationConfig
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.config import EQUIPPED, AutopilotKind, Boot, Equipment, OtherBattery, Purpose, SimulationConfig
+from rtshcua.simulation.place import HomePosition
 from rtshcua.virtual.vehicle import SECOND, VirtualClock, VirtualVehicle
 from virtual import case
 from virtual.rows import rows
@@ -57,7 +57,7 @@ def examine(
     """The findings after so many seconds, by slug; of several with one slug, the worst. An ArduCopter acts on a low
     battery, as its owner set it, unless `config` says otherwise.
     """
-    if config.flavour is Kind.ARDUPILOT and "BATT_FS_LOW_ACT" not in dict(config.parameters):
+    if config.flavour is AutopilotKind.ARDUPILOT and "BATT_FS_LOW_ACT" not in dict(config.parameters):
         config = dataclasses.replace(config, parameters=(*config.parameters, ("BATT_FS_LOW_ACT", 2.0)))
     policy = policy or case.policy()
     clock = VirtualClock()
@@ -67,7 +67,7 @@ def examine(
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
     found: dict[str, VehicleFinding] = {}
-    time = TimeOfDay(utc_error_us, vehicle=vehicle_counts, stated_us=stated_us)
+    time = TimeSources(utc_error_us, vehicle=vehicle_counts, stated_us=stated_us)
     for each in diagnose(vehicle.driver, policy, MISSION, keyed=False, time=time):
         if each.slug not in found or each.verdict is MissionVerdict.STOP:
             found[each.slug] = each
@@ -233,7 +233,7 @@ def test_without_a_position_it_would_not_fly(flavour: str) -> None:
 
 
 def test_a_vehicle_far_from_the_home_of_the_policy() -> None:
-    found = examine(case.simulated("px4", home=Home(473_980_000, 85_500_000, 488_000)))
+    found = examine(case.simulated("px4", home=HomePosition(473_980_000, 85_500_000, 488_000)))
     assert stops(found) == {"mission/unready"}
     assert "m from the policy's home" in found["mission/unready"].found
 
@@ -348,7 +348,7 @@ def test_what_settles_by_itself_is_named_until_it_has() -> None:
 @rows(("seconds", "needed"), [(60.0, "at least 1080 s"), (1_079.0, "at least 1080 s"), (1_080.0, ""), (0.0, "")])
 def test_a_simulation_of_px4_that_empties_its_battery_faster_than_declared_is_told(seconds: float, needed: str) -> None:
     """As it is delivered in a minute (`SIM_BAT_DRAIN`): each flight there would turn home soon."""
-    (found,) = settings_told("px4", {"SIM_BAT_DRAIN": seconds}, case.policy(), Reach())
+    (found,) = settings_told("px4", {"SIM_BAT_DRAIN": seconds}, case.policy(), FlightReach())
     assert (found.slug, found.needed) == ("settings/sim_bat_drain", needed)
     assert found.verdict is (MissionVerdict.WARN if needed else MissionVerdict.OK)
     if needed:
@@ -400,7 +400,7 @@ def test_a_vehicle_whose_clock_is_not_known(flavour: str) -> None:
 
 
 def test_a_signal_that_nobody_sends() -> None:
-    found = examine(case.simulated("px4", extras=EQUIPPED - {Extra.RANGE}))
+    found = examine(case.simulated("px4", extras=EQUIPPED - {Equipment.RANGE}))
     (obstacle,) = [each for slug, each in found.items() if slug.startswith("signal/obstacle")]
     assert obstacle.verdict in (MissionVerdict.STOP, MissionVerdict.WARN)
     assert obstacle.found.endswith("no DISTANCE_SENSOR")
@@ -463,7 +463,7 @@ def signs(flavour: str, utc_us: int) -> SimulationConfig:
 def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, VehicleFinding]:
     """The same on a link with a key."""
     now = VirtualClock().now()
-    link = SignedLink(KEY, State(0, {}), now.utc_us, now.monotonic_us)
+    link = SignedLink(KEY, SigningState(0, {}), now.utc_us, now.monotonic_us)
     frames = FrameSession()
     frames.sign_with(link)
     policy, clock = case.policy(), VirtualClock()
@@ -471,7 +471,7 @@ def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, VehicleFi
     vehicle.driver = ExaminingDriver(policy, clock, frames, link)
     while clock.elapsed_us < seconds * SECOND:
         vehicle.poll(clock.now().monotonic_us, SECOND)
-    findings = diagnose(vehicle.driver, policy, MISSION, keyed=True, time=TimeOfDay(1_000), **words)
+    findings = diagnose(vehicle.driver, policy, MISSION, keyed=True, time=TimeSources(1_000), **words)
     return {each.slug: each for each in findings}
 
 

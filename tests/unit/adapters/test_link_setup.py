@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.link_setup import LinkSetup, SetUp, after_setup, carry_out
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.simulation.config import Answers, Kind, SimulationConfig
+from rtshcua.simulation.config import Answers, AutopilotKind, SimulationConfig
 from rtshcua.simulation.world import Simulation
 
 KEY = b"shared/traces test key, 32 bytes"
@@ -24,7 +24,7 @@ class Bench:
 
     def __init__(self, flavour: str, **config: Any) -> None:
         self.simulation = Simulation(
-            SimulationConfig(flavour=Kind(flavour), utc_us=UTC_US, answers=Answers.RECORDED, **config)
+            SimulationConfig(flavour=AutopilotKind(flavour), utc_us=UTC_US, answers=Answers.RECORDED, **config)
         )
         self.sent: list[bytes] = []
         self.advance(1_500_000)

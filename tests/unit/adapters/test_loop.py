@@ -11,11 +11,11 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import (
     Append,
     Command,
+    CommandFailed,
     End,
     Ending,
     EvidenceFailed,
     EvidenceKept,
-    Failed,
     Interrupted,
     Noted,
     Release,
@@ -107,7 +107,7 @@ def test_what_is_late_is_not_sent_and_the_runtime_is_told() -> None:
     world.loop.turn()
     assert world.did == []
     world.loop.turn()
-    assert world.events == [Failed(1_000, 7, "late")]
+    assert world.events == [CommandFailed(1_000, 7, "late")]
     assert world.polled == [WAIT_US, 0]  # and told at once
 
 
@@ -118,7 +118,7 @@ def test_what_could_not_be_recorded_is_withheld() -> None:
     assert world.did == []
     world.loop.turn()
     assert world.events == [
-        EvidenceFailed(1_000, "no space left on device"), Failed(1_000, 7, "withheld"),
+        EvidenceFailed(1_000, "no space left on device"), CommandFailed(1_000, 7, "withheld"),
     ]  # fmt: skip
 
 
@@ -181,7 +181,7 @@ def test_a_record_that_takes_too_long_makes_its_step_late() -> None:
     world = held()
     world.now_us = 5_001
     world.loop.turn()
-    assert world.events == [Failed(5_001, 7, "late")]
+    assert world.events == [CommandFailed(5_001, 7, "late")]
     world.kept = 2
     world.loop.turn()
     assert world.did == []
@@ -192,7 +192,7 @@ def test_a_record_that_comes_when_it_is_too_late_changes_nothing() -> None:
     world.now_us, world.kept = 5_001, 2
     world.loop.turn()
     assert world.did == []
-    assert world.events == [Failed(5_001, 7, "late")]
+    assert world.events == [CommandFailed(5_001, 7, "late")]
 
 
 def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
@@ -242,7 +242,7 @@ def test_a_disk_that_fails_withholds_a_step_that_waits() -> None:
     world = held()
     world.troubles = ["input/output error"]
     world.loop.turn()
-    assert world.events == [EvidenceFailed(1_000, "input/output error"), Failed(1_000, 7, "withheld")]
+    assert world.events == [EvidenceFailed(1_000, "input/output error"), CommandFailed(1_000, 7, "withheld")]
     world.kept = 9
     world.loop.turn()
     assert world.did == []

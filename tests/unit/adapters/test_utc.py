@@ -9,14 +9,14 @@ from reference import flat_case as flat
 from rtshcua.adapters.clock import PacedClock, SystemClock
 from rtshcua.adapters.utc import UtcWatch, certain_from_us, kernel_error_us, synchronised_us
 from rtshcua.adapters.vehicle.source_time import SourceTime
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import ReceivedFrame
 from rtshcua.decision.decide import decide
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.isolated import OwnTime
-from rtshcua.wire.clock import AUTOPILOT_US, DRIFT_US, Source
+from rtshcua.wire.clock import AUTOPILOT_US, DRIFT_US, ClockSource
 
 NOW_US = 1_800_000_000_000_000
 
@@ -115,10 +115,10 @@ def test_the_vehicles_time_is_known_as_well_as_its_clock() -> None:
         (mavlink.MAVLink_timesync_message(5_000_000_000, ts1_ns), 100_002_000),
         (mavlink.MAVLink_system_time_message(0, 5_010), 100_012_000),  # before its receiver told it
     ):
-        source.of(Received(message, message.get_type(), 1, 1, 0, False, b""), at_us)
+        source.of(ReceivedFrame(message, message.get_type(), 1, 1, 0, False, b""), at_us)
     assert source.utc(100_012_000) is None
     message = mavlink.MAVLink_system_time_message(NOW_US, 5_020)
-    source.of(Received(message, message.get_type(), 1, 1, 2, False, b""), 100_022_000)
+    source.of(ReceivedFrame(message, message.get_type(), 1, 1, 2, False, b""), 100_022_000)
     told = source.utc(100_022_000)
     assert told is not None
     ahead_us, open_us = told
@@ -167,15 +167,15 @@ def test_a_bundle_is_waited_for_that_may_be_of_the_time_to_come(issued_us: int, 
 class Own:
     """A boundary's clock, which knows nothing yet."""
 
-    def __init__(self, source: Source = Source.UNKNOWN, number: int = 0) -> None:
+    def __init__(self, source: ClockSource = ClockSource.UNKNOWN, number: int = 0) -> None:
         self.source, self.number = source, number
-        self.stated: Source | None = None
+        self.stated: ClockSource | None = None
         self.gone = False
 
     def __call__(self, settle: bool) -> OwnTime | None:
-        if settle and self.source is Source.UNKNOWN and self.stated is not None:
+        if settle and self.source is ClockSource.UNKNOWN and self.stated is not None:
             self.source = self.stated
-        known = self.source is not Source.UNKNOWN
+        known = self.source is not ClockSource.UNKNOWN
         now = Now(1_000, 1_800_000_000_000_000, 700 if known else UTC_UNKNOWN_US)
         return None if self.gone else OwnTime(self.source, now, 0 if known else self.number)
 
@@ -187,7 +187,7 @@ def test_the_boundarys_clock_counts_and_no_other() -> None:
     assert (watch.bound.source, watch.waits) == ("unknown", True)
     assert clock.now().utc_error_us == UTC_UNKNOWN_US
     assert not watch.look(SourceTime(), "px4", 0)
-    own.source = Source.VEHICLE
+    own.source = ClockSource.VEHICLE
     assert watch.look(SourceTime(), "px4", 0)
     assert (watch.bound.source, watch.bound.error_us) == ("vehicle", 700)
     now = clock.now()
@@ -197,7 +197,7 @@ def test_the_boundarys_clock_counts_and_no_other() -> None:
 
 def test_what_the_operator_stated_holds_once_no_more_is_waited_for() -> None:
     own = Own(number=77)
-    own.stated = Source.OPERATOR
+    own.stated = ClockSource.OPERATOR
     watch = UtcWatch(SystemClock(), 500, kernel_us=lambda: None)
     assert (watch.question(), watch.vehicle_may_tell) == (0, True)
     watch.follow(own)
@@ -216,15 +216,15 @@ def test_a_boundary_that_took_the_vehicles_time_since_we_looked_is_still_followe
     own = Own(number=77)
     watch = UtcWatch(SystemClock(), None, kernel_us=lambda: None)
     watch.follow(own)
-    own.source = Source.VEHICLE  # its answer came between two looks
+    own.source = ClockSource.VEHICLE  # its answer came between two looks
     assert (watch.waits, watch.question(), watch.vehicle_may_tell) == (True, 0, True)
     assert watch.look(SourceTime(), "px4", 0)
     assert not watch.vehicle_may_tell
 
 
 def test_a_boundary_without_a_clock_or_that_is_gone_changes_nothing() -> None:
-    for own in (Own(Source.SHARED), Own()):
-        own.gone = own.source is Source.UNKNOWN
+    for own in (Own(ClockSource.SHARED), Own()):
+        own.gone = own.source is ClockSource.UNKNOWN
         watch = UtcWatch(SystemClock(), None, kernel_us=lambda: 3)
         watch.follow(own)
         assert watch.bound.source == "kernel"
@@ -232,7 +232,7 @@ def test_a_boundary_without_a_clock_or_that_is_gone_changes_nothing() -> None:
 
 def test_of_a_simulated_vehicle_the_boundary_has_this_machines_time() -> None:
     own = Own()
-    own.stated = Source.OPERATOR
+    own.stated = ClockSource.OPERATOR
     watch = UtcWatch.simulated(SystemClock())
     watch.follow(own)
     assert (watch.bound.source, watch.bound.error_us) == ("simulated", 700)

@@ -13,11 +13,11 @@ from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Log, log_keys
 from rtshcua.adapters import witness_link
 from rtshcua.adapters.store.logs import anchors_path, read_anchors
 from rtshcua.adapters.store.witness import FileWitness, WitnessStore
-from rtshcua.adapters.witness_link import ANSWER, REQUEST, Anchor, Trouble, WitnessClient, WitnessLink
+from rtshcua.adapters.witness_link import ANSWER, REQUEST, Anchor, WitnessClient, WitnessLink, WitnessTrouble
 from rtshcua.codec.frames import Codec
 from rtshcua.codec.tunnel import answer_name, messages, name_of
-from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
-from rtshcua.evidence.witnessing.witness import Answer, Declined, Request
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors
+from rtshcua.evidence.witnessing.witness import CosignRequest, Declined, WitnessResponse
 from rtshcua.wire.keys import SigningKey
 
 HOST = "127.0.0.1"
@@ -29,7 +29,7 @@ class Served:
 
     def __init__(self, state: Path, key: SigningKey = WITNESSES[0], port: int = 0) -> None:
         self.store = WitnessStore(state, key)
-        self.asked: list[Request] = []
+        self.asked: list[CosignRequest] = []
         self.witness = FileWitness(self.store, key, log_keys, lambda: 1_000)
         self.link = WitnessLink((HOST, port), self.consider)
         self.over = threading.Event()
@@ -40,7 +40,7 @@ class Served:
     def address(self) -> tuple[str, int]:
         return HOST, self.link.port
 
-    def consider(self, request: Request) -> Answer | Declined:
+    def consider(self, request: CosignRequest) -> WitnessResponse | Declined:
         self.asked.append(request)
         return self.witness.consider(request)
 
@@ -153,8 +153,10 @@ def writer(tmp_path: Path) -> Writer:
     return Writer(tmp_path)
 
 
-def until(client: WitnessClient, wanted: Callable[[list[Anchor | Trouble]], bool]) -> list[Anchor | Trouble]:
-    found: list[Anchor | Trouble] = []
+def until(
+    client: WitnessClient, wanted: Callable[[list[Anchor | WitnessTrouble]], bool]
+) -> list[Anchor | WitnessTrouble]:
+    found: list[Anchor | WitnessTrouble] = []
     until_s = time.monotonic() + PATIENCE_S
     while not wanted(found):
         assert time.monotonic() < until_s, found
@@ -163,10 +165,10 @@ def until(client: WitnessClient, wanted: Callable[[list[Anchor | Trouble]], bool
     return found
 
 
-def seen(size: int, key: SigningKey = WITNESSES[0]) -> Callable[[list[Anchor | Trouble]], bool]:
+def seen(size: int, key: SigningKey = WITNESSES[0]) -> Callable[[list[Anchor | WitnessTrouble]], bool]:
     """Whether a witness cosigned the checkpoint of this size."""
 
-    def has(found: list[Anchor | Trouble]) -> bool:
+    def has(found: list[Anchor | WitnessTrouble]) -> bool:
         held = Anchors(ORIGIN, [key.public], 1)
         notes = [each.note for each in found if isinstance(each, Anchor)]
         assert not any(held.anchor(note) for note in notes)
@@ -178,14 +180,14 @@ def seen(size: int, key: SigningKey = WITNESSES[0]) -> Callable[[list[Anchor | T
     return has
 
 
-def outcome(writer: Writer, notes: list[str], threshold: int) -> Anchored:
+def outcome(writer: Writer, notes: list[str], threshold: int) -> AnchoredExtent:
     held = Anchors(ORIGIN, PUBLIC, threshold)
     for note in writer.log.notes:
         held.checkpoint(note)
     for note in notes:
         assert held.anchor(note) is None
     found = held.finish(len(writer.log.lines))
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     return found
 
 
@@ -279,8 +281,8 @@ def test_a_witness_that_saw_another_future(serve: Callable[..., Served], writer:
     client = writer.client(served.address)
     writer.epoch(2)
     writer.epoch(4)
-    found = until(client, lambda found: any(isinstance(each, Trouble) for each in found))
-    (trouble,) = [each for each in found if isinstance(each, Trouble)]
+    found = until(client, lambda found: any(isinstance(each, WitnessTrouble) for each in found))
+    (trouble,) = [each for each in found if isinstance(each, WitnessTrouble)]
     assert "saw another log" in trouble.text
     assert client.finish(PATIENCE_S) == []  # nothing more is expected of it
     assert not seen(3)(found)
@@ -289,7 +291,7 @@ def test_a_witness_that_saw_another_future(serve: Callable[..., Served], writer:
 def test_a_witness_that_the_root_does_not_name(serve: Callable[..., Served], writer: Writer) -> None:
     client = writer.client(serve(2).address, keys=frozenset(PUBLIC[:2]))
     found = until(client, bool)
-    assert found == [Trouble(found[0].text)]  # type: ignore[union-attr]
+    assert found == [WitnessTrouble(found[0].text)]  # type: ignore[union-attr]
     assert "does not name" in found[0].text  # type: ignore[union-attr]
     (late,) = client.finish(0)
     assert "did not cosign the end" in late.text
@@ -377,7 +379,10 @@ def test_answers_that_are_none(writer: Writer) -> None:
             name = bytes(chunks[0].message.payload)[1:9]
             for message in messages(ANSWER, answer_name(name, answer), answer):
                 liar.sendto(codec.pack(message), sender)
-        until(client, lambda found: any("saw another log" in each.text for each in found if isinstance(each, Trouble)))
+        until(
+            client,
+            lambda found: any("saw another log" in each.text for each in found if isinstance(each, WitnessTrouble)),
+        )
         client.finish(0)
 
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Codec, Received
+from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.codec.tunnel import (
     CHUNK,
     LONGEST,
@@ -25,7 +25,7 @@ from virtual.rows import rows
 NAME = b"12345678"
 
 
-def frames(data: bytes, kind: int = 1, name: bytes = NAME) -> list[Received]:
+def frames(data: bytes, kind: int = 1, name: bytes = NAME) -> list[ReceivedFrame]:
     """Over the wire and back."""
     codec = Codec(1, 191)
     found = [codec.parse(codec.pack(message)) for message in messages(kind, name, data)]
@@ -33,7 +33,7 @@ def frames(data: bytes, kind: int = 1, name: bytes = NAME) -> list[Received]:
     return [each for (each,) in found]
 
 
-def crafted(payload: bytes, length: int | None = None, payload_type: int = PAYLOAD_TYPE) -> Received:
+def crafted(payload: bytes, length: int | None = None, payload_type: int = PAYLOAD_TYPE) -> ReceivedFrame:
     codec = Codec(1, 191)
     octets = list(payload.ljust(128, b"\0"))
     message = mavlink.MAVLink_tunnel_message(0, 0, payload_type, len(payload) if length is None else length, octets)
@@ -95,7 +95,7 @@ def test_lost_repeated_and_out_of_order(data: bytes, seed: int) -> None:
     ],
     ids=range(8),
 )
-def test_frames_that_are_none_of_ours(frame: Received) -> None:
+def test_frames_that_are_none_of_ours(frame: ReceivedFrame) -> None:
     assembler = Assembler()
     assert assembler.take("a", frame) is None
     assert assembler.unfinished == 0

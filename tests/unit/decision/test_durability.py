@@ -9,7 +9,7 @@ from reference import flat_case as flat
 from rtshcua.decision.durability import confirmed, durability_of, recorded_as
 from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WORDS, WRITTEN
 from rtshcua.model.flat.contract import Contract, MotionKind
-from rtshcua.model.flat.situation import Approval, Context
+from rtshcua.model.flat.situation import ConfirmAnswer, Context
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 from virtual.rows import rows
@@ -60,5 +60,5 @@ def test_of_several_words_the_greatest_counts(names: list[str], many: int) -> No
     ("granted", "expected"), [((), False), ((1,), True), ((0,), False), ((0, 1), True), ((0, 0), False)]
 )
 def test_confirmed_is_whatever_somebody_approved(granted: tuple[int, ...], expected: bool) -> None:
-    approvals = tuple(Approval(number, 0, each, 5) for number, each in enumerate(granted))
+    approvals = tuple(ConfirmAnswer(number, 0, each, 5) for number, each in enumerate(granted))
     assert confirmed(Context(b"", "quad-07", 7, 0, 0, 0, 0, approvals)) is expected

@@ -16,7 +16,7 @@ from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interval, maybe, point
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Volume
 from rtshcua.decision.watch import WAY_HOME, holding
-from rtshcua.decision.zones import Place
+from rtshcua.decision.zones import PlaceSet
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.policy import Speeds
@@ -70,7 +70,7 @@ MOST = ENERGY.needed(100 * M, (0, 20 * M))
 
 
 def volume(near: int, far: int, height: Value, gap: int = 0) -> Volume:
-    return Volume(Place(UNKNOWN_VOLUME.place.parts, gap), height, (near, far))
+    return Volume(PlaceSet(UNKNOWN_VOLUME.place.parts, gap), height, (near, far))
 
 
 LEVEL = interval(0, 20 * M)

@@ -9,7 +9,7 @@ from reference.asking import ask, loaded
 from reference.flat_case import H
 from reference.naive_code import on_the_wall
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.nearest import Changes, offer
+from rtshcua.decision.nearest import ChangeSearch, offer
 from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.decision.times import LocalTime, Times, Windows, daily, local_time, weekly
 from rtshcua.decision.tree import InWeek
@@ -257,7 +257,7 @@ def test_a_rule_of_a_monday(at: int, answer: bool) -> None:
 )
 def test_the_nearest_time_is_on_the_same_day(at: int, windows: tuple[int, ...], times: tuple[int, int] | None) -> None:
     tables = on_monday().tables
-    changes = Changes(Environment((), (), ((ZERO + at, ZERO + at),), (0, 0)), tables)
+    changes = ChangeSearch(Environment((), (), ((ZERO + at, ZERO + at),), (0, 0)), tables)
     found = changes.find(InWeek(windows), True)
     if times is None:
         assert found is None
@@ -271,8 +271,8 @@ def test_the_nearest_time_is_on_the_same_day(at: int, windows: tuple[int, ...], 
 def test_no_time_is_near_where_the_local_time_is_not_known() -> None:
     tables = loaded(replace(flat.POLICY, vehicle=VEHICLE)).tables
     at = Environment((), (), ((ZERO + 9 * DAY,) * 2,), (0, 0))
-    (change,) = Changes(at, tables).find(InWeek((0, WEEK)), True) or ()
-    assert not Changes(at, tables).help(InWeek((0, WEEK)), True, {change.subject: 0})
+    (change,) = ChangeSearch(at, tables).find(InWeek((0, WEEK)), True) or ()
+    assert not ChangeSearch(at, tables).help(InWeek((0, WEEK)), True, {change.subject: 0})
     (option,) = offer(change, flat.POLICY.contracts[0], replace(flat.POLICY, vehicle=VEHICLE), at).options
     assert option[0] in (0, DAY - 1)
 

@@ -14,7 +14,7 @@ from rtshcua.decision.fallbacks import choose_contingency, choose_fallback, link
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.decision.situation import is_situation, situation
-from rtshcua.decision.tree import InPhase, Monitored, Scope, monitored, parse, scope_of, slots_read
+from rtshcua.decision.tree import CodeScope, MonitorSays, PhaseIn, monitored, parse, scope_of, slots_read
 from rtshcua.decision.values import Sets
 from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal
@@ -55,15 +55,15 @@ INNER = SCOPE.about(flat.CONTRACTS[INSPECT]).inside_monitor(1)
 @rows(
     ("code", "scope", "found"),
     [
-        ((Op.MONITOR, 2, 0), SCOPE, Monitored(2)),
+        ((Op.MONITOR, 2, 0), SCOPE, MonitorSays(2)),
         ((Op.MONITOR, 3, 0), SCOPE, "instruction 0: there is no monitor 3 here"),
         ((Op.MONITOR, -1, 0), SCOPE, "instruction 0: there is no monitor -1 here"),
         ((Op.MONITOR, 0, 1), SCOPE, "instruction 0: an unused operand is not 0"),
-        ((Op.MONITOR, 0, 0), INNER, Monitored(0)),
+        ((Op.MONITOR, 0, 0), INNER, MonitorSays(0)),
         ((Op.MONITOR, 1, 0), INNER, "instruction 0: there is no monitor 1 here"),
-        ((Op.PHASE_IN, 0, 2), SCOPE, InPhase(2)),
-        ((Op.PHASE_IN, 0, 3), SCOPE, InPhase(3)),
-        ((Op.PHASE_IN, 0, 4), SCOPE, InPhase(4)),
+        ((Op.PHASE_IN, 0, 2), SCOPE, PhaseIn(2)),
+        ((Op.PHASE_IN, 0, 3), SCOPE, PhaseIn(3)),
+        ((Op.PHASE_IN, 0, 4), SCOPE, PhaseIn(4)),
         ((Op.PHASE_IN, 0, 1), SCOPE, "instruction 0: set 1 is none of phases"),
         ((Op.PHASE_IN, 0, 5), SCOPE, "instruction 0: there is no set 5"),
         ((Op.PHASE_IN, 0, -1), SCOPE, "instruction 0: there is no set -1"),
@@ -73,7 +73,7 @@ INNER = SCOPE.about(flat.CONTRACTS[INSPECT]).inside_monitor(1)
         ((Op.MONITOR, 0, 0), scope_of(flat.POLICY), "instruction 0: there is no monitor 0 here"),
     ],
 )
-def test_code(code: tuple[int, ...], scope: Scope, found: object) -> None:
+def test_code(code: tuple[int, ...], scope: CodeScope, found: object) -> None:
     assert parse(code, scope) == found
 
 

@@ -12,7 +12,7 @@ from reference.asking import POLICY, STEP, ask, loaded, ready, with_contract
 from reference.flat_case import BATTERY, FIX, GOTO, HEIGHT, INSPECT, NOW, POSITION_X, WIND, M, clause, rule
 from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import Environment
-from rtshcua.decision.nearest import Change, Changes, nearest, nearest_in
+from rtshcua.decision.nearest import ChangeSearch, NearestChange, nearest, nearest_in
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.situation import situation
 from rtshcua.decision.tree import parse, scope_of
@@ -146,7 +146,7 @@ def changes(
     assert not isinstance(node, str), node
     sets = situation(flat.state(values), POLICY, NOW)
     at = Environment([*sets.values, MISSING], tuple(map(point, STEP.arguments)), sets.utc_us, sets.utc_error_us)
-    return Changes(at, POLICY.tables, signals_only=signals_only).find(node, goal)
+    return ChangeSearch(at, POLICY.tables, signals_only=signals_only).find(node, goal)
 
 
 def bounds(code: tuple[int, ...], goal: bool = True, **given: Any) -> Any:
@@ -212,7 +212,7 @@ def test_sets_of_choices_are_cut() -> None:
     both = flat.apply(Op.AND, (Op.SIGNAL_IN, FIX, flat.GOOD_FIX), (Op.SIGNAL_IN, FIX, flat.IN_BRIDGE))
     assert changes(both, values={FIX: 0}) is None
     same = flat.apply(Op.AND, (Op.SIGNAL_IN, FIX, flat.GOOD_FIX), (Op.SIGNAL_IN, FIX, flat.GOOD_FIX))
-    assert changes(same, values={FIX: 0}) == (Change(False, FIX, 0, 0, frozenset({3, 4, 5, 6})),)
+    assert changes(same, values={FIX: 0}) == (NearestChange(False, FIX, 0, 0, frozenset({3, 4, 5, 6})),)
     mixed = flat.apply(Op.AND, (Op.SIGNAL_IN, FIX, flat.GOOD_FIX), flat.apply(Op.GE, SIG(FIX), N(3)))
     assert changes(mixed, values={FIX: 0}) is None
 
@@ -225,17 +225,17 @@ def test_what_is_missing_beside_it_leaves_no_answer() -> None:
 @rows(
     ("change", "value", "answer"),
     [
-        (Change(False, 0, 5, 9, None), point(7), 9),
-        (Change(False, 0, 5, 9, None), point(3), 5),
-        (Change(False, 0, 5, 9, None), point(11), 9),
-        (Change(False, 0, 5, (1 << 53) - 1, None), MISSING, 5),
-        (Change(False, 0, -((1 << 53) - 1), 9, None), MISSING, 9),
-        (Change(False, None, 100, 200, None), point(50), 100),
-        (Change(False, None, 100, 200, None), point(250), 200),
-        (Change(False, None, 100, 200, None), point(DAY - 10), 100),
+        (NearestChange(False, 0, 5, 9, None), point(7), 9),
+        (NearestChange(False, 0, 5, 9, None), point(3), 5),
+        (NearestChange(False, 0, 5, 9, None), point(11), 9),
+        (NearestChange(False, 0, 5, (1 << 53) - 1, None), MISSING, 5),
+        (NearestChange(False, 0, -((1 << 53) - 1), 9, None), MISSING, 9),
+        (NearestChange(False, None, 100, 200, None), point(50), 100),
+        (NearestChange(False, None, 100, 200, None), point(250), 200),
+        (NearestChange(False, None, 100, 200, None), point(DAY - 10), 100),
     ],
 )
-def test_the_nearest_that_a_change_allows(change: Change, value: Any, answer: int) -> None:
+def test_the_nearest_that_a_change_allows(change: NearestChange, value: Any, answer: int) -> None:
     assert nearest_in(change, value) == answer
 
 

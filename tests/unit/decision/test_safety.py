@@ -28,7 +28,7 @@ from rtshcua.decision.decide import decide
 from rtshcua.decision.flying import MOST_DRAIN
 from rtshcua.decision.values import MISSING, interval, maybe, point
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Planner, Volume
-from rtshcua.decision.zones import Place, WellKnown
+from rtshcua.decision.zones import PlaceSet, WellKnown
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
@@ -228,7 +228,7 @@ ENERGY = Energy(flat.CONTRACTS[GOTO], flat.POLICY.vehicle)
 
 
 def volume(near: int, far: int, gap: int = 0) -> Volume:
-    return Volume(Place(UNKNOWN_VOLUME.place.parts, gap), MISSING, (near, far))
+    return Volume(PlaceSet(UNKNOWN_VOLUME.place.parts, gap), MISSING, (near, far))
 
 
 @rows(("drain", "least", "most"), [

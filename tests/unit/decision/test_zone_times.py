@@ -13,7 +13,7 @@ from rtshcua.decision.contracts import longest
 from rtshcua.decision.fallbacks import choose_fallback
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedPolicy
-from rtshcua.decision.times import Dates, LocalTime, Times
+from rtshcua.decision.times import DateRange, LocalTime, Times
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.decision.watch import holding, watch
 from rtshcua.model.flat.code import Op
@@ -38,7 +38,7 @@ def test_dates_over_sets(start: int, length: int, spans: list[tuple[int, int]], 
             for error in range(least, least + more + 1):
                 (letter,) = between(moment, error, start, start + length)
                 expected |= LETTERS[letter]
-    assert Dates(start, start + length).truth(utc, (least, least + more)) == expected
+    assert DateRange(start, start + length).truth(utc, (least, least + more)) == expected
 
 
 @rows(

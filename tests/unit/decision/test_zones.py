@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from reference import outlines, worlds
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 from rtshcua.decision.values import ABSENT, AND, FALSE, MAYBE, PRESENT, TRUE, UNKNOWN
-from rtshcua.decision.zones import NOWHERE, Place, PreparedZone, Sweep
+from rtshcua.decision.zones import NOWHERE, PlaceSet, PreparedZone, Sweep
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
 from virtual.rows import rows
 
@@ -110,7 +110,7 @@ def test_what_a_zone_was_asked_before_changes_no_answer(seed: int) -> None:
             low, box = height + chance.randint(-12 * METRE, 12 * METRE), (-reach, -reach, reach, reach)
             high = low + chance.randint(0, 9 * METRE)
             exact = AND[asked.between(low, high)][asked.along(path, box)]
-            assert Place(((Sweep(path, box), low, high),)).inside(asked) == exact
+            assert PlaceSet(((Sweep(path, box), low, high),)).inside(asked) == exact
 
 
 @rows(
@@ -124,7 +124,7 @@ def test_a_short_leg_past_a_circle_stays_in_doubt(north: int, box: tuple[int, in
     """Its length of 2 mm counts as 3, and its box as if it reached to all sides."""
     zone = PreparedZone(0, Zone("c", CIRCLE, LOWEST, HIGHEST, (0, 0, (60 * METRE) ** 2)))
     for _ in range(3):
-        assert Place(((Sweep((-1, north, 1, north), box), 0, 0),)).inside(zone) == T | F
+        assert PlaceSet(((Sweep((-1, north, 1, north), box), 0, 0),)).inside(zone) == T | F
 
 
 def test_a_zone_is_compared_once_for_places_close_by(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,7 +133,7 @@ def test_a_zone_is_compared_once_for_places_close_by(monkeypatch: pytest.MonkeyP
     along = PreparedZone.along
     monkeypatch.setattr(PreparedZone, "along", lambda *asked: compared.append(asked[1]) or along(*asked))
     for x in range(45_000, 50_000, 500):
-        assert Place(((Sweep((x, 45_000), (-1, -1, 1, 1)), 0, 0),)).inside(zone) == T
+        assert PlaceSet(((Sweep((x, 45_000), (-1, -1, 1, 1)), 0, 0),)).inside(zone) == T
     assert compared == [(45_000, 45_000)]
 
 
@@ -265,16 +265,16 @@ def test_a_place_in_a_box(box: tuple[int, int, int, int], answer: int) -> None:
 def test_floor_and_ceiling_are_outside(low: int, high: int, answer: int) -> None:
     zone = PreparedZone(0, SQUARE)
     assert zone.between(low, high) == answer
-    assert Place(((Sweep((5, 5), (0, 0, 0, 0)), low, high),)).inside(zone) == answer
+    assert PlaceSet(((Sweep((5, 5), (0, 0, 0, 0)), low, high),)).inside(zone) == answer
 
 
 def test_a_place_is_the_union_of_its_parts_and_of_what_is_unknown() -> None:
     zone = PreparedZone(0, SQUARE)
     inside = (Sweep((5, 5), (0, 0, 0, 0)), 6, 7)
     outside = (Sweep((15, 5), (0, 0, 0, 0)), 6, 7)
-    assert Place((inside, outside)).inside(zone) == T | F
-    assert Place((inside,), MAYBE).inside(zone) == T | UNKNOWN
-    assert Place((inside,), PRESENT, MAYBE).inside(zone) == T | UNKNOWN
+    assert PlaceSet((inside, outside)).inside(zone) == T | F
+    assert PlaceSet((inside,), MAYBE).inside(zone) == T | UNKNOWN
+    assert PlaceSet((inside,), PRESENT, MAYBE).inside(zone) == T | UNKNOWN
     assert NOWHERE.inside(zone) == UNKNOWN
 
 
@@ -295,13 +295,13 @@ def test_an_unknown_height_counts_where_a_band_and_the_outline_leave_it_open(
     zone = SQUARE if banded else replace(SQUARE, floor=LOWEST, ceiling=HIGHEST)
     x, y, z = place
     part = (Sweep((x, y), (0, 0, 0, 0)), z, z)
-    assert Place((part,), PRESENT, high).inside(PreparedZone(0, zone)) == answer
+    assert PlaceSet((part,), PRESENT, high).inside(PreparedZone(0, zone)) == answer
 
 
 @rows(("height", "located", "answer"), [(6, ABSENT, UNKNOWN), (20, ABSENT, F), (20, MAYBE, F), (6, MAYBE, T | UNKNOWN)])
 def test_an_unknown_place_counts_where_the_height_leaves_it_open(height: int, located: int, answer: int) -> None:
     part = (Sweep((5, 5), (0, 0, 0, 0)), height, height)
-    assert Place((part,), located).inside(PreparedZone(0, SQUARE)) == answer
+    assert PlaceSet((part,), located).inside(PreparedZone(0, SQUARE)) == answer
 
 
 def test_the_largest_coordinates_stay_within_64_bits() -> None:

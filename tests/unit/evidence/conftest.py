@@ -8,7 +8,7 @@ from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Link
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.request import Ref
@@ -49,7 +49,7 @@ def decide(recorder: Recorder, now: Callable[[int], Now]) -> Callable[..., bytes
             "ref": Ref(0, 0, -1),
             "invocation": bytes(16),
             "state": State((35_000, None, -3), (1_200, 0, 50)),
-            "context": Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (Approval(2, 0, 1, 4_999_999),)),
+            "context": Context(bytes(32), "quad-07", 7, 0, 5_000_000, 1, 12_000, (ConfirmAnswer(2, 0, 1, 4_999_999),)),
             "decided": Decision(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, None, 6_000_000),
         }
         return recorder.decision(now(ms), **(given | fields))  # type: ignore[arg-type]

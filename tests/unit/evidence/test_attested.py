@@ -12,12 +12,12 @@ from reference.verifiers import ROOT_KEY
 from rtshcua.evidence.attested import BoundaryEvidence, entry_of
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.rooted import rooted
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.wire import boundary_chain, statement
 from rtshcua.wire.boundary_chain import MOST_MARKS, START, BoundaryChain, Tag
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.preparation import ParameterWrite
 from rtshcua.wire.statement import Statement
 from rtshcua.wire.trust import TrustRoot
@@ -26,7 +26,7 @@ from virtual.rows import rows
 
 RECORDS: list[AnyRecord] = [record for record in map(read, attested()) if not isinstance(record, Flaw)]
 GENESIS = next(record for record in RECORDS if isinstance(record, Genesis))
-DECISION = next(record for record in RECORDS if isinstance(record, Decision))
+DECISION = next(record for record in RECORDS if isinstance(record, DecisionRecord))
 EFFECT = next(record for record in RECORDS if isinstance(record, Effect))
 SEAL = next(record for record in RECORDS if isinstance(record, Seal))
 CLOSE = next(record for record in RECORDS if isinstance(record, Close))
@@ -65,7 +65,7 @@ class Log:
         said = Statement(
             bytes.fromhex(GENESIS.boot), 1, START, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
             chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside,
-            Source.SHARED, EFFECT.at_us, EFFECT.utc_us, EFFECT.utc_error_us, final=False,
+            ClockSource.SHARED, EFFECT.at_us, EFFECT.utc_us, EFFECT.utc_error_us, final=False,
         )  # fmt: skip
         return replace(said, **fields)
 
@@ -320,7 +320,7 @@ def test_other_records_have_none() -> None:
     assert entry_of(effect("noted")) is None
 
 
-def changed(**fields: object) -> Decision:
+def changed(**fields: object) -> DecisionRecord:
     return replace(DECISION, **fields)
 
 
@@ -349,7 +349,7 @@ def changed(**fields: object) -> Decision:
         changed(state=replace(DECISION.state, monitors=(1,) * 33)),
     ],
 )
-def test_records_of_which_no_entry_can_be_made(record: Decision | Effect) -> None:
+def test_records_of_which_no_entry_can_be_made(record: DecisionRecord | Effect) -> None:
     found = entry_of(record)
     assert isinstance(found, Flaw)
     assert found.slug == "boundary/record"
@@ -363,7 +363,7 @@ def test_records_of_which_no_entry_can_be_made(record: Decision | Effect) -> Non
 AT_US, UTC_US, S = EFFECT.at_us, EFFECT.utc_us, 1_000_000
 
 
-def told(log: Log, of: Source = Source.KERNEL, **own: int) -> tuple[str, int] | None:
+def told(log: Log, of: ClockSource = ClockSource.KERNEL, **own: int) -> tuple[str, int] | None:
     """A statement, by another clock than that of the record."""
     return log.state(**({"source": of, "utc_error_us": 1_000} | own))
 
@@ -393,7 +393,7 @@ def test_the_first_record_that_claims_another_time_is_named(log: Log) -> None:
 
 
 def test_none_may_be_claimed_where_the_boundary_knows_none() -> None:
-    said = Log().statement(source=Source.UNKNOWN, utc_error_us=UTC_UNKNOWN_US)
+    said = Log().statement(source=ClockSource.UNKNOWN, utc_error_us=UTC_UNKNOWN_US)
     assert Log().take(stated(said)) == ("boundary/clock", 0)
     quiet = Log(replace(GENESIS, utc_error_us=UTC_UNKNOWN_US))
     assert quiet.take(replace(stated(said), utc_error_us=UTC_UNKNOWN_US)) is None

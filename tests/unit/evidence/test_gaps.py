@@ -1,18 +1,18 @@
 """What is told of a gap, and who vouches for it."""
 
-from rtshcua.evidence.gaps import Gap, seconds, told
+from rtshcua.evidence.gaps import RecordGap, seconds, told
 from virtual.rows import rows
 
 
 @rows(
     ("gap", "words"),
     [
-        (Gap(7, 127_560_000, 9, 8), "the key that signed record 9 and by the boundary, which signed in record 8"),
-        (Gap(7, 127_560_000, 9), "vouched for by the key that signed record 9"),
-        (Gap(7, 127_560_000), "nobody has signed for that yet"),
+        (RecordGap(7, 127_560_000, 9, 8), "the key that signed record 9 and by the boundary, which signed in record 8"),
+        (RecordGap(7, 127_560_000, 9), "vouched for by the key that signed record 9"),
+        (RecordGap(7, 127_560_000), "nobody has signed for that yet"),
     ],
 )  # fmt: skip
-def test_it_says_how_long_it_was_and_who_vouches_for_it(gap: Gap, words: str) -> None:
+def test_it_says_how_long_it_was_and_who_vouches_for_it(gap: RecordGap, words: str) -> None:
     claim = told(gap)
     assert claim.slug == "gap"
     assert claim.text.startswith("what happened in a gap of 127.56 s before record 7: nothing was recorded; ")

@@ -7,7 +7,7 @@ import pytest
 from reference import flat_case as flat
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Decision, Effect, in_words
+from rtshcua.evidence.records import DecisionRecord, Effect, in_words
 from rtshcua.model.decision import Decision as Decided
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.outcome import Outcome, Reason
@@ -39,7 +39,7 @@ def test_a_record_says_what_it_is_about(
     begin()
     decision = read(decide(1, ref=Ref(1, 2, 3)))
     effect, other = read(recorder.effect(now(2), "sent", Ref(2, -1, 1))), read(recorder.effect(now(3), "ready"))
-    assert isinstance(decision, Decision)
+    assert isinstance(decision, DecisionRecord)
     assert isinstance(effect, Effect)
     assert isinstance(other, Effect)
     assert (decision.ref, effect.ref, other.ref) == (Ref(1, 2, 3), Ref(2, -1, 1), NOTHING)

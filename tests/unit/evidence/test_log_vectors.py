@@ -11,14 +11,14 @@ from reference.log_vectors import FOLDER, made
 from reference.verifiers import agree
 from rtshcua.evidence.attested import BoundaryEvidence
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.merkle import Tree, leaf_hash
+from rtshcua.evidence.merkle import MerkleTree, leaf_hash
 from rtshcua.evidence.note import Checkpoint, parse, split
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Genesis
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.evidence.rooted import rooted
 from rtshcua.evidence.verify import verify
-from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors, notes
 from rtshcua.ground.audit.audit import audit
 from rtshcua.wire.boundary_chain import START
 from rtshcua.wire.trust import TrustRoot
@@ -77,13 +77,13 @@ def test_the_audit_and_the_quick_verifier(name: str) -> None:
 @rows("name", REJECTED)
 def test_what_the_audit_rejects(name: str) -> None:
     found = audit(lines_of(f"rejected/{name}"), ROOT_KEY)
-    assert found.report.verdict is Verdict.FAILED
+    assert found.report.verdict is LogVerdict.FAILED
     agree(b"".join(lines_of(f"rejected/{name}")), found)
 
 
 @rows("name", EXPECTED)
 def test_leaves_roots_and_checkpoints(name: str) -> None:
-    wanted, tree = EXPECTED[name], Tree()
+    wanted, tree = EXPECTED[name], MerkleTree()
     for number, leaf in enumerate(wanted["leaves"]):
         line = lines_of(name)[number]
         assert leaf_hash(line).hex() == leaf
@@ -134,7 +134,7 @@ def test_the_anchored_part() -> None:
     given += [anchors.anchor(note) for note in (*recorded, *notes(beside))]
     assert given == [None] * len(given)
     found = anchors.finish(len(lines))
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     assert found.records == EXPECTED["anchored"]["anchored"] + 1  # and the signed record that carries the checkpoint
     assert [each.size for each in found.witnessed] == [4, 2]
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtshcua.evidence.merkle import EMPTY, Tree, leaf_hash, node_hash, root_of
+from rtshcua.evidence.merkle import EMPTY, MerkleTree, leaf_hash, node_hash, root_of
 from virtual.rows import rows
 
 
@@ -25,7 +25,7 @@ def definition(entries: list[bytes]) -> bytes:
 
 @given(st.lists(st.binary(max_size=8), max_size=70))
 def test_root_is_that_of_the_definition_after_every_leaf(entries: list[bytes]) -> None:
-    tree = Tree()
+    tree = MerkleTree()
     assert tree.root() == definition([])
     for count, entry in enumerate(entries, 1):
         tree.push(leaf_hash(entry))
@@ -61,11 +61,11 @@ def test_prefixes_keep_leaves_and_nodes_apart() -> None:
     assert sha256(b"").digest() == EMPTY
 
 
-@pytest.mark.parametrize("count", [Tree.TILE - 1, Tree.TILE, Tree.TILE + 1, 2 * Tree.TILE + 5])
+@pytest.mark.parametrize("count", [MerkleTree.TILE - 1, MerkleTree.TILE, MerkleTree.TILE + 1, 2 * MerkleTree.TILE + 5])
 def test_leaves_are_folded_in_together_wherever_the_root_was_asked_for_before(count: int) -> None:
     entries = [number.to_bytes(2) for number in range(count)]
-    for asked in (None, 1, Tree.TILE - 1, Tree.TILE, count // 2):
-        tree = Tree()
+    for asked in (None, 1, MerkleTree.TILE - 1, MerkleTree.TILE, count // 2):
+        tree = MerkleTree()
         for number, entry in enumerate(entries):
             if number == asked:
                 assert tree.root() == definition(entries[:number])

@@ -12,9 +12,9 @@ from reference.resealing import leaf_of, line_of, resealed, root_of
 from reference.witnessed import LOG_KEY, ORIGIN, PUBLIC, WITNESSES, Judge, Log
 from rtshcua.evidence import quick as quick_verification
 from rtshcua.evidence.epochs import EpochKey
-from rtshcua.evidence.merkle import Tree
-from rtshcua.evidence.quick import Outline, Part, _nodes, outline, quick, scan, signed_line
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.merkle import MerkleTree
+from rtshcua.evidence.quick import LogOutline, SegmentPart, _nodes, outline, quick, scan, signed_line
+from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.evidence.verify import verify
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 
@@ -29,14 +29,14 @@ def octets_of(data: bytes) -> Callable[[int, int], bytes]:
     return lambda offset, length: data[offset : offset + length]
 
 
-def laid_out(lines: list[bytes]) -> Outline | None:
+def laid_out(lines: list[bytes]) -> LogOutline | None:
     data = b"".join(lines)
     return outline(octets_of(data), len(data))
 
 
 def quickly(
-    lines: list[bytes], given: tuple[str, ...] = (), part: Callable[[bytes], Part | None] = scan
-) -> Report | None:
+    lines: list[bytes], given: tuple[str, ...] = (), part: Callable[[bytes], SegmentPart | None] = scan
+) -> LogReport | None:
     data = b"".join(lines)
     log = laid_out(lines)
     if log is None:
@@ -46,7 +46,7 @@ def quickly(
     return quick(log, [part(data[start:end]) for start, end in pairwise(log.offsets)], anchors)
 
 
-def octets_alone(data: bytes) -> Part | None:
+def octets_alone(data: bytes) -> SegmentPart | None:
     part = scan(data)
     return None if part is None else part._replace(leaves=None)
 
@@ -80,7 +80,7 @@ def anew(lines: list[bytes], **ways: object) -> list[bytes]:
 def test_it_agrees_on_every_whole_log(epochs: list[int]) -> None:
     lines = logged(*epochs).lines
     careful, found = verify(lines), quickly(lines)
-    assert careful.verdict is Verdict.VERIFIED
+    assert careful.verdict is LogVerdict.VERIFIED
     assert found is not None
     for field in ("records", "root", "close", "genesis", "last_us", "sealed", "epochs", "failure", "shortfall"):
         assert getattr(found, field) == getattr(careful, field)
@@ -93,7 +93,7 @@ def test_it_agrees_on_every_whole_log(epochs: list[int]) -> None:
 def test_by_octets_alone_it_says_less(log: Log) -> None:
     found = quickly(log.lines, part=octets_alone)
     assert found is not None
-    assert found.verdict is Verdict.VERIFIED
+    assert found.verdict is LogVerdict.VERIFIED
     assert [claim.slug for claim in found.proven] == ["octets", "seals", "signed-close"]
     assert [claim.slug for claim in found.unproven] == ["anchor", "tree", "form"]
     assert found.root == b""
@@ -129,7 +129,7 @@ def test_what_all_keys_wrote_anew_must_still_add_up(log: Log) -> None:
     for kept, number in (("records", 4), ("bytes", 4), ("digest", 4), ("epoch", 5)):
         value = "00" * 32 if kept == "digest" else 3
         forged = anew(edited(lines, number, **{kept: value}), keep=[kept])
-        assert verify(forged).verdict is Verdict.FAILED
+        assert verify(forged).verdict is LogVerdict.FAILED
         assert quickly(forged) is None
     for line in range(5):
 
@@ -141,7 +141,7 @@ def test_what_all_keys_wrote_anew_must_still_add_up(log: Log) -> None:
             return "\n".join(found)
 
         forged = anew(lines, text=text)
-        assert verify(forged).verdict is Verdict.FAILED
+        assert verify(forged).verdict is LogVerdict.FAILED
         assert quickly(forged) is None
 
 
@@ -154,7 +154,7 @@ def test_times_of_signed_records_are_looked_at(log: Log) -> None:
         edited(log.lines, 4, utc_us=utc_us + 4_001),
     ):
         forged = anew(lines)
-        assert verify(forged).verdict is Verdict.FAILED
+        assert verify(forged).verdict is LogVerdict.FAILED
         assert quickly(forged) is None
 
 
@@ -172,7 +172,7 @@ def test_an_epoch_that_was_sealed_too_late(monkeypatch: pytest.MonkeyPatch) -> N
     log.ms = 20_001
     log.effects(1)
     log.close()
-    assert verify(log.lines).verdict is Verdict.FAILED
+    assert verify(log.lines).verdict is LogVerdict.FAILED
     assert quickly(log.lines) is None
     many = logged(9)
     assert quickly(many.lines) is not None
@@ -192,7 +192,7 @@ def test_monotonic_time_may_begin_anew_at_a_recover() -> None:
     utc_us = json.loads(lines[3])["utc_us"]
     moved = [line_of(json.loads(line) | {"utc_us": utc_us + n}) if n > 3 else line for n, line in enumerate(lines)]
     whole = anew([line_of(json.loads(line) | {"utc_error_us": 9_000_000}) for line in moved])
-    assert verify(whole).verdict is Verdict.VERIFIED
+    assert verify(whole).verdict is LogVerdict.VERIFIED
     found = quickly(whole)
     assert found is not None
     assert found.counts == {"genesis": 1, "seal": 1, "recover": 1, "close": 1}
@@ -311,7 +311,7 @@ def test_a_walk_that_ends_without_a_close(log: Log) -> None:
 @given(sizes=some.lists(some.integers(1, 70), min_size=1, max_size=12))
 def test_a_tree_put_together_from_segments(sizes: list[int]) -> None:
     leaves = [bytes([number % 256]) * 32 for number in range(sum(sizes))]
-    tree, first = Tree(), 0
+    tree, first = MerkleTree(), 0
     for size in sizes:
         for height, node in _nodes(leaves[first : first + size], first):
             tree.graft(height, node)
@@ -331,7 +331,7 @@ def test_a_log_that_is_anchored_to_its_end(log: Log) -> None:
 
 
 def test_a_part_of_another_place(log: Log) -> None:
-    def elsewhere(data: bytes) -> Part | None:
+    def elsewhere(data: bytes) -> SegmentPart | None:
         part = scan(data)
         assert part is not None
         assert part.leaves is not None

@@ -13,7 +13,7 @@ from rtshcua.evidence.records import (
     LARGEST,
     AnyRecord,
     Close,
-    Decision,
+    DecisionRecord,
     Effect,
     RecordedContext,
     RecordedState,
@@ -82,7 +82,7 @@ contexts = st.builds(
     texts,
 )
 decisions = st.builds(
-    Decision,
+    DecisionRecord,
     prev=hashes,
     at_us=counts,
     binding=hashes,
@@ -207,7 +207,7 @@ def test_anything_else_is_refused(line: bytes, slug: str, words: str) -> None:
 def test_a_decision_has_one_of_four_outcomes_and_octets_in_hexadecimal(old: bytes, new: bytes, found: str) -> None:
     context, state = RecordedContext((), 0, 0, 0, 0, 0, "v"), RecordedState(ages=(), values=())
     line = encode(
-        Decision(
+        DecisionRecord(
             "0" * 64,
             1,
             "00",

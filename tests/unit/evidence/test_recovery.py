@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from reference.crashed import LOG_KEY, UTC_US, certify, writes
-from rtshcua.evidence.recovery import RECOVERABLE, Examination, Examined, State, ending
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.recovery import RECOVERABLE, Examination, FoundLog, LogState, ending
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.evidence.verify import verify
 from rtshcua.model.flat.situation import Now
 
@@ -26,14 +26,14 @@ def lines() -> list[bytes]:
     return [next(log)[0] for _ in range(60)]
 
 
-def examined(lines: Iterable[bytes], public: bytes = LOG_KEY.public) -> Examined:
+def examined(lines: Iterable[bytes], public: bytes = LOG_KEY.public) -> FoundLog:
     examination = Examination(public)
     for line in lines:
         examination.take(line)
     return examination.examined()
 
 
-def recovered(found: Examined, now: Now = LATER) -> list[bytes]:
+def recovered(found: FoundLog, now: Now = LATER) -> list[bytes]:
     return ending(found, now, certify, LOG_KEY.public, lambda: bytes(32)).splitlines(keepends=True)
 
 
@@ -47,16 +47,16 @@ def split(data: bytes) -> list[bytes]:
 
 def test_a_log_that_ends_between_two_records_is_kept_whole(lines: list[bytes]) -> None:
     found = examined(lines)
-    assert (found.state, found.kept, found.discarded) == (State.WHOLE, len(b"".join(lines)), 0)
+    assert (found.state, found.kept, found.discarded) == (LogState.WHOLE, len(b"".join(lines)), 0)
     assert found.sealed == signed(lines)[-1] + 1
     log = lines + recovered(found)
-    assert verify(log).verdict is Verdict.VERIFIED
+    assert verify(log).verdict is LogVerdict.VERIFIED
     recover, close = json.loads(log[-2]), json.loads(log[-1])
     assert (recover["type"], recover["discarded_bytes"], recover["discarded_digest"]) == (
         "recover", 0, sha256().hexdigest(),
     )  # fmt: skip
     assert (close["type"], close["ending"], close["tlog"]) == ("close", "recovered", None)
-    assert examined(log).state is State.CLOSED
+    assert examined(log).state is LogState.CLOSED
 
 
 @pytest.mark.unmeasured
@@ -67,21 +67,21 @@ def test_wherever_it_is_cut_what_is_whole_is_kept(lines: list[bytes]) -> None:
             whole += 1
         kept = sum(map(len, lines[:whole]))
         found = examined(split(data[:end]))
-        assert found.state is (State.TORN if end > kept else State.WHOLE)
+        assert found.state is (LogState.TORN if end > kept else LogState.WHOLE)
         assert (found.kept, found.discarded, found.head.seq) == (kept, end - kept, whole)
         assert found.discarded_digest == sha256(data[kept:end]).digest()
         assert (found.reason is None) == (end == kept)
         if end % 5 == 0:
             log = lines[:whole] + recovered(found)
-            assert verify(log).verdict is Verdict.VERIFIED
+            assert verify(log).verdict is LogVerdict.VERIFIED
             assert json.loads(log[-2])["discarded_bytes"] == end - kept
 
 
 @pytest.mark.parametrize("garbage", [b"\0" * 5_000, b"\xff\n" * 30, b"{}\n", b"\n", b'{"_prev":"', b"x" * 10])
 def test_what_is_no_record_behind_the_last_one_is_discarded(lines: list[bytes], garbage: bytes) -> None:
     found = examined(split(b"".join(lines) + garbage))
-    assert (found.state, found.head.seq, found.discarded) == (State.TORN, len(lines), len(garbage))
-    assert verify(lines + recovered(found)).verdict is Verdict.VERIFIED
+    assert (found.state, found.head.seq, found.discarded) == (LogState.TORN, len(lines), len(garbage))
+    assert verify(lines + recovered(found)).verdict is LogVerdict.VERIFIED
 
 
 def test_a_hole_in_what_was_not_sealed_is_torn_there(lines: list[bytes]) -> None:
@@ -90,7 +90,7 @@ def test_a_hole_in_what_was_not_sealed_is_torn_there(lines: list[bytes]) -> None
     holed = lines.copy()
     holed[last + 2] = holed[last + 2][:40] + bytes(60) + holed[last + 2][100:]
     found = examined(holed)
-    assert (found.state, found.head.seq) == (State.TORN, last + 2)
+    assert (found.state, found.head.seq) == (LogState.TORN, last + 2)
     assert found.discarded == sum(map(len, holed[last + 2 :]))
 
 
@@ -98,7 +98,7 @@ def test_damage_before_a_signed_record_is_no_crash(lines: list[bytes]) -> None:
     for place in range(signed(lines)[-1]):
         holed = lines.copy()
         holed[place] = bytes(60) + holed[place][60:]
-        assert examined(holed).state is State.TAMPERED
+        assert examined(holed).state is LogState.TAMPERED
 
 
 def test_a_record_that_does_not_follow_is_no_crash(lines: list[bytes]) -> None:
@@ -114,7 +114,7 @@ def test_a_record_that_does_not_follow_is_no_crash(lines: list[bytes]) -> None:
         ([edited(lines[0], mission="other"), *lines[1:]], "seal/self"),
     ):
         found = examined(changed)
-        assert found.state is State.TAMPERED
+        assert found.state is LogState.TAMPERED
         assert found.reason is not None
         assert found.reason.slug == slug
 
@@ -122,7 +122,7 @@ def test_a_record_that_does_not_follow_is_no_crash(lines: list[bytes]) -> None:
 def test_an_epoch_that_was_never_sealed_is_no_crash() -> None:
     log = writes(Random(1), seals=10**9)
     found = examined(next(log)[0] for _ in range(2_060))
-    assert (found.state, found.head.seq) == (State.TAMPERED, 2_049)
+    assert (found.state, found.head.seq) == (LogState.TAMPERED, 2_049)
     assert found.reason is not None
     assert found.reason.slug == "seal/missing"
 
@@ -131,7 +131,7 @@ def test_what_stands_behind_the_close_is_no_crash(lines: list[bytes]) -> None:
     log = lines + recovered(examined(lines))
     for more in (b"x", b"\n", lines[-1], bytes(512)):
         found = examined([*log, more])
-        assert found.state is State.TAMPERED
+        assert found.state is LogState.TAMPERED
         assert found.reason is not None
         assert found.reason.slug == "close/junk-after"
         assert found.kept == sum(map(len, log))
@@ -140,30 +140,30 @@ def test_what_stands_behind_the_close_is_no_crash(lines: list[bytes]) -> None:
 @pytest.mark.parametrize("data", [b"", b"x", bytes(4_000), b'{"_prev":"000'])
 def test_a_log_without_a_first_record_has_nothing_to_keep(data: bytes) -> None:
     found = examined(split(data))
-    assert (found.state, found.kept, found.genesis) == (State.UNBEGUN, 0, None)
+    assert (found.state, found.kept, found.genesis) == (LogState.UNBEGUN, 0, None)
 
 
 def test_a_damaged_first_record_before_others_is_no_crash(lines: list[bytes]) -> None:
-    assert examined([lines[0][:-1]]).state is State.UNBEGUN
-    assert examined([b"x" * 9 + lines[0][9:], lines[1]]).state is State.TAMPERED
+    assert examined([lines[0][:-1]]).state is LogState.UNBEGUN
+    assert examined([b"x" * 9 + lines[0][9:], lines[1]]).state is LogState.TAMPERED
 
 
 def test_a_log_of_another_key_is_not_ours(lines: list[bytes]) -> None:
-    assert examined(lines, bytes(32)).state is State.FOREIGN
-    assert examined([*lines, b"x"], bytes(32)).state is State.FOREIGN
+    assert examined(lines, bytes(32)).state is LogState.FOREIGN
+    assert examined([*lines, b"x"], bytes(32)).state is LogState.FOREIGN
 
 
 def test_a_line_without_end_is_not_read_for_ever(lines: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rtshcua.evidence.reading.LONGEST", 2_000)
     found = examined([*lines, b"x" * 2_001, b"y"])
     assert found.reason is not None
-    assert (found.state, found.reason.slug) == (State.TORN, "record/too-long")
+    assert (found.state, found.reason.slug) == (LogState.TORN, "record/too-long")
 
 
 def test_a_clock_that_was_lost_states_an_error_as_great_as_that(lines: list[bytes]) -> None:
     found = examined(lines)
     log = lines + recovered(found, Now(7, 0, 5))
-    assert verify(log).verdict is Verdict.VERIFIED
+    assert verify(log).verdict is LogVerdict.VERIFIED
     assert json.loads(log[-1])["utc_error_us"] == found.latest_us
 
 
@@ -183,8 +183,8 @@ def test_what_was_recovered_can_be_torn_itself(lines: list[bytes]) -> None:
     found = examined(lines)
     recover, close = recovered(found)
     again = examined([*lines, recover, close[:-1]])
-    assert (again.state, again.head.seq) == (State.TORN, len(lines) + 1)
-    assert verify([*lines, recover, *recovered(again)]).verdict is Verdict.VERIFIED
+    assert (again.state, again.head.seq) == (LogState.TORN, len(lines) + 1)
+    assert verify([*lines, recover, *recovered(again)]).verdict is LogVerdict.VERIFIED
 
 
 LOG = b"".join(line for line, _ in islice(writes(Random(9), seals=8), 40))
@@ -198,11 +198,11 @@ def test_whatever_stands_there_only_a_beginning_that_verifies_is_signed(start: i
     assert found.kept + found.discarded == len(data)
     if found.state in RECOVERABLE:
         kept = data[: found.kept]
-        assert verify(split(kept) + recovered(found)).verdict is Verdict.VERIFIED
+        assert verify(split(kept) + recovered(found)).verdict is LogVerdict.VERIFIED
         assert LOG.startswith(kept)
         assert data.startswith(SEALED) or split(SEALED)[-1] not in split(data)
     elif found.genesis is not None:
-        assert found.state is State.TAMPERED
+        assert found.state is LogState.TAMPERED
 
 
 def edited(line: bytes, **fields: object) -> bytes:

@@ -3,14 +3,14 @@
 import pytest
 
 from rtshcua.evidence.reading import may_be_torn
-from rtshcua.evidence.report import Report, cosigned, rejected, unanchored, utc_of, with_anchors
-from rtshcua.evidence.witnessing.anchors import Anchored, Witnessed
+from rtshcua.evidence.report import LogReport, cosigned, rejected, unanchored, utc_of, with_anchors
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Witnessed
 
 
-def outside(threshold: int, *sizes: int) -> Anchored:
+def outside(threshold: int, *sizes: int) -> AnchoredExtent:
     witnessed = tuple(Witnessed(bytes([n]) * 32, f"w{n}", size, 1) for n, size in enumerate(sizes))
     count = sizes[threshold - 1] + 1 if len(sizes) >= threshold else 0
-    return Anchored(count, 10 - count, threshold, witnessed)
+    return AnchoredExtent(count, 10 - count, threshold, witnessed)
 
 
 def test_too_few_witnesses() -> None:
@@ -36,7 +36,7 @@ def test_moments() -> None:
 
 
 def test_notes_that_say_nothing() -> None:
-    report = Report(10, {}, None, None, None, None, 0, b"", (), ())
+    report = LogReport(10, {}, None, None, None, None, 0, b"", (), ())
     for count, many in ((1, "1 note"), (2, "2 notes")):
         found = with_anchors(report, outside(1, 9)._replace(rejected=count, first="why"))
         assert found.unproven == (rejected(outside(1, 9)._replace(rejected=count, first="why")),)

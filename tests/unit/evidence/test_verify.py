@@ -13,8 +13,8 @@ from rtshcua.evidence import gaps
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.merkle import leaf_hash
-from rtshcua.evidence.report import Report, Verdict
-from rtshcua.evidence.verify import Verifier, verify
+from rtshcua.evidence.report import LogReport, LogVerdict
+from rtshcua.evidence.verify import LogVerifier, verify
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import SigningKey
 
@@ -24,7 +24,7 @@ KEYS = {Ed25519PrivateKey.from_private_bytes(seed).public_key().public_bytes_raw
 
 def failed(lines: list[bytes]) -> Finding:
     report = verify(lines)
-    assert report.verdict is Verdict.FAILED
+    assert report.verdict is LogVerdict.FAILED
     assert report.failure is not None
     assert report.shortfall is None
     assert report.failure.offset == sum(map(len, lines[: report.failure.record]))
@@ -38,7 +38,7 @@ def failure(lines: list[bytes]) -> tuple[str, int]:
 
 def shortfall(lines: list[bytes]) -> tuple[str, int]:
     report = verify(lines)
-    assert report.verdict is Verdict.INCOMPLETE
+    assert report.verdict is LogVerdict.INCOMPLETE
     assert report.failure is None
     assert report.shortfall is not None
     assert report.shortfall.offset == sum(map(len, lines[: report.shortfall.record]))
@@ -78,7 +78,7 @@ def chained(lines: list[bytes]) -> list[bytes]:
 
 def test_a_whole_log(log: list[bytes], log_key: SigningKey) -> None:
     report = verify(log)
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert (report.failure, report.shortfall) == (None, None)
     assert report.records == report.sealed == 9
     assert report.epochs == 3
@@ -107,14 +107,14 @@ def test_a_verified_log_is_never_called_complete_without_an_anchor(log: list[byt
 
 
 def test_records_are_handed_on_as_they_are_read(log: list[bytes]) -> None:
-    verifier = Verifier()
+    verifier = LogVerifier()
     assert [getattr(verifier.take(line), "type", None) for line in log] == [
         "genesis", "decision", "effect", "decision", "effect", "seal", "seal", "effect", "close",
     ]  # fmt: skip
 
 
 def test_whoever_reads_along_can_end_it(log: list[bytes]) -> None:
-    verifier = Verifier()
+    verifier = LogVerifier()
     verifier.take(log[0])
     verifier.fail(Finding("mine", 0, "because"))
     assert verifier.take(log[1]) is None
@@ -142,7 +142,7 @@ def test_nothing_may_follow_the_close(log: list[bytes]) -> None:
 def test_a_line_has_a_limit(log: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rtshcua.evidence.reading.LONGEST", 2000)
     assert failure([log[0], b"x" * 2001]) == ("record/too-long", 1)
-    assert verify(log).verdict is Verdict.VERIFIED
+    assert verify(log).verdict is LogVerdict.VERIFIED
 
 
 def test_a_line_without_end_is_the_last(log: list[bytes]) -> None:
@@ -323,8 +323,8 @@ def test_what_was_written_anew_without_keys(log: list[bytes]) -> None:
 
 
 def test_a_record_that_all_keys_wrote_anew_passes_here(log: list[bytes]) -> None:
-    assert verify(anew(changed(log, 3, outcome="allow"))).verdict is Verdict.VERIFIED
-    assert verify(anew([*log[:2], *log[3:]])).verdict is Verdict.VERIFIED
+    assert verify(anew(changed(log, 3, outcome="allow"))).verdict is LogVerdict.VERIFIED
+    assert verify(anew([*log[:2], *log[3:]])).verdict is LogVerdict.VERIFIED
 
 
 def seconds(line: bytes, ms: int) -> bytes:
@@ -333,10 +333,10 @@ def seconds(line: bytes, ms: int) -> bytes:
 
 def test_an_epoch_lasts_no_longer_than_twenty_seconds(log: list[bytes]) -> None:
     first, record, seal, close = log[0], log[2], log[5], log[8]
-    assert verify(anew([first, seconds(record, 20_000), seconds(close, 60_000)])).verdict is Verdict.VERIFIED
+    assert verify(anew([first, seconds(record, 20_000), seconds(close, 60_000)])).verdict is LogVerdict.VERIFIED
     assert failure(anew([first, seconds(record, 20_001), seconds(close, 60_000)])) == ("seal/missing", 1)
     late = [first, seconds(seal, 30_000), seconds(record, 50_000), seconds(close, 50_000)]
-    assert verify(anew(late)).verdict is Verdict.VERIFIED
+    assert verify(anew(late)).verdict is LogVerdict.VERIFIED
     assert failure(anew([*late[:2], seconds(record, 50_001)])) == ("seal/missing", 2)
 
 
@@ -346,10 +346,10 @@ def test_an_epoch_has_no_more_than_twice_as_many_records_as_its_writer_puts_in(
     first, record, seal, close = log[0], log[2], log[5], log[8]
     assert gaps.MOST_RECORDS == 2_048
     monkeypatch.setattr(gaps, "MOST_RECORDS", 3)
-    assert verify(anew([first, record, record, record, close])).verdict is Verdict.VERIFIED
+    assert verify(anew([first, record, record, record, close])).verdict is LogVerdict.VERIFIED
     assert failure(anew([first, record, record, record, record, close])) == ("seal/missing", 4)
     more = [edit(record, at_us=5_014_000, utc_us=1_750_000_000_014_000)] * 3
-    assert verify(anew([first, record, seal, *more, close])).verdict is Verdict.VERIFIED
+    assert verify(anew([first, record, seal, *more, close])).verdict is LogVerdict.VERIFIED
 
 
 def recover_from(line: bytes) -> bytes:
@@ -361,7 +361,7 @@ def test_monotonic_time_begins_anew_at_a_recover(log: list[bytes]) -> None:
     recover = edit(recover_from(log[5]), at_us=3)
     tail = [edit(line, at_us=4 + number * 1_000) for number, line in enumerate(log[6:])]
     whole = anew([*log[:5], recover, *tail])
-    assert verify(whole).verdict is Verdict.VERIFIED
+    assert verify(whole).verdict is LogVerdict.VERIFIED
     assert verify(whole).counts["recover"] == 1
     assert failure(anew([*log[:5], recover, edit(log[7], at_us=2)])) == ("clock/backwards", 6)
     assert failure(anew([*log[:5], edit(recover, utc_us=0), *tail])) == ("clock/utc-backwards", 5)
@@ -373,7 +373,7 @@ def test_the_log_key_signs_a_recover_and_no_other_does(log: list[bytes]) -> None
     whole, first = anew(recovered), json.loads(log[0])
     origin, epoch_key = f"rtshcua/log/quad%2007%2B%C3%A9/{first['boot']}", KEYS[first["next_key"]]
     text = json.loads(whole[5])["checkpoint"].rpartition("\n\n")[0] + "\n"
-    assert verify(whole).verdict is Verdict.VERIFIED
+    assert verify(whole).verdict is LogVerdict.VERIFIED
     assert failure(changed(whole, 5, checkpoint=note_of(origin, text, epoch_key))) == ("seal/key", 5)
 
 
@@ -381,7 +381,7 @@ def test_a_log_of_genesis_and_close_alone(
     recorder: Recorder, begin: Callable[[], bytes], now: Callable[[int], Now]
 ) -> None:
     log = [begin(), recorder.close(now(1), ending="refused", tlog=None)]
-    assert verify(log).verdict is Verdict.VERIFIED
+    assert verify(log).verdict is LogVerdict.VERIFIED
 
 
 # 7 the end
@@ -390,7 +390,7 @@ def test_a_log_of_genesis_and_close_alone(
 def test_a_log_without_close_is_incomplete(log: list[bytes]) -> None:
     for count in range(1, 8):
         assert shortfall(log[:count]) == ("close/missing", count)
-    report: Report = verify(log[:1])
+    report: LogReport = verify(log[:1])
     assert [claim.slug for claim in report.proven] == ["chain", "seals"]
     assert [claim.slug for claim in report.unproven] == ["signed-close", "anchor"]
     assert report.proven[0].text.startswith("record 0 is")

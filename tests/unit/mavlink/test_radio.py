@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.radio import SPAN_US, UnsignedRadio
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 
 FIELDS = ("rssi", "remrssi", "txbuf", "noise", "remnoise", "rxerrors", "fixed")
 
@@ -18,16 +18,16 @@ def status(txbuf: int = 80, rssi: int = 200, noise: int = 20) -> Any:
 
 
 def radio() -> UnsignedRadio:
-    return UnsignedRadio(SignedLink(bytes(range(32)), State(0, {}), 10**15, 0))
+    return UnsignedRadio(SignedLink(bytes(range(32)), SigningState(0, {}), 10**15, 0))
 
 
 def test_radio_status_alone_needs_no_signature() -> None:
     codec, accepting = Codec(1, 68), radio()
     assert accepting.accept(codec.pack(status()), 0)
     assert not accepting.accept(codec.pack(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 0, 3)), 0)
-    rightly = SignedLink(bytes(range(32)), State(0, {}), 10**15, 0)
+    rightly = SignedLink(bytes(range(32)), SigningState(0, {}), 10**15, 0)
     assert accepting.accept(rightly.sign(codec.pack(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 0, 3)), 0), 0)
-    badly_signed = SignedLink(bytes(32), State(0, {}), 10**15, 0).sign(codec.pack(status()), 0)
+    badly_signed = SignedLink(bytes(32), SigningState(0, {}), 10**15, 0).sign(codec.pack(status()), 0)
     assert not accepting.accept(badly_signed, 0), "what claims a signature must have the right one"
 
 

@@ -11,25 +11,25 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink import signing, tlog
 from rtshcua.mavlink.framing import FLAG_SIGNED, checksum, unsigned, with_flags
-from rtshcua.mavlink.signing import (
+from rtshcua.mavlink.signing import (  # fmt: skip
     EPOCH_US,
     LEAD,
     MINUTE,
     MOST_STREAMS,
     SignedLink,
-    State,
+    SigningState,
     stream_of,
     timestamp_of,
-)  # fmt: skip
+)
 
 KEY = bytes(range(32))
 UTC = EPOCH_US + 11 * 366 * 86_400_000_000
 RECORDED = Path(__file__).parent / "data" / "arducopter-signed.tlog"
 RECORDED_KEY = b"shared/traces test key, 32 bytes"
-NEW = State(0, {})
+NEW = SigningState(0, {})
 
 
-def link(key: bytes = KEY, stored: State = NEW, utc_us: int = UTC, number: int = 0) -> SignedLink:
+def link(key: bytes = KEY, stored: SigningState = NEW, utc_us: int = UTC, number: int = 0) -> SignedLink:
     return SignedLink(key, stored, utc_us, 0, number)
 
 
@@ -47,7 +47,7 @@ def theirs(key: bytes = KEY, timestamp: int = 0, number: int = 0) -> Any:
 
 def at(timestamp: int, other: SignedLink | None = None, of: bytes | None = None) -> bytes:
     """A frame that is rightly signed at a timestamp."""
-    sender = other or link(stored=State(timestamp - 1, {}), utc_us=0)
+    sender = other or link(stored=SigningState(timestamp - 1, {}), utc_us=0)
     return sender.sign(of or frame(), 0)
 
 
@@ -108,7 +108,7 @@ def test_timestamps_follow_the_clock_and_always_rise() -> None:
 
 def test_it_starts_at_the_greater_of_clock_and_stored() -> None:
     for utc_us, stored in ((UTC, 0), (UTC, timestamp_of(UTC) + 77), (0, timestamp_of(UTC))):
-        ours = link(stored=State(stored, {}), utc_us=utc_us)
+        ours = link(stored=SigningState(stored, {}), utc_us=utc_us)
         assert int.from_bytes(ours.sign(frame(), 0)[-12:-6], "little") == max(timestamp_of(utc_us), stored) + 1
 
 
@@ -120,7 +120,7 @@ def test_every_bit_counts() -> None:
         turned[bit // 8] ^= 1 << bit % 8
         assert not ours.accept(bytes(turned), 0), bit
     assert ours.counts.accepted == 0
-    assert ours.state == State(timestamp_of(UTC), {}), "and nothing is remembered of them"
+    assert ours.state == SigningState(timestamp_of(UTC), {}), "and nothing is remembered of them"
     assert ours.accept(signed, 0)
 
 
@@ -175,8 +175,8 @@ def test_what_it_signed_itself_does_not_come_in() -> None:
 def test_what_was_overheard_on_another_link_does_not_come_in() -> None:
     """An autopilot signs on each of its channels; here only one of them is heard, also after a restart."""
     now = timestamp_of(UTC)
-    here = [at(now + 10 * n, SignedLink(KEY, State(now + 10 * n, {}), 0, 0, link=1)) for n in range(3)]
-    there = at(0, SignedLink(KEY, State(now + 5, {}), 0, 0, link=2))
+    here = [at(now + 10 * n, SignedLink(KEY, SigningState(now + 10 * n, {}), 0, 0, link=1)) for n in range(3)]
+    there = at(0, SignedLink(KEY, SigningState(now + 5, {}), 0, 0, link=2))
     assert link().accept(there, 0), "the first that is heard is the one"
     ours = link()
     assert ours.accept(here[0], 0)
@@ -187,7 +187,7 @@ def test_what_was_overheard_on_another_link_does_not_come_in() -> None:
     assert not again.accept(there, 0)
     assert again.accept(here[2], 0)
     later = link(stored=ours.state, utc_us=UTC + 61_000_000)
-    rewired = at(0, SignedLink(KEY, State(now + 6_100_000, {}), 0, 0, link=2))
+    rewired = at(0, SignedLink(KEY, SigningState(now + 6_100_000, {}), 0, 0, link=2))
     assert later.accept(rewired, 0), "after a minute of silence it may be another one"
 
 

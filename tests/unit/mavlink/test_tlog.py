@@ -18,7 +18,9 @@ DATA = Path(__file__).parent / "data"
 @given(st.lists(st.tuples(st.integers(0, 2**64 - 1), st.integers(0, 2**32 - 1)), max_size=10))
 def test_round_trip(stamps: list[tuple[int, int]]) -> None:
     codec = Codec(1, 1)
-    entries = [tlog.Entry(at_us, codec.pack(mavlink.MAVLink_system_time_message(value, 7))) for at_us, value in stamps]
+    entries = [
+        tlog.TlogEntry(at_us, codec.pack(mavlink.MAVLink_system_time_message(value, 7))) for at_us, value in stamps
+    ]
     data = b"".join(tlog.encode(entry.at_us, entry.frame) for entry in entries)
     assert list(tlog.read(data)) == list(tlog.stream(BytesIO(data))) == entries
 
@@ -36,7 +38,7 @@ def test_a_cut_file_gives_its_whole_entries_and_the_place() -> None:
     first = next(tlog.read(data))
     size = len(tlog.encode(first.at_us, first.frame))
     for length in range(size + 1, size + 30):
-        seen: list[tlog.Entry] = []
+        seen: list[tlog.TlogEntry] = []
         with pytest.raises(tlog.DamagedTlog) as caught:
             seen.extend(entry for entry in tlog.read(data[:length]))
         assert caught.value.offset == size

@@ -13,7 +13,7 @@ from reference.world import TICK, Run, assert_audited, loaded
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.outcome import Outcome, Reason
-from rtshcua.onboard.ports import Announce, Ending, Presented, Reply, Said, Sent
+from rtshcua.onboard.ports import Announce, Ending, Presented, Reply, Sent, StatusText
 from rtshcua.onboard.runtime.admission import InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US, WINDOW, RemainingLatency
 from rtshcua.onboard.runtime.supervisor import RetryPolicy
@@ -147,7 +147,7 @@ def test_every_decision_is_announced_and_every_document_answered() -> None:
 
 def test_what_the_vehicle_says_is_kept_as_its_own_words() -> None:
     run = Run(loaded())
-    run.tick(Said(0, 4, "EKF lane switch"), Said(0, 6, "x" * 500))
+    run.tick(StatusText(0, 4, "EKF lane switch"), StatusText(0, 6, "x" * 500))
     said = [json.loads(line)["detail"] for line in run.lines if b'"event":"said"' in line]
     assert said == ["4: EKF lane switch", "6: " + "x" * 200]
 

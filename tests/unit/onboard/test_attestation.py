@@ -16,7 +16,7 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import BoundaryKey, Command
 from rtshcua.wire import boundary_chain, preparation, response
 from rtshcua.wire.boundary_chain import Tag, following
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.preparation import Preparation
 from rtshcua.wire.receipt import decode
 from rtshcua.wire.statement import Statement, open_statement
@@ -56,7 +56,7 @@ def test_a_session_has_one_beginning_and_one_end() -> None:
     first = said(of)
     assert (first.session, first.before, first.digest) == (7, b"k" * 32, following(before, Tag.BEGIN, payload))
     assert not first.final
-    assert (first.source, first.now) == (Source.SHARED, START)
+    assert (first.source, first.now) == (ClockSource.SHARED, START)
     assert said(of, final=True).final
     assert of.attestation.statement(START) is None
 

@@ -14,7 +14,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import signing
 from rtshcua.mavlink.layouts import LAYOUTS
 from rtshcua.mavlink.parameters import bits_of
-from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, SigningState
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import (
     AFTER_START,
@@ -561,7 +561,7 @@ def test_a_frame_that_is_not_signed_ahead_does_not_count_as_refused() -> None:
 def test_a_flood_to_sign_ahead_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(signing, "MOST_AHEAD", 50)
     gate, of = session(PX4), command(K.LAND)
-    gate.sign_with(SignedLink(bytes(32), State(0, {}), EPOCH_US, NOW))
+    gate.sign_with(SignedLink(bytes(32), SigningState(0, {}), EPOCH_US, NOW))
     land = pack(long(176, 1, 4, 6))
     found = [gate.sign_ahead(land, of, NOW) for _ in range(51)]
     assert isinstance(found[-2], bytes)

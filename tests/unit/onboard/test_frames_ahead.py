@@ -13,11 +13,11 @@ from rtshcua.adapters.vehicle.manoeuvre import RETRIES, sendings
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.modes import Px4Mode
-from rtshcua.mavlink.signing import EPOCH_US, LEAD, UNIT_US, SignedLink, State, timestamp_in
+from rtshcua.mavlink.signing import EPOCH_US, LEAD, UNIT_US, SignedLink, SigningState, timestamp_in
 from rtshcua.onboard.enforcement import ahead
 from rtshcua.onboard.enforcement.ahead import EVERY_US, LAST, NO_COPY, FramesAhead
 from rtshcua.onboard.enforcement.allow_list import Frame, read_frame
-from rtshcua.onboard.enforcement.executor import Ahead, Commands
+from rtshcua.onboard.enforcement.executor import Commands, SignedAhead
 from rtshcua.onboard.ports import Command
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.wire.permit import AGAIN
@@ -36,18 +36,18 @@ class Boundary:
     """Signs whatever it is given, under tokens of its own; `refused` are links that it refuses."""
 
     def __init__(self, *, signs: bool = True) -> None:
-        self.link = SignedLink(KEY, State(0, {}), UTC, 0)
+        self.link = SignedLink(KEY, SigningState(0, {}), UTC, 0)
         self.signs = signs
         self.refused: dict[tuple[int, int], str] = {}
         self.asked: list[tuple[int, int]] = []
 
-    def sign(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> Ahead | Refusal:
+    def sign(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> SignedAhead | Refusal:
         assert sealed == PERMIT
         self.asked.append((kind, link))
         if (kind, link) in self.refused:
             return Refusal(self.refused[kind, link], "")
         signed = [self.link.sign_ahead(each, now_us) if self.signs else b"" for each in frames]
-        return Ahead(100 * kind + 20 * link, tuple(each[-13:] for each in signed if each is not None))
+        return SignedAhead(100 * kind + 20 * link, tuple(each[-13:] for each in signed if each is not None))
 
 
 def pack(message: Any) -> bytes:
@@ -210,7 +210,8 @@ def test_it_is_signed_anew_where_timestamps_run_faster_than_our_time() -> None:
     of = made(boundary)
     for second in range(1, 12):
         boundary.link.accept(
-            SignedLink(KEY, State(0, {}), UTC + 8_000_000 * second, 0).sign(pack_of_vehicle(), 0), 1_000_000 * second
+            SignedLink(KEY, SigningState(0, {}), UTC + 8_000_000 * second, 0).sign(pack_of_vehicle(), 0),
+            1_000_000 * second,
         )
         of.sent(boundary.link.sign(pack(messages.heartbeat()), 1_000_000 * second))
         of.renew(encode, 1_000_000 * second)

@@ -8,9 +8,9 @@ from reference.flat_case import OBSTACLE, WIND, M
 from reference.world import FakeVehicle, Run, assert_audited
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.executor import LATE as PERMIT_LATE
-from rtshcua.onboard.ports import Command, Ending, Failed
+from rtshcua.onboard.ports import Command, CommandFailed, Ending
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 from virtual.rows import rows
 
 #: as the loop says it, and as the gate does of a first frame
@@ -33,7 +33,7 @@ def start(*deaf: str) -> Run:
 
 def fail(run: Run, reason: str) -> None:
     """What was dispatched last was not sent."""
-    run.tick(Failed(0, run.vehicle.commands[-1].token, reason))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, reason))
 
 
 def coming_home(run: Run) -> Run:
@@ -64,7 +64,7 @@ def test_a_return_that_was_late_is_flown_all_the_same(reason: str) -> None:
 def test_in_place_of_a_late_link_of_a_steps_chain_the_contingency_flies(skill: str) -> None:
     """The boundary lets no link of a chain fly twice."""
     run = start("inspect_area", skill).until_flies("inspect_area")
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "no-progress"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "no-progress"))
     run.until_flies(skill)
     assert run.decisions[-1][0] == 1, "of the step's own chain"
     run.vehicle.deaf.clear()
@@ -87,7 +87,7 @@ def test_the_last_link_is_tried_again_at_once() -> None:
 
 def test_what_is_late_again_and_again_is_tried_for_a_bounded_number_of_times() -> None:
     run = start("return_home", "emergency_land", "hover").until_flies("goto")
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "no-progress"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "no-progress"))
     answered = len(run.flown) - 1
     for _ in range(2_000):
         if run.ending is not None:
@@ -141,7 +141,7 @@ def test_a_hold_that_was_late_is_tried_again_and_the_mission_goes_on(reason: str
     run = waiting(start("hover"))
     fail(run, reason)
     run.until(lambda run: run.flown[-2:] == ["hover", "hover"], 1)
-    assert run.runtime.view(run.clock.now()).stage is Stage.DECIDING
+    assert run.runtime.view(run.clock.now()).stage is RunStage.DECIDING
     run.vehicle.values[OBSTACLE] = 20 * M
     run.until_over()
     assert run.ending is Ending.COMPLETED
@@ -153,7 +153,7 @@ def test_a_hold_that_is_late_again_and_again_ends_the_wait() -> None:
     for _ in range(Limits().tries):
         fail(run, "late")
         run.until(lambda run: run.events[-1] == "dispatched", 1)
-    assert run.runtime.view(run.clock.now()).stage is Stage.DECIDING
+    assert run.runtime.view(run.clock.now()).stage is RunStage.DECIDING
     fail(run, "late")
     assert run.flown[-1] == "return_home"
 

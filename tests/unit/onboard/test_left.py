@@ -8,7 +8,7 @@ from reference.documents import low, replacement
 from reference.flat_case import BATTERY
 from reference.world import FakeVehicle, Run, loaded, renewed, sealed_again
 from rtshcua.onboard.left import Left, left_by
-from rtshcua.onboard.ports import AirState, Failed, Obeyed, Presented, Ready, TakenOver
+from rtshcua.onboard.ports import AirState, CommandFailed, Obeyed, Presented, Ready, TakenOver
 
 HERE, THERE = (473_977_400, 85_455_900, 494_000), (473_979_400, 85_455_900, 494_000)
 
@@ -61,7 +61,7 @@ def test_what_was_allowed_may_have_been_sent() -> None:
 
 def test_of_a_step_that_came_too_late_nothing_is_in_force() -> None:
     run = Run().until_flies("goto")
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "late"))
     unsent = max(n for n, line in enumerate(run.lines) if b'"permit/unsent"' in line)
     assert in_force(run, run.lines[:unsent]) == [("takeoff", None), ("goto", None)]
     assert in_force(run, run.lines[: unsent + 1]) == [("takeoff", None)]

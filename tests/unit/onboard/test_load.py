@@ -8,7 +8,7 @@ from reference.world import FLIGHT, MISSION_KEY, POLICY_KEY, ROOT, SESSION_KEY, 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_SLOTS
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.load import Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.wire import binding, bundle
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.request import MAX_AGE_US
@@ -20,7 +20,7 @@ def refusal(data: bytes, **changed: object) -> Refusal:
         "root": ROOT,
         "vehicle": VEHICLE,
         "now": START,
-        "mode": Mode.SOFTWARE,
+        "mode": EnforcementMode.SOFTWARE,
         "session_key": SESSION_KEY,
         "flight": FLIGHT,
         "peer_is_own_simulator": False,
@@ -33,13 +33,13 @@ def refusal(data: bytes, **changed: object) -> Refusal:
 def test_a_good_bundle_is_in_force() -> None:
     of = loaded()
     assert of.vehicle == VEHICLE
-    assert of.mode is Mode.SOFTWARE
+    assert of.mode is EnforcementMode.SOFTWARE
     assert of.expires_us == ISSUED + H // 2
 
 
 def test_mode_none_flies_the_own_simulator_only() -> None:
-    assert refusal(sealed(), mode=Mode.NONE).slug == "mode-refused"
-    assert isinstance(try_load(sealed(), Mode.NONE, own_simulator=True), Loaded)
+    assert refusal(sealed(), mode=EnforcementMode.NONE).slug == "mode-refused"
+    assert isinstance(try_load(sealed(), EnforcementMode.NONE, own_simulator=True), Loaded)
 
 
 def test_a_bundle_for_another_vehicle_is_refused() -> None:
@@ -126,7 +126,7 @@ def test_a_bundle_may_be_loaded_before_it_was_issued() -> None:
             root=ROOT,
             vehicle=VEHICLE,
             now=early,
-            mode=Mode.SOFTWARE,
+            mode=EnforcementMode.SOFTWARE,
             session_key=SESSION_KEY,
             flight=FLIGHT,
             peer_is_own_simulator=False,

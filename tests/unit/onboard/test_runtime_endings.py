@@ -9,19 +9,19 @@ from reference.world import FakeVehicle, Run, loaded
 from rtshcua.onboard.ports import (
     PAUSED,
     AirState,
-    Answering,
+    CommandFailed,
     Crashed,
     Ending,
     Event,
     EvidenceFailed,
-    Failed,
     Interrupted,
     LinkLost,
     Noted,
     Obeyed,
     Succeeded,
     TakenOver,
-    Unfit,
+    VehicleAnswers,
+    VehicleUnfit,
 )
 from rtshcua.onboard.runtime.aftermath import MAY_FLY
 
@@ -63,7 +63,7 @@ def silent(run: Run) -> None:
 
 def mute(run: Run) -> None:
     run.vehicle.deaf = {"hover", "return_home", "emergency_land"}
-    run.tick(Answering(0, answers=False))
+    run.tick(VehicleAnswers(0, answers=False))
     run.tick(Interrupted(0))
 
 
@@ -153,7 +153,7 @@ def test_a_command_that_was_obeyed_and_then_failed_on_the_ground_is_told() -> No
     token = next(each["token"] for each in run.records if each.get("event") == "dispatched")
     run.tick(Obeyed(0, token))
     run.tick(AirState(0, armed=False, airborne=False))
-    run.tick(Failed(0, token, "disarmed"))
+    run.tick(CommandFailed(0, token, "disarmed"))
     over(run)
     assert run.ending is Ending.REFUSED
     assert "approach it as one that may start" in run.runtime.may_fly
@@ -184,7 +184,7 @@ def test_a_pilot_and_a_failsafe_take_over_with_different_words() -> None:
 def test_what_no_waiting_changes_ends_the_wait_at_once() -> None:
     run = start(ready=False)
     began_us = run.clock.now().monotonic_us
-    run.tick(Unfit(0, "it returns at 15 m (`RTL_ALT`), and the policy says 30 m"))
+    run.tick(VehicleUnfit(0, "it returns at 15 m (`RTL_ALT`), and the policy says 30 m"))
     over(run, 3)
     assert run.ending is Ending.REFUSED
     assert run.clock.now().monotonic_us - began_us < 5 * S
@@ -195,7 +195,7 @@ def test_what_no_waiting_changes_ends_the_wait_at_once() -> None:
 def test_a_command_that_was_late_says_that_the_computer_was_busy() -> None:
     run = start(vehicle=FakeVehicle(deaf={"takeoff"})).until_flies("takeoff")
     token = next(each["token"] for each in run.records if each.get("event") == "dispatched")
-    run.tick(Failed(0, token, "late"))
+    run.tick(CommandFailed(0, token, "late"))
     (record,) = [each for each in run.records if each.get("event") == "failed"]
     assert "too busy" in record["detail"]
 

@@ -18,9 +18,9 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
     Command,
+    CommandFailed,
     End,
     EvidenceFailed,
-    Failed,
     Interrupted,
     LinkBack,
     LinkLost,
@@ -80,7 +80,7 @@ def wait(run: Run) -> None:
 
 EVENTS: dict[str, Callable[[Run], object]] = {
     "succeeded": lambda run: run.step(Succeeded(0, token(run))),
-    "failed": lambda run: run.step(Failed(0, token(run), "no-effect")),
+    "failed": lambda run: run.step(CommandFailed(0, token(run), "no-effect")),
     "landed": lambda run: run.step(AirState(0, False, False)),
     "taken-over": lambda run: run.step(TakenOver(0, "POSCTL")),
     "link-lost": lambda run: run.step(LinkLost(0)),

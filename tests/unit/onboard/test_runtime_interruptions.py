@@ -12,9 +12,9 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import (
     AirState,
     Command,
+    CommandFailed,
     Ending,
     EvidenceFailed,
-    Failed,
     Interrupted,
     LinkBack,
     LinkLost,
@@ -24,7 +24,7 @@ from rtshcua.onboard.ports import (
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 from rtshcua.onboard.runtime.journal import REPEATED_EVERY_US
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 from rtshcua.wire.response import Status, encode_refusal
 from virtual.rows import rows
 
@@ -126,7 +126,7 @@ def test_a_mission_that_is_on_its_way_home_is_let_home(event: Interrupted | Evid
 
 def test_a_return_that_fails_after_an_interrupt_still_falls_back() -> None:
     run = Run().until_flies("return_home")
-    run.tick(Interrupted(0), Failed(0, run.vehicle.commands[-1].token, "no-effect"))
+    run.tick(Interrupted(0), CommandFailed(0, run.vehicle.commands[-1].token, "no-effect"))
     run.until_over()
     assert run.flown[-1] == "emergency_land"
     assert run.ending is Ending.INTERRUPTED
@@ -175,7 +175,7 @@ def test_a_failsafe_while_the_link_was_lost_is_the_autopilots() -> None:
 def test_what_failed_meanwhile_falls_back_once_the_link_is_back() -> None:
     run = running()
     token = run.vehicle.commands[-1].token
-    run.tick(LinkLost(0), Failed(0, token, "no-effect"))
+    run.tick(LinkLost(0), CommandFailed(0, token, "no-effect"))
     assert run.flown[-1] == "inspect_area"
     (detail,) = [record["detail"] for record in run.records if record.get("event") == "failed"]
     assert detail == "no-effect; the link is silent: what the vehicle does is not known"
@@ -326,7 +326,7 @@ def test_a_vehicle_that_never_moves_again_is_stood_down_from() -> None:
         run.tick()
     assert run.ending is Ending.ABORTED
     assert run.events[-1] == "stood-down"
-    assert run.runtime.view(run.clock.now()).stage is Stage.ENDED
+    assert run.runtime.view(run.clock.now()).stage is RunStage.ENDED
 
 
 class Echo:

@@ -29,10 +29,10 @@ from rtshcua.model.flat.contract import QUANTITY, Motion, MotionKind, Parameter
 from rtshcua.model.flat.mission import Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.onboard.enforcement.executor import Executor
-from rtshcua.onboard.enforcement.load import Mode
-from rtshcua.onboard.ports import AirState, Ending, Failed, Hindered, Readings, Ready, Succeeded
+from rtshcua.onboard.enforcement.load import EnforcementMode
+from rtshcua.onboard.ports import AirState, CommandFailed, Ending, Hindered, Readings, Ready, Succeeded
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 
 RUNS: list[Run] = []
 
@@ -460,7 +460,7 @@ def test_a_mission_that_ends_in_the_air_is_brought_down() -> None:
 def test_words_about_commands_that_are_over_mean_nothing() -> None:
     run = start().until_flies("goto")
     token = run.vehicle.commands[0].token
-    run.tick(Succeeded(0, token), Failed(0, token, "late"), Succeeded(0, 10**9))
+    run.tick(Succeeded(0, token), CommandFailed(0, token, "late"), Succeeded(0, 10**9))
     assert run.flown[-1] == "goto"
     assert run.until_over().ending is Ending.COMPLETED
 
@@ -470,7 +470,7 @@ def test_words_about_commands_that_are_over_mean_nothing() -> None:
 def test_a_step_of_which_nothing_was_sent_in_time_is_tried_again(skill: str, reason: str) -> None:
     run = start().until_flies(skill)
     step, released_us = run.runtime.view(run.clock.now()).step, released(run)
-    run.tick(Failed(0, run.vehicle.commands[-1].token, reason))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, reason))
     assert run.flown[-2:] == [skill, skill]
     assert run.decisions[-2:] == [(0, step, -1, "allow", "admitted")] * 2
     assert [each["detail"] for each in run.records if each.get("event") == "refused"] == ["permit/unsent"]
@@ -495,7 +495,7 @@ def test_a_step_that_is_late_again_and_again_is_tried_up_to_its_deadline(
     began_us, tries = run.clock.now().monotonic_us, 0
     while run.ending is None and run.flown[-1] == skill:
         tries += 1
-        run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+        run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "late"))
     waited_us = run.clock.now().monotonic_us - began_us
     assert waited_us <= INVOCATIONS[0].contract.deadline_us + TICK
     assert 2 < tries <= waited_us // TICK + 1
@@ -510,7 +510,7 @@ def test_a_step_of_which_a_frame_left_does_not_come_again(skill: str) -> None:
     run = start().until_flies(skill)
     assert isinstance(run.loaded.executor, Executor)
     run.loaded.executor.frames.let_out = True
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "late"))
     assert run.flown.count(skill) == 1
     assert [each["detail"] for each in run.records if each.get("event") == "refused"] == ["permit/sent"]
     run.until_over()
@@ -520,7 +520,7 @@ def test_a_hold_that_was_late_is_none_of_a_step() -> None:
     run = start().until_flies("goto")
     run.vehicle.values[WIND] = 12 * M
     run.until_flies("hover")
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "late"))
     assert "refused" not in run.events
 
 
@@ -558,7 +558,7 @@ def test_readings_that_make_no_sense_are_unknown_or_ignored() -> None:
 
 
 def test_mode_none_records_what_it_does_not_enforce() -> None:
-    run = Run(loaded(without_permit(GOTO), mode=Mode.NONE)).until_over()
+    run = Run(loaded(without_permit(GOTO), mode=EnforcementMode.NONE)).until_over()
     assert (0, 1, -1, "deny", "authority/not-permitted") in run.decisions
     assert run.flown == ["takeoff", "goto", "inspect_area", "return_home"]
     assert run.ending is Ending.COMPLETED
@@ -570,12 +570,12 @@ def test_mode_none_records_what_it_does_not_enforce() -> None:
 def test_the_view_follows_the_run() -> None:
     run = start(ready=False)
     view = run.runtime.view(run.clock.now())
-    assert (view.stage, view.contract, view.left_us, view.airborne) == (Stage.WAITING, "takeoff", None, None)
+    assert (view.stage, view.contract, view.left_us, view.airborne) == (RunStage.WAITING, "takeoff", None, None)
     run.tick(AirState(0, False, False), Ready(0))
     run.until_flies("goto")
     run.tick()
     view = run.runtime.view(run.clock.now())
-    assert (view.stage, view.phase, view.step, view.steps) == (Stage.RUNNING, "inspection", 1, 4)
+    assert (view.stage, view.phase, view.step, view.steps) == (RunStage.RUNNING, "inspection", 1, 4)
     assert view.contract == "goto"
     assert view.left_us == 5 * 60 * S - TICK
     assert view.decisions[-1].outcome == "allow"
@@ -583,9 +583,9 @@ def test_the_view_follows_the_run() -> None:
     run.vehicle.values[OBSTACLE] = None
     run.until_flies("hover")
     view = run.runtime.view(run.clock.now())
-    assert view.stage is Stage.DECIDING
+    assert view.stage is RunStage.DECIDING
     assert view.left_us == 2 * S
     assert view.decisions[-2].reason == "state/unknown"
     run.until_over()
     view = run.runtime.view(run.clock.now())
-    assert (view.stage, view.left_us, view.ending) == (Stage.ENDED, None, Ending.ABORTED)
+    assert (view.stage, view.left_us, view.ending) == (RunStage.ENDED, None, Ending.ABORTED)

@@ -28,19 +28,19 @@ from reference.world import TICK, FakeVehicle, Run, assert_audited, loaded, rene
 from rtshcua.model.flat.policy import AfterSilence
 from rtshcua.onboard.ports import (
     AirState,
-    Answering,
+    CommandFailed,
     Ending,
     Event,
-    Failed,
     Interrupted,
     LinkBack,
     LinkLost,
     Readings,
     Succeeded,
     TakenOver,
+    VehicleAnswers,
 )
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 from virtual.rows import rows
 
 LOST_US = S  # a link counts as lost when it was silent for so long
@@ -439,13 +439,13 @@ def test_the_time_limit_of_a_step_runs_in_link_time_and_its_reason_names_the_sil
 
 def test_the_time_limit_of_a_step_does_not_run_while_the_vehicle_answers_nothing() -> None:
     run = limited()
-    run.step(Answering(0, answers=False))
+    run.step(VehicleAnswers(0, answers=False))
     for _ in range(20):
         run.clock.advance(S)
         run.tick()
         if "violated" in run.events:
             break
-    run.step(Answering(0, answers=True))
+    run.step(VehicleAnswers(0, answers=True))
     assert run.runtime.view(run.clock.now()).left_us > LIMIT_US - 10 * S
     assert violations(run) == []
     run.until(lambda run: "violated" in run.events)
@@ -464,7 +464,7 @@ def test_grace_of_a_waiting_step_does_not_run_through_silence() -> None:
     for _ in range(20):
         run.tick()
     assert "violated" not in run.events
-    assert run.runtime.view(run.clock.now()).stage is Stage.DECIDING
+    assert run.runtime.view(run.clock.now()).stage is RunStage.DECIDING
 
 
 # ---------------------------------------------------------------------------------------- what comes in between
@@ -475,7 +475,7 @@ def test_a_step_that_fails_in_the_silence_falls_back_on_fresh_state(order: int) 
     run = running(AfterSilence.CONTINUE)
     token = run.vehicle.commands[-1].token
     be_silent(run, 5)
-    run.step(LinkBack(0), Failed(0, token, "no-progress"))
+    run.step(LinkBack(0), CommandFailed(0, token, "no-progress"))
     assert run.flown[-1] == "inspect_area", "the next link is chosen on fresh state"
     come_back(run, order)
     assert run.flown[-1] == "hover"
@@ -574,7 +574,7 @@ DEAF = {"takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_la
 def mute(run: Run) -> Run:
     """What is sent does not arrive any more; the vehicle is heard all the while."""
     run.vehicle.deaf = DEAF
-    run.tick(Answering(0, answers=False))
+    run.tick(VehicleAnswers(0, answers=False))
     return run
 
 
@@ -605,7 +605,7 @@ def test_one_that_answers_again_is_brought_down_however_often_it_was_told_in_vai
     run.vehicle.deaf, run.vehicle.fails = set(), {"return_home", "emergency_land"}
     run.until(lambda run: run.flown.count("emergency_land") > 2 * Limits().tries + 4)
     run.vehicle.fails = set()
-    run.tick(Answering(0, answers=True))
+    run.tick(VehicleAnswers(0, answers=True))
     run.until_over()
     assert run.ending is Ending.ABORTED
     assert run.flown[-1] == "emergency_land"
@@ -615,7 +615,7 @@ def test_one_that_answers_again_is_brought_down_however_often_it_was_told_in_vai
 def test_once_it_answers_again_it_is_waited_for_anew() -> None:
     run = mute(running(AfterSilence.CONTINUE))
     go_on(run, SHORT.endurance_us)
-    run.tick(Answering(0, answers=True), Answering(0, answers=True))
+    run.tick(VehicleAnswers(0, answers=True), VehicleAnswers(0, answers=True))
     mute(run)
     go_on(run, SHORT.endurance_us)
     assert run.ending is None
@@ -635,7 +635,7 @@ def test_on_the_ground_one_that_answers_nothing_is_waited_for_as_a_silent_one(si
 def test_the_wait_is_one_whether_or_not_it_is_silent_too(silent: bool) -> None:
     run = mute(running(AfterSilence.CONTINUE))
     go_on(run, SHORT.endurance_us)
-    run.step(*([LinkLost(0)] if silent else []), Answering(0, answers=False))
+    run.step(*([LinkLost(0)] if silent else []), VehicleAnswers(0, answers=False))
     pass_time(run, Limits().silent_us + TICK)
     assert run.ending is Ending.LINK_LOST
 

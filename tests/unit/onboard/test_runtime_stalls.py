@@ -24,7 +24,7 @@ from reference.world import TICK, FakeVehicle, Run, assert_audited, loaded, rene
 from rtshcua.onboard.ports import Ending, Event, LinkBack, LinkLost, Readings, Succeeded
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.link import STOOD_STILL
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 from virtual.rows import rows
 
 #: as what ships: most signals are stale after 2 s, and a step may wait for minutes
@@ -206,7 +206,7 @@ def test_a_run_that_is_over_tells_of_no_stall() -> None:
     run = start().until_over()
     assert run.ending is Ending.COMPLETED
     stand_still(run, 10 * S)
-    assert run.runtime.view(run.clock.now()).stage is Stage.ENDED
+    assert run.runtime.view(run.clock.now()).stage is RunStage.ENDED
     assert STOOD_STILL not in run.events
 
 

@@ -15,16 +15,16 @@ from reference.world import FakeVehicle, Run, assert_audited, loaded, renewed
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.onboard.ports import (
     AirState,
+    CommandFailed,
     Crashed,
     Ending,
     Event,
     EvidenceFailed,
-    Failed,
     Interrupted,
     LinkBack,
     LinkLost,
     Readings,
-    Said,
+    StatusText,
     Succeeded,
     TakenOver,
 )
@@ -87,7 +87,7 @@ STAGES = (waiting, deferred_on_the_ground, taking_off, running, holding, falling
 #: what may come with it; each could turn the run, or end it, by itself
 WITH: dict[str, Callable[[int], tuple[Event, ...]]] = {
     "succeeded": lambda token: (Succeeded(0, token),),
-    "failed": lambda token: (Failed(0, token, "no-effect"),),
+    "failed": lambda token: (CommandFailed(0, token, "no-effect"),),
     "landed": lambda token: (AirState(0, False, False),),
     "landed and succeeded": lambda token: (AirState(0, False, False), Succeeded(0, token)),
     "interrupted": lambda token: (Interrupted(0),),
@@ -136,7 +136,7 @@ def test_a_crash_is_graver_than_a_takeover(order: tuple[Event, ...]) -> None:
 
 def test_a_crash_says_what_showed_it_and_where_it_was_last_seen() -> None:
     run = running()
-    run.step(Crashed(0, "on its side"), Said(0, 2, "SIM Hit ground at 5.2 m/s"))
+    run.step(Crashed(0, "on its side"), StatusText(0, 2, "SIM Hit ground at 5.2 m/s"))
     details = {str(record["event"]): record["detail"] for record in run.records if record["type"] == "effect"}
     assert details["said"] == "2: SIM Hit ground at 5.2 m/s", "what the vehicle said of it is not lost"
     assert details["crashed"] == "on its side"
@@ -178,7 +178,7 @@ def held(*, chain: tuple[int, ...] = ()) -> Run:
 @pytest.mark.parametrize("reason", ["did-not-stop", "no-progress", "refused"])
 def test_a_hold_between_steps_that_fails_flies_the_steps_chain(reason: str) -> None:
     run = held()
-    run.tick(Failed(0, run.vehicle.commands[-1].token, reason))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, reason))
     assert run.flown[-1] == "return_home", "another hold would fail as this one did"
     assert run.decisions[-1] == (1, 2, 1, "allow", "admitted")
     run.vehicle.values[OBSTACLE] = 20 * M
@@ -190,7 +190,7 @@ def test_a_hold_between_steps_that_fails_flies_the_steps_chain(reason: str) -> N
 def test_no_hold_of_the_contingency_is_tried_either_after_one_that_failed() -> None:
     run = held(chain=(HOVER,))
     run.vehicle.fails = {"return_home"}
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "did-not-stop"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "did-not-stop"))
     run.until_over()
     assert run.flown == ["takeoff", "goto", "hover", "return_home", "emergency_land"]
     assert run.ending is Ending.ABORTED
@@ -198,7 +198,7 @@ def test_no_hold_of_the_contingency_is_tried_either_after_one_that_failed() -> N
 
 def test_a_late_word_about_another_command_is_no_failed_hold() -> None:
     run = held()
-    run.tick(Failed(0, run.vehicle.commands[-2].token, "did-not-stop"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-2].token, "did-not-stop"))
     for _ in range(20):
         run.tick()
     assert run.flown[-1] == "hover"
@@ -207,6 +207,6 @@ def test_a_late_word_about_another_command_is_no_failed_hold() -> None:
 @pytest.mark.parametrize("reason", ["did-not-stop", "no-progress"])
 def test_a_link_that_does_not_stop_or_get_on_is_followed_by_the_next(reason: str) -> None:
     run = falling()
-    run.tick(Failed(0, run.vehicle.commands[-1].token, reason))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, reason))
     assert run.flown[-1] == "return_home"
     assert CONTRACTS[GOTO].fallback[1].skill == MISSION.invocations[-1].skill

@@ -26,7 +26,7 @@ from reference.flat_case import (
 from reference.world import FakeVehicle, Run, assert_audited, loaded
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import AirState, Ending, Event, EvidenceFailed, Failed, Interrupted
+from rtshcua.onboard.ports import AirState, CommandFailed, Ending, Event, EvidenceFailed, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 
 CAUSES = [(Interrupted(0), Ending.INTERRUPTED), (EvidenceFailed(0, "disk full"), Ending.EVIDENCE_LOST)]
@@ -84,7 +84,7 @@ def test_a_hold_that_failed_on_the_ground_is_a_landing_too() -> None:
     run = Run().until_flies("goto")
     run.vehicle.values[OBSTACLE] = None
     run.until_flies("hover")
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "disarmed"), AirState(0, False, False))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "disarmed"), AirState(0, False, False))
     assert run.ending is Ending.ABORTED
 
 
@@ -114,7 +114,7 @@ def test_a_take_off_that_is_broken_off_on_the_ground_is_told_to_land(event: Even
 
 def test_a_take_off_that_fails_once_armed_is_told_to_land() -> None:
     run = arming(armed=True)
-    run.tick(Failed(0, run.vehicle.commands[-1].token, "no-effect"))
+    run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "no-effect"))
     assert run.flown == ["takeoff", "emergency_land"]
     assert run.until_over().ending is Ending.ABORTED
 

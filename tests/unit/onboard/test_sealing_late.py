@@ -14,8 +14,8 @@ from hypothesis import strategies as some
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.epochs import LONGEST_US
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.evidence.recovery import Examination, State
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.recovery import Examination, LogState
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.evidence.verify import verify
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
@@ -91,7 +91,7 @@ def test_however_late_it_is_its_log_verifies(
     given_to_disk = list(lines_of(steps, end_us, signs=signs))
     lines = [line for line, _ in given_to_disk]
     report = verify(lines)
-    assert (report.verdict, report.failure) == (Verdict.VERIFIED, None)
+    assert (report.verdict, report.failure) == (LogVerdict.VERIFIED, None)
     records: list[dict[str, Any]] = [json.loads(line) for line in lines]
     long = {(n, b["at_us"] - a["at_us"]) for n, (a, b) in enumerate(pairwise(records), 1)}
     assert {(gap.record, gap.us) for gap in report.gaps if gap.us > LONGEST_US} == {
@@ -107,4 +107,4 @@ def test_wherever_it_breaks_off_it_is_recovered(steps: list[tuple[int, int, bool
     examination = Examination(KEY.public)
     for line in lines:
         assert examination.take(line), examination.reason
-        assert examination.examined().state is State.WHOLE
+        assert examination.examined().state is LogState.WHOLE

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.codec.frames import Codec, Received
-from rtshcua.model.faults import Mode
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.codec.frames import Codec, ReceivedFrame
+from rtshcua.model.faults import FlightMode
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.simulation.world import Simulation
 from virtual.copying import copied
 
@@ -24,10 +24,10 @@ class Pilot:
 
     def __init__(self, flavour: str, station: bool = True, **config: Any) -> None:
         self.px4 = flavour == "px4"
-        self.config = SimulationConfig(flavour=Kind(flavour), **config)
+        self.config = SimulationConfig(flavour=AutopilotKind(flavour), **config)
         self.simulation = Simulation(self.config)
         self.codec = Codec(255, 190)
-        self.seen: list[Received] = []
+        self.seen: list[ReceivedFrame] = []
         self.sent: list[bytes] = []
         self._sent_us: list[int] = []
         if station:
@@ -35,17 +35,17 @@ class Pilot:
 
     # ------------------------------------------------------------------------------------------ talking
 
-    def send(self, message: Any) -> list[Received]:
+    def send(self, message: Any) -> list[ReceivedFrame]:
         self.sent.append(self.codec.pack(message))
         self._sent_us.append(self.simulation.now_us)
         return self.take(self.simulation.receive(self.sent[-1], self.simulation.now_us))
 
-    def take(self, datagrams: list[bytes]) -> list[Received]:
+    def take(self, datagrams: list[bytes]) -> list[ReceivedFrame]:
         received = [frame for datagram in datagrams for frame in self.codec.parse(datagram)]
         self.seen += received
         return received
 
-    def wait(self, seconds: float) -> list[Received]:
+    def wait(self, seconds: float) -> list[ReceivedFrame]:
         return self.take(self.simulation.advance(self.simulation.now_us + round(seconds * SECOND)))
 
     def until(self, reached: Callable[[], bool], seconds: float = 300) -> None:
@@ -62,7 +62,7 @@ class Pilot:
         message = mavlink.MAVLink_command_int_message(1, 1, frame, command, 0, 0, *params, x, y, z)
         return acks(self.send(message), command)
 
-    def mode(self, mode: Mode) -> list[int]:
+    def mode(self, mode: FlightMode) -> list[int]:
         number = self.simulation._autopilot.flavour.modes.numbers[mode]
         if self.px4:
             return self.long(mavlink.MAV_CMD_DO_SET_MODE, 1, number >> 16 & 0xFF, number >> 24)
@@ -102,7 +102,7 @@ class Pilot:
     def _take_off(self, up_m: float) -> None:
         self.ready()
         if not self.px4:
-            assert self.mode(Mode.GUIDED) == [0]
+            assert self.mode(FlightMode.GUIDED) == [0]
         assert self.arm() == [0]
         altitude = up_m + self.config.home.amsl_mm / 1000 if self.px4 else up_m
         assert self.long(mavlink.MAV_CMD_NAV_TAKEOFF, -1, 0, 0, nan, nan, nan, altitude) == [0]
@@ -141,7 +141,7 @@ class Pilot:
 CLIMBED: dict[tuple[str, tuple[tuple[int, bytes], ...], int, float], Pilot] = {}
 
 
-def acks(received: list[Received], command: int) -> list[int]:
+def acks(received: list[ReceivedFrame], command: int) -> list[int]:
     return [f.message.result for f in received if f.name == "COMMAND_ACK" and f.message.command == command]
 
 

@@ -11,21 +11,32 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from recorded.trace import CLIENT, Trace
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.answers import Delays, Inbox, Lanes
-from rtshcua.simulation.config import Answers, Kind, SimulationConfig
+from rtshcua.simulation.config import Answers, AutopilotKind, SimulationConfig
 from rtshcua.simulation.world import FLAVOURS, Simulation
 
 S = 1_000_000
 RECORDED = {
-    Kind.PX4: ("px4-commands", "px4-hover-does-not-stop", "px4-pilot-goto", "px4-pilot-pause", "px4-takeover-race"),
-    Kind.ARDUPILOT: ("arducopter-commands", "arducopter-dropout", "arducopter-pilot-goto", "arducopter-signing"),
+    AutopilotKind.PX4: (
+        "px4-commands",
+        "px4-hover-does-not-stop",
+        "px4-pilot-goto",
+        "px4-pilot-pause",
+        "px4-takeover-race",
+    ),
+    AutopilotKind.ARDUPILOT: (
+        "arducopter-commands",
+        "arducopter-dropout",
+        "arducopter-pilot-goto",
+        "arducopter-signing",
+    ),
 }
 STALLED = "arducopter-dropout"
 
 
 @cache
-def measured(kind: Kind) -> dict[int, list[int]]:
+def measured(kind: AutopilotKind) -> dict[int, list[int]]:
     """By lane, how long answers took in the recordings, microseconds."""
     lanes, taken = FLAVOURS[kind].lanes, dict[int, list[int]]()
     for name in RECORDED[kind]:
@@ -48,10 +59,10 @@ def measured(kind: Kind) -> dict[int, list[int]]:
     return taken
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_the_delays_are_those_that_were_recorded(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", list(AutopilotKind))
+def test_the_delays_are_those_that_were_recorded(kind: AutopilotKind) -> None:
     chance, taken = Random(5), measured(kind)
-    assert sum(map(len, taken.values())) == {Kind.PX4: 107, Kind.ARDUPILOT: 110}[kind]
+    assert sum(map(len, taken.values())) == {AutopilotKind.PX4: 107, AutopilotKind.ARDUPILOT: 110}[kind]
     for lane, delays in enumerate(FLAVOURS[kind].lanes.delays):
         real, drawn = sorted(taken[lane]), sorted(delays.draw(chance) for _ in range(20_000))
         assert (drawn[0], drawn[-1]) == (pytest.approx(real[0], abs=1_000), pytest.approx(real[-1], rel=0.02))
@@ -120,7 +131,7 @@ def test_a_request_may_overtake_a_command_on_px4_and_never_on_copter(pilot: Call
     """Asked right behind a command for another mode, PX4 may tell the old one, as measured on the real one."""
     p = pilot(flavour, answers=Answers.RECORDED, noise=False)
     p.wait(2)
-    modes = [Mode.LAND, Mode.POSITION] if p.px4 else [Mode.LAND, Mode.ALTITUDE]
+    modes = [FlightMode.LAND, FlightMode.POSITION] if p.px4 else [FlightMode.LAND, FlightMode.ALTITUDE]
     old = 0
     for turn in range(60):
         mode = modes[turn % 2]
@@ -149,7 +160,10 @@ def test_what_waits_while_it_stands_still_is_answered_after(pilot: Callable[...,
 
 def test_streams_begin_at_any_time(pilot: Callable[..., Any], flavour: str) -> None:
     def first(seed: int, answers: Answers) -> int:
-        simulation, codec = Simulation(SimulationConfig(Kind(flavour), seed=seed, answers=answers)), Codec(0, 0)
+        simulation, codec = (
+            Simulation(SimulationConfig(AutopilotKind(flavour), seed=seed, answers=answers)),
+            Codec(0, 0),
+        )
         while True:
             for datagram in simulation.advance(simulation.now_us + 20_000):
                 if any(f.name == "HEARTBEAT" and f.component == 1 for f in codec.parse(datagram)):
@@ -163,7 +177,7 @@ def test_streams_begin_at_any_time(pilot: Callable[..., Any], flavour: str) -> N
 
 def test_the_same_seed_gives_the_same_bytes(flavour: str) -> None:
     def said(seed: int) -> list[bytes]:
-        config = SimulationConfig(Kind(flavour), seed=seed, answers=Answers.RECORDED)
+        config = SimulationConfig(AutopilotKind(flavour), seed=seed, answers=Answers.RECORDED)
         simulation, codec, heard = Simulation(config), Codec(255, 190), []
         for turn in range(100):
             message = mavlink.MAVLink_command_long_message(1, 1, 512, 0, turn % 3, 0, 0, 0, 0, 0, 0)

@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.simulation.face import _HANDLERS
 from rtshcua.simulation.world import Simulation
 from virtual.rows import rows
@@ -44,7 +44,7 @@ def one(chance: Random, type_: str) -> int | float:
 
 def bombard(seed: int) -> Simulation:
     chance = Random(seed)
-    simulation = Simulation(SimulationConfig(flavour=chance.choice(list(Kind)), seed=seed))
+    simulation = Simulation(SimulationConfig(flavour=chance.choice(list(AutopilotKind)), seed=seed))
     codec = Codec(255, 190)
     simulation.advance(1_500_000)
     for _ in range(60):

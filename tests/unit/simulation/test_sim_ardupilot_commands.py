@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from recorded.trace import SECOND, Trace
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 
 
 @pytest.fixture
@@ -54,9 +54,16 @@ def test_results_on_the_ground(copter: Any, command: int, params: tuple[float, .
 
 @pytest.mark.parametrize(
     ("mode", "number"),
-    [(Mode.GUIDED, 4), (Mode.LOITER, 5), (Mode.RETURN, 6), (Mode.LAND, 9), (Mode.BRAKE, 17), (Mode.MANUAL, 0)],
+    [
+        (FlightMode.GUIDED, 4),
+        (FlightMode.LOITER, 5),
+        (FlightMode.RETURN, 6),
+        (FlightMode.LAND, 9),
+        (FlightMode.BRAKE, 17),
+        (FlightMode.MANUAL, 0),
+    ],
 )
-def test_custom_modes(copter: Any, mode: Mode, number: int) -> None:
+def test_custom_modes(copter: Any, mode: FlightMode, number: int) -> None:
     assert copter.mode(mode) == [0]
     copter.wait(1)
     assert copter.last("HEARTBEAT").custom_mode == number
@@ -68,15 +75,15 @@ def test_arming_before_ready_fails_with_a_text(pilot: Callable[..., Any]) -> Non
     assert early.texts() == ["Arm: Accels inconsistent"]
 
 
-@pytest.mark.parametrize("mode", [Mode.LAND, Mode.RETURN, Mode.BRAKE])
-def test_modes_that_cannot_be_armed_in(copter: Any, mode: Mode) -> None:
+@pytest.mark.parametrize("mode", [FlightMode.LAND, FlightMode.RETURN, FlightMode.BRAKE])
+def test_modes_that_cannot_be_armed_in(copter: Any, mode: FlightMode) -> None:
     copter.mode(mode)
     assert copter.arm() == [4]
     assert copter.texts()[-1].endswith("mode not armable")
 
 
 def test_takeoff_in_loiter_is_accepted_and_does_nothing(copter: Any) -> None:
-    copter.mode(Mode.LOITER)
+    copter.mode(FlightMode.LOITER)
     assert copter.arm() == [0]
     assert copter.long(22, 0, 0, 0, 0, 0, 0, 10) == [0]
     copter.wait(5)
@@ -85,7 +92,7 @@ def test_takeoff_in_loiter_is_accepted_and_does_nothing(copter: Any) -> None:
 
 @pytest.mark.parametrize(("frame", "result"), [(0, 2), (5, 2), (10, 2), (3, 0), (6, 0)])
 def test_takeoff_wants_a_relative_frame(copter: Any, frame: int, result: int) -> None:
-    copter.mode(Mode.GUIDED)
+    copter.mode(FlightMode.GUIDED)
     copter.arm()
     assert copter.int(22, frame, [0, 0, 0, 0], 0, 0, 10) == [result]
     copter.wait(3)
@@ -95,7 +102,7 @@ def test_takeoff_wants_a_relative_frame(copter: Any, frame: int, result: int) ->
 
 
 def test_in_the_air(flying: Any) -> None:
-    assert flying.truth.mode is Mode.GUIDED
+    assert flying.truth.mode is FlightMode.GUIDED
     assert flying.arm() == [0]
     assert flying.long(400, 0) == [4]
     assert flying.long(22, 0, 0, 0, 0, 0, 0, 20) == [4]
@@ -129,29 +136,29 @@ def test_position_target_honours_the_frame(flying: Any, frame: int, moves: bool)
 
 def test_position_target_is_ignored_on_the_ground_and_outside_guided(copter: Any) -> None:
     latitude, longitude = copter.config.home.globe(20, 0)
-    copter.mode(Mode.GUIDED)
+    copter.mode(FlightMode.GUIDED)
     copter.arm()
     copter.target(latitude, longitude, 10)
     copter.wait(4)
     assert not copter.truth.in_air
     copter.long(22, 0, 0, 0, 0, 0, 0, 10)
     copter.wait(10)
-    copter.mode(Mode.LOITER)
+    copter.mode(FlightMode.LOITER)
     copter.target(latitude, longitude, 10)
     copter.wait(5)
     assert abs(copter.truth.north_mm) < 300
 
 
 def test_pause_stops_and_brake_stops(flying: Any) -> None:
-    for stop in (lambda: flying.long(193, 0), lambda: flying.mode(Mode.BRAKE)):
-        flying.mode(Mode.GUIDED)
+    for stop in (lambda: flying.long(193, 0), lambda: flying.mode(FlightMode.BRAKE)):
+        flying.mode(FlightMode.GUIDED)
         flying.go_to(flying.truth.north_mm / 1000 + 100, 0, 10)
         flying.wait(5)
         assert flying.truth.speed_mm_s > 4_000
         assert stop() == [0]
         flying.wait(5)
         assert flying.truth.speed_mm_s < 150
-        assert flying.long(193, 1) == [0 if flying.truth.mode is Mode.GUIDED else 4]
+        assert flying.long(193, 1) == [0 if flying.truth.mode is FlightMode.GUIDED else 4]
 
 
 def test_a_pause_keeps_mode_and_target_and_what_comes_meanwhile(flying: Any) -> None:
@@ -161,7 +168,7 @@ def test_a_pause_keeps_mode_and_target_and_what_comes_meanwhile(flying: Any) -> 
     asked = flying.last("POSITION_TARGET_GLOBAL_INT")
     assert flying.long(193, 0) == [0]
     flying.wait(6)
-    assert (flying.truth.mode, flying.truth.speed_mm_s < 150) == (Mode.GUIDED, True)
+    assert (flying.truth.mode, flying.truth.speed_mm_s < 150) == (FlightMode.GUIDED, True)
     assert flying.last("POSITION_TARGET_GLOBAL_INT").lat_int == asked.lat_int
     north = flying.truth.north_mm
     flying.go_to(0, 100, 10)
@@ -217,11 +224,11 @@ def test_a_velocity_or_a_pause_in_a_leg_does_what_was_recorded(flying: Any, name
 
 def test_a_velocity_that_is_not_commanded_again_ends_in_standing(flying: Any) -> None:
     """GUID_TIMEOUT: 3 s after the last. In another mode than GUIDED nobody minds it."""
-    flying.mode(Mode.BRAKE)
+    flying.mode(FlightMode.BRAKE)
     steer(flying, 3)
     flying.wait(2)
     assert flying.truth.speed_mm_s < 100
-    flying.mode(Mode.GUIDED)
+    flying.mode(FlightMode.GUIDED)
     steer(flying, 3)
     flying.wait(2.5)
     assert flying.truth.speed_mm_s > 2_500
@@ -248,30 +255,30 @@ def test_targets_are_told_where_the_mode_has_one(copter: Any) -> None:
     assert (target.coordinate_frame, target.type_mask) == (0, 0xFDF8)
     assert target.alt == pytest.approx(copter.config.home.amsl_mm / 1000 + 12, abs=0.01)
     assert (target.lat_int, target.lon_int) == copter.config.home.globe(80, 0)
-    copter.mode(Mode.LOITER)
+    copter.mode(FlightMode.LOITER)
     assert not told(), "none in LOITER"
-    copter.mode(Mode.GUIDED)
+    copter.mode(FlightMode.GUIDED)
     assert not told(), "none before one is given"
-    copter.mode(Mode.RETURN)
+    copter.mode(FlightMode.RETURN)
     assert told()
-    copter.mode(Mode.LAND)
+    copter.mode(FlightMode.LAND)
     assert not told()
 
 
 def test_the_same_mode_again_changes_nothing(flying: Any) -> None:
     flying.go_to(100, 0, 10)
     flying.wait(5)
-    assert flying.mode(Mode.GUIDED) == [0]
+    assert flying.mode(FlightMode.GUIDED) == [0]
     flying.wait(5)
     assert flying.truth.speed_mm_s > 4_000
-    assert flying.mode(Mode.LOITER) == [0]
+    assert flying.mode(FlightMode.LOITER) == [0]
     assert flying.long(17) == [0]
 
 
 def test_set_mode_message_is_acknowledged_with_its_own_number(flying: Any) -> None:
     answers = flying.send(mavlink.MAVLink_set_mode_message(1, 1, 9))
     assert [(f.message.command, f.message.result) for f in answers if f.name == "COMMAND_ACK"] == [(11, 0)]
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
 
 
 def test_nothing_but_the_heartbeat_its_time_and_the_radio_unasked(copter: Any) -> None:

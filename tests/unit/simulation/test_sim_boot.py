@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.config import Boot
 
 S = 1_000_000
@@ -81,12 +81,12 @@ def test_arming_while_it_comes_up(pilot: Callable[..., Any], flavour: str) -> No
         return
     assert p.texts()[-1] == "Arm: Accels inconsistent"
     p.wait(25)
-    p.mode(Mode.ALTITUDE)
-    assert p.mode(Mode.GUIDED) == [4]
+    p.mode(FlightMode.ALTITUDE)
+    assert p.mode(FlightMode.GUIDED) == [4]
     assert p.arm() == [0], "a mode that needs no position can be armed in without one"
     assert p.long(400, 0) == [0]
     p.wait(17)
-    assert p.mode(Mode.GUIDED) == [0]
+    assert p.mode(FlightMode.GUIDED) == [0]
     assert p.arm() == [0]
 
 
@@ -101,7 +101,7 @@ def test_arming_while_it_comes_up(pilot: Callable[..., Any], flavour: str) -> No
 def test_refusals_to_arm_say_why(pilot: Callable[..., Any], flavour: str, fault: Any, px4: str, copter: str) -> None:
     p = pilot(flavour, faults=(fault,)).ready()
     p.long(511, 1, 100_000)
-    p.mode(Mode.LOITER)
+    p.mode(FlightMode.LOITER)
     p.wait(12)
     assert p.arm() == [1 if p.px4 else 4]
     assert (f"Arming denied: {px4}" if p.px4 else f"Arm: {copter}") in p.texts()
@@ -119,7 +119,7 @@ def test_standing_armed_it_disarms_by_itself(pilot: Callable[..., Any], flavour:
 
 def test_running_up_it_does_not(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour).ready()
-    p.mode(Mode.GUIDED)
+    p.mode(FlightMode.GUIDED)
     p.arm()
     p.wait(9)
     p.long(22, -1, 0, 0, 0, 0, 0, 500 if p.px4 else 10)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.simulation.config import Estimate, Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, Estimate, SimulationConfig
 from rtshcua.simulation.sensors import FIX_LATE_S, LATE_S, WANDER_M
 from rtshcua.simulation.world import Simulation
 
@@ -55,7 +55,7 @@ def test_a_real_speed_comes_down_late(pilot: Callable[..., Any], flavour: str) -
 def test_a_real_receiver_strays_slowly_by_about_a_metre() -> None:
     found, steps = [], []
     for seed in range(12):
-        simulation = Simulation(SimulationConfig(Kind.PX4, seed=seed, estimate=Estimate.REAL))
+        simulation = Simulation(SimulationConfig(AutopilotKind.PX4, seed=seed, estimate=Estimate.REAL))
         sensors = simulation._autopilot.sensors
         last = (0.0, 0.0)
         for second in range(1, 301):

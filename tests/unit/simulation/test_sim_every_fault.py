@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode
+from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.simulation.autopilot import Autopilot
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.simulation.fault_effects import Affected, effects
 from rtshcua.simulation.fault_syntax import OF_VEHICLE
 from rtshcua.simulation.world import FLAVOURS
@@ -36,8 +36,8 @@ EXAMPLES: dict[str, Callable[[int], Fault]] = {
     "second-voice": faults.SecondVoice,
     "obstacle": lambda at: faults.Obstacle(at, 9_000),
     "pillar": lambda at: faults.Pillar(at, 60_000, 30_000, 1_000, 60_000, None, 4_000, 270),
-    "pilot": lambda at: faults.PilotMode(at, Mode.LOITER),
-    "pilot-mode": lambda at: faults.PilotMode(at, Mode.LAND),
+    "pilot": lambda at: faults.PilotMode(at, FlightMode.LOITER),
+    "pilot-mode": lambda at: faults.PilotMode(at, FlightMode.LAND),
     "pilot-pause": faults.PilotPause,
     "pilot-goto": lambda at: faults.PilotGoto(at, 0, 90_000, 20_000),
     "pilot-velocity": lambda at: faults.PilotVelocity(at, -3_000, 0, 2 * S),
@@ -91,10 +91,10 @@ def test_it_changes_what_is_seen(
     now_us = with_it.now_us
     if not p.px4 and name in LANDING:
         for each in (with_it, without):
-            each.inject(faults.PilotMode(now_us, Mode.LAND))
+            each.inject(faults.PilotMode(now_us, FlightMode.LAND))
     if p.px4 and name in STAYS:
         for each in (with_it, without):
-            each.inject(faults.PilotMode(now_us, Mode.POSITION))
+            each.inject(faults.PilotMode(now_us, FlightMode.POSITION))
     with_it.inject(EXAMPLES[name](now_us + 200_000))
     for at_us in range(now_us + 100_000, now_us + 6 * S, 100_000):
         seen, expected = with_it.advance(at_us), without.advance(at_us)
@@ -105,7 +105,7 @@ def test_it_changes_what_is_seen(
 
 
 def test_what_is_not_of_the_vehicle_has_no_effect_on_it_and_an_unknown_kind_is_refused() -> None:
-    on = Affected(Autopilot(FLAVOURS[Kind.PX4], SimulationConfig()), None, None, None, None)  # type: ignore[arg-type]
+    on = Affected(Autopilot(FLAVOURS[AutopilotKind.PX4], SimulationConfig()), None, None, None, None)  # type: ignore[arg-type]
     assert not list(effects(faults.DiskFull(0), on))
     assert not list(effects(faults.Recall(0), on))
     bases = (Fault, faults.LinkFault, faults.ReceiverFault, faults.AutopilotFault, faults.PilotFault)

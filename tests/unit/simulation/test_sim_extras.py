@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from rtshcua.model.faults import Mode
-from rtshcua.simulation.config import EQUIPPED, STOCK, Extra
+from rtshcua.model.faults import FlightMode
+from rtshcua.simulation.config import EQUIPPED, STOCK, Equipment
 from rtshcua.simulation.surroundings import Wind
 
 NOT_STOCK = {"RADIO_STATUS", "DISTANCE_SENSOR", "OBSTACLE_DISTANCE", "WIND_COV"}
@@ -53,7 +53,7 @@ def test_the_wind_is_known_in_the_air_and_what_is_told_after_it_is_old(pilot: Ca
     speed = (told.wind_x**2 + told.wind_y**2) ** 0.5 if p.px4 else told.speed
     assert speed == pytest.approx(5, abs=0.1)
     assert len({str(f.message) for f in p.seen if f.name == name}) > 4, "no estimate is twice the same"
-    p.mode(Mode.LAND)
+    p.mode(FlightMode.LAND)
     p.until(lambda: not p.truth.in_air)
     p.wait(1)
     p.seen.clear()
@@ -63,7 +63,7 @@ def test_the_wind_is_known_in_the_air_and_what_is_told_after_it_is_old(pilot: Ca
 
 
 def test_two_range_finders_tell_in_turn_where_they_look(pilot: Callable[..., Any]) -> None:
-    p = pilot("px4", extras=EQUIPPED | {Extra.ALTIMETER})
+    p = pilot("px4", extras=EQUIPPED | {Equipment.ALTIMETER})
     p.take_off(5)
     p.seen.clear()
     p.wait(2)
@@ -74,5 +74,5 @@ def test_two_range_finders_tell_in_turn_where_they_look(pilot: Callable[..., Any
 
 
 def test_one_that_looks_down_is_all_that_there_may_be(pilot: Callable[..., Any]) -> None:
-    p = pilot("px4", extras=frozenset({Extra.ALTIMETER})).ready()
+    p = pilot("px4", extras=frozenset({Equipment.ALTIMETER})).ready()
     assert {f.message.orientation for f in p.seen if f.name == "DISTANCE_SENSOR"} == {25}

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.campaign.drawing import Space, Tally, draw
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.fault_syntax import OF_VEHICLE, fault_words, parse_fault
 from rtshcua.simulation.surroundings import Wind
 from virtual.rows import rows
@@ -42,7 +42,7 @@ def test_battery_level(flying: Any) -> None:
 def test_empty_battery_lands_and_then_falls(flying: Any) -> None:
     inject(flying, faults.BatteryLevel, 390)
     flying.wait(1)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
     inject(flying, faults.BatteryLevel, 0)
     flying.wait(1)
     assert flying.truth.climb_mm_s < -5_000
@@ -52,7 +52,7 @@ def test_empty_battery_lands_and_then_falls(flying: Any) -> None:
 
 def test_low_battery_refuses_to_arm(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, battery=500).ready()
-    p.mode(Mode.LOITER)
+    p.mode(FlightMode.LOITER)
     assert p.arm() == [1 if p.px4 else 4]
     assert p.texts()[-1] == (
         "Arming denied: battery too low" if p.px4 else "Arm: Battery 1 below minimum arming capacity"
@@ -60,27 +60,27 @@ def test_low_battery_refuses_to_arm(pilot: Callable[..., Any], flavour: str) -> 
 
 
 def test_gps_loss_shows_at_once_and_the_autopilot_lands_later(flying: Any) -> None:
-    flying.mode(Mode.LOITER)
+    flying.mode(FlightMode.LOITER)
     inject(flying, faults.GpsLoss)
     flying.wait(1)
     assert flying.last("GPS_RAW_INT").fix_type == 1
-    assert flying.truth.mode is Mode.LOITER
+    assert flying.truth.mode is FlightMode.LOITER
     assert flying.simulation.now_us - flying.last("GLOBAL_POSITION_INT").time_boot_ms * 1000 < 200_000
     estimator = "ESTIMATOR_STATUS" if flying.px4 else "EKF_STATUS_REPORT"
     assert flying.last(estimator).flags & 16
     flying.wait(8)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
     assert not flying.last(estimator).flags & 16
-    assert flying.mode(Mode.LOITER)[-1] != 0
+    assert flying.mode(FlightMode.LOITER)[-1] != 0
     flying.until(lambda: not flying.truth.armed)
 
 
 def test_short_gps_loss_passes(flying: Any) -> None:
-    flying.mode(Mode.LOITER)
+    flying.mode(FlightMode.LOITER)
     inject(flying, faults.GpsLoss, 2 * S)
     flying.wait(4)
     assert flying.last("GPS_RAW_INT").fix_type == (3 if flying.px4 else 6)
-    assert flying.truth.mode is Mode.LOITER
+    assert flying.truth.mode is FlightMode.LOITER
 
 
 def test_gps_jump_moves_the_report_and_then_the_vehicle(flying: Any) -> None:
@@ -113,11 +113,11 @@ def test_a_storm_carries_it_away(flying: Any) -> None:
 def test_link_delay(flying: Any) -> None:
     inject(flying, faults.LinkDelay, 300_000)
     flying.wait(1)
-    assert flying.mode(Mode.LAND) == []
+    assert flying.mode(FlightMode.LAND) == []
     flying.wait(0.28)
-    assert flying.truth.mode is not Mode.LAND
+    assert flying.truth.mode is not FlightMode.LAND
     flying.wait(0.04)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
     flying.wait(0.3)
     assert flying.last("COMMAND_ACK").result == 0
 
@@ -135,9 +135,9 @@ def test_link_silence(flying: Any) -> None:
     inject(flying, faults.LinkSilence, 5 * S)
     flying.wait(0.1)
     assert flying.wait(4.8) == []
-    assert flying.mode(Mode.LAND) == []
+    assert flying.mode(FlightMode.LAND) == []
     assert flying.wait(1)
-    assert flying.truth.mode is not Mode.LAND
+    assert flying.truth.mode is not FlightMode.LAND
 
 
 def test_link_quality_is_told_by_the_radio(flying: Any) -> None:
@@ -198,23 +198,23 @@ def test_faults_from_the_configuration_happen_when_they_should(pilot: Callable[.
             "pillar,at=0s,north=1m,east=-2m,radius=500mm,height=30m,for=2min",
             faults.Pillar(0, 1_000, -2_000, 500, 30_000, 120 * S),
         ),
-        ("link-delay,at=1s,delay=200ms,for=3s,way=up", faults.LinkDelay(S, 200_000, 3 * S, faults.Way.UP)),
-        ("link-jitter,at=1s,jitter=80ms,way=down", faults.LinkJitter(S, 80_000, None, faults.Way.DOWN)),
+        ("link-delay,at=1s,delay=200ms,for=3s,way=up", faults.LinkDelay(S, 200_000, 3 * S, faults.Direction.UP)),
+        ("link-jitter,at=1s,jitter=80ms,way=down", faults.LinkJitter(S, 80_000, None, faults.Direction.DOWN)),
         ("link-reorder,at=1s,part=5%", faults.LinkReorder(S, 500)),
         ("link-loss,at=1s,loss=30%,for=9s,way=both", faults.LinkLoss(S, 3_000, 9 * S)),
-        ("link-silence,at=1s,for=5s,way=down,held=yes", faults.LinkSilence(S, 5 * S, faults.Way.DOWN, True)),
+        ("link-silence,at=1s,for=5s,way=down,held=yes", faults.LinkSilence(S, 5 * S, faults.Direction.DOWN, True)),
         ("link-silence,at=1s,held=no", faults.LinkSilence(S)),
         ("stall,at=1s,for=5s,shuffle=7", faults.Stall(S, 5 * S, 7)),
         ("stall,at=1s,for=5s", faults.Stall(S, 5 * S)),
         ("freeze,at=1s,for=2s", faults.Freeze(S, 2 * S)),
         ("mute,at=1s,message=GPS_RAW_INT,for=2s", faults.MessageSilence(S, "GPS_RAW_INT", 2 * S)),
-        ("pilot-mode,at=1s,mode=land", faults.PilotMode(S, Mode.LAND)),
+        ("pilot-mode,at=1s,mode=land", faults.PilotMode(S, FlightMode.LAND)),
         ("pilot-pause,at=1s", faults.PilotPause(S)),
         ("pilot-goto,at=1s,north=100m,east=-3m,up=20m", faults.PilotGoto(S, 100_000, -3_000, 20_000)),
         ("pilot-sticks,at=1s,for=3s", faults.PilotSticks(S, 3 * S)),
         ("kill,at=1s", faults.Kill(S)),
-        ("pilot,at=1s,mode=altitude", faults.PilotMode(S, Mode.ALTITUDE)),
-        ("pilot,at=1s", faults.PilotMode(S, Mode.POSITION)),
+        ("pilot,at=1s,mode=altitude", faults.PilotMode(S, FlightMode.ALTITUDE)),
+        ("pilot,at=1s", faults.PilotMode(S, FlightMode.POSITION)),
     ],
 )
 def test_fault_texts(text: str, expected: faults.Fault) -> None:
@@ -246,7 +246,7 @@ def test_bad_fault_texts(text: str, message: str) -> None:
 
 
 def test_a_glitch_is_not_believed_and_then_nothing_is(flying: Any) -> None:
-    flying.mode(Mode.LOITER)
+    flying.mode(FlightMode.LOITER)
     estimator = "ESTIMATOR_STATUS" if flying.px4 else "EKF_STATUS_REPORT"
     before = flying.last("GLOBAL_POSITION_INT").lat
     inject(flying, faults.GpsGlitch, 50_000, 0, 3 * S)
@@ -257,22 +257,22 @@ def test_a_glitch_is_not_believed_and_then_nothing_is(flying: Any) -> None:
     flying.wait(2)
     assert abs(flying.last("GPS_RAW_INT").lat - before) < 200
     assert not flying.last(estimator).flags & (1 << 10 if flying.px4 else 1 << 15)
-    assert flying.truth.mode is Mode.LOITER
+    assert flying.truth.mode is FlightMode.LOITER
     inject(flying, faults.GpsGlitch, 50_000, 0)
     flying.wait(10)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
 
 
 def test_without_a_position_it_lands_where_the_wind_carries_it(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, wind=Wind(5_000, 270))
     p.take_off(20)
-    p.mode(Mode.LOITER)
+    p.mode(FlightMode.LOITER)
     p.wait(3)
     held = p.truth
     assert abs(held.east_mm) < 1_500
     inject(p, faults.GpsLoss, 9 * S)
     p.wait(14)
-    assert p.truth.mode is Mode.LAND
+    assert p.truth.mode is FlightMode.LAND
     assert p.truth.east_mm > held.east_mm + 10_000
     assert ("EKF Failsafe Cleared" in p.texts()) is not p.px4
 
@@ -288,10 +288,10 @@ def test_low_voltage_is_told_after_a_while_and_changes_nothing_by_default(pilot:
     p.wait(2)
     assert p.texts()[-1] == "Battery Failsafe"
     assert p.texts()[-2].startswith("Battery 1 is low 10.20V used ")
-    assert (p.truth.mode, p.last("HEARTBEAT").system_status) == (Mode.GUIDED, 5)
-    p.mode(Mode.LAND)
+    assert (p.truth.mode, p.last("HEARTBEAT").system_status) == (FlightMode.GUIDED, 5)
+    p.mode(FlightMode.LAND)
     p.until(lambda: not p.truth.armed)
-    p.mode(Mode.GUIDED)
+    p.mode(FlightMode.GUIDED)
     assert p.arm() == [4]
     assert p.texts()[-2:] == ["Arm: Battery 1 low voltage failsafe", "Arm: Battery failsafe"]
 
@@ -303,8 +303,8 @@ def test_the_voltage_that_is_low_is_a_parameter(pilot: Callable[..., Any]) -> No
     assert "Battery Failsafe" in p.texts(), "it sags below under load"
 
 
-@pytest.mark.parametrize(("action", "mode"), [(1, Mode.LAND), (2, Mode.RETURN)])
-def test_low_voltage_may_be_told_to_act(pilot: Callable[..., Any], action: int, mode: Mode) -> None:
+@pytest.mark.parametrize(("action", "mode"), [(1, FlightMode.LAND), (2, FlightMode.RETURN)])
+def test_low_voltage_may_be_told_to_act(pilot: Callable[..., Any], action: int, mode: FlightMode) -> None:
     p = pilot("ardupilot")
     p.send(mavlink.MAVLink_param_set_message(1, 1, b"BATT_FS_LOW_ACT", action, 9))
     p.take_off(15)

@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.config import HOME
-from rtshcua.simulation.fence import Area, Circle, FenceLimits, Polygon
+from rtshcua.simulation.fence import FenceArea, FenceCircle, FenceLimits, FencePolygon
 from rtshcua.simulation.place import Point
 from rtshcua.simulation.plans import draws_no_fence, from_message
 from virtual import plans as p
 from virtual.rows import rows
 
 Pilots = Callable[..., Any]
-SQUARE = Polygon(((-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)))
-NOTCHED = Polygon(((-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (0.0, 0.0), (-10.0, 10.0)))
+SQUARE = FencePolygon(((-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)))
+NOTCHED = FencePolygon(((-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (0.0, 0.0), (-10.0, 10.0)))
 
 
 def set_param(a: Any, name: str, value: float) -> float:
@@ -69,15 +69,15 @@ def test_a_polygon_may_be_concave() -> None:
 @rows(
     ("area", "inside", "outside"),
     [
-        (Area(), (500, 500), None),
-        (Area((SQUARE,)), (0, 0), (11, 0)),
-        (Area((), (SQUARE,)), (11, 0), (9, 0)),
-        (Area((SQUARE, Circle((30, 0), 5))), (30, 1), (20, 0)),
-        (Area((SQUARE, Circle((0, 0), 5)), every=True), (1, 1), (6, 0)),
-        (Area((SQUARE,), (Circle((0, 0), 2),)), (5, 5), (1, 0)),
+        (FenceArea(), (500, 500), None),
+        (FenceArea((SQUARE,)), (0, 0), (11, 0)),
+        (FenceArea((), (SQUARE,)), (11, 0), (9, 0)),
+        (FenceArea((SQUARE, FenceCircle((30, 0), 5))), (30, 1), (20, 0)),
+        (FenceArea((SQUARE, FenceCircle((0, 0), 5)), every=True), (1, 1), (6, 0)),
+        (FenceArea((SQUARE,), (FenceCircle((0, 0), 2),)), (5, 5), (1, 0)),
     ],
 )
-def test_areas(area: Area, inside: tuple[float, float], outside: tuple[float, float] | None) -> None:
+def test_areas(area: FenceArea, inside: tuple[float, float], outside: tuple[float, float] | None) -> None:
     assert area.holds(*inside)
     assert area.outside_by(*inside) == 0
     if outside is not None:
@@ -86,7 +86,7 @@ def test_areas(area: Area, inside: tuple[float, float], outside: tuple[float, fl
 
 
 def test_the_ceiling() -> None:
-    limits = FenceLimits(Area(), 50)
+    limits = FenceLimits(FenceArea(), 50)
     assert limits.holds(Point(0, 0, 50))
     assert not limits.holds(Point(0, 0, 50.1))
 
@@ -102,7 +102,7 @@ def test_what_is_uploaded_becomes_an_area(pilot: Pilots) -> None:
     ]
     items = [from_message(p.item(a, row, number, p.FENCE)) for number, row in enumerate(rows)]
     assert not draws_no_fence([item for item in items if item])
-    area = Area.of([item for item in items if item], HOME, every=False)
+    area = FenceArea.of([item for item in items if item], HOME, every=False)
     for place, allowed in {(40, 0): 1, (20, 0): 0, (0, 0): 0, (0, 100): 1, (60, 0): 0, (0, 55): 0}.items():
         assert area.holds(*place) == bool(allowed)
 
@@ -141,7 +141,7 @@ def test_right_behind_an_upload_a_target_outside_is_accepted(pilot: Pilots, flav
     assert ordered_out(a) == [0]
     a.until(lambda: a.truth.north_mm > 58_000)
     a.wait(10)
-    assert a.truth.mode is (Mode.LOITER if a.px4 else Mode.RETURN)
+    assert a.truth.mode is (FlightMode.LOITER if a.px4 else FlightMode.RETURN)
     if a.px4:
         assert 59_000 < a.truth.north_mm < 64_000
         assert any(f.name == "HEARTBEAT" and f.message.system_status == 5 for f in a.seen)
@@ -163,18 +163,18 @@ def on_the_way_out(a: Any) -> Any:
 @pytest.mark.parametrize(
     ("flavour", "action", "mode"),
     [
-        ("px4", 3, Mode.RETURN),
-        ("px4", 5, Mode.LAND),
-        ("px4", 2, Mode.LOITER),
-        ("px4", 1, Mode.LOITER),
-        ("px4", 0, Mode.LOITER),
-        ("ardupilot", 0, Mode.GUIDED),
-        ("ardupilot", 1, Mode.RETURN),
-        ("ardupilot", 2, Mode.LAND),
-        ("ardupilot", 4, Mode.BRAKE),
+        ("px4", 3, FlightMode.RETURN),
+        ("px4", 5, FlightMode.LAND),
+        ("px4", 2, FlightMode.LOITER),
+        ("px4", 1, FlightMode.LOITER),
+        ("px4", 0, FlightMode.LOITER),
+        ("ardupilot", 0, FlightMode.GUIDED),
+        ("ardupilot", 1, FlightMode.RETURN),
+        ("ardupilot", 2, FlightMode.LAND),
+        ("ardupilot", 4, FlightMode.BRAKE),
     ],
 )
-def test_actions(pilot: Pilots, flavour: str, action: int, mode: Mode) -> None:
+def test_actions(pilot: Pilots, flavour: str, action: int, mode: FlightMode) -> None:
     a = pilot(flavour)
     a.take_off(10)
     if a.px4:
@@ -185,7 +185,7 @@ def test_actions(pilot: Pilots, flavour: str, action: int, mode: Mode) -> None:
     a = on_the_way_out(a)
     a.until(lambda: a.truth.north_mm > 31_000)
     a.wait(1)
-    assert a.truth.mode is (Mode.LOITER if a.px4 else mode), "PX4 holds for COM_FAIL_ACT_T first"
+    assert a.truth.mode is (FlightMode.LOITER if a.px4 else mode), "PX4 holds for COM_FAIL_ACT_T first"
     a.wait(6)
     assert a.truth.mode is mode
     goes_on = action in ((0, 1) if a.px4 else (0,))
@@ -199,9 +199,9 @@ def test_px4_does_not_return_after_somebody_took_over_while_it_held(pilot: Pilot
     a = on_the_way_out(a)
     a.until(lambda: a.truth.north_mm > 31_000)
     a.wait(1)
-    assert set(a.mode(Mode.POSITION)) == {0}
+    assert set(a.mode(FlightMode.POSITION)) == {0}
     a.wait(10)
-    assert a.truth.mode is Mode.POSITION
+    assert a.truth.mode is FlightMode.POSITION
 
 
 def test_px4_can_be_told_to_terminate(pilot: Pilots) -> None:
@@ -219,13 +219,13 @@ def test_whoever_commands_in_a_breach_is_obeyed(pilot: Pilots, flavour: str) -> 
     on_the_way_out(a)
     a.until(lambda: a.truth.north_mm > 31_000)
     a.wait(1)
-    a.mode(Mode.LOITER)
+    a.mode(FlightMode.LOITER)
     a.wait(1)
-    assert a.truth.mode is Mode.LOITER
+    assert a.truth.mode is FlightMode.LOITER
     if not a.px4:
         assert a.texts().count("Manual recovery started") == 2
     a.wait(12)
-    assert a.truth.mode is Mode.LOITER
+    assert a.truth.mode is FlightMode.LOITER
 
 
 def test_far_outside_arducopter_lands(pilot: Pilots) -> None:
@@ -235,7 +235,7 @@ def test_far_outside_arducopter_lands(pilot: Pilots) -> None:
     a.until(lambda: a.truth.north_mm > 138_000)
     fenced(a, p.square(30))
     a.wait(1)
-    assert a.truth.mode is Mode.LAND
+    assert a.truth.mode is FlightMode.LAND
 
 
 def test_the_height_and_the_circle(pilot: Pilots) -> None:
@@ -245,13 +245,13 @@ def test_the_height_and_the_circle(pilot: Pilots) -> None:
     set_param(a, "FENCE_ALT_MAX", 20)
     a.go_to(0, 0, 19)
     a.wait(10)
-    assert a.truth.mode is Mode.GUIDED
+    assert a.truth.mode is FlightMode.GUIDED
     a.go_to(0, 0, 30)  # refused
     a.wait(10)
     assert a.truth.up_mm < 20_000
     set_param(a, "FENCE_ALT_MAX", 15)
     a.wait(1)
-    assert a.truth.mode is Mode.RETURN
+    assert a.truth.mode is FlightMode.RETURN
     assert "Max Alt fence breached" in a.texts()
     assert a.last("FENCE_STATUS").breach_type == 2
     b = pilot("ardupilot")
@@ -285,13 +285,13 @@ def test_a_fence_off_or_left_out_does_nothing(pilot: Pilots) -> None:
     a.wait(1)
     assert ordered_out(a) == [0]
     a.until(lambda: a.truth.north_mm > 40_000)
-    assert a.truth.mode is Mode.GUIDED
+    assert a.truth.mode is FlightMode.GUIDED
 
 
 def test_outside_the_fence_it_does_not_arm(pilot: Pilots, flavour: str) -> None:
     a = fenced(pilot(flavour).ready(), p.square(20, 100, 0))
     if not a.px4:
-        a.mode(Mode.GUIDED)
+        a.mode(FlightMode.GUIDED)
     assert a.arm() == [1 if a.px4 else 4]
     assert any("ence" in text for text in a.texts())
     assert not a.last("SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK if a.px4 else 1

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from virtual.sampling import each_once
@@ -52,7 +52,7 @@ def test_out_and_home(
     assert abs(p.truth.up_mm - up_m * 1000) < 200
     assert p.truth.speed_mm_s < 100
 
-    assert p.mode(Mode.RETURN)[-1] == 0
+    assert p.mode(FlightMode.RETURN)[-1] == 0
     p.until(lambda: not p.truth.armed)
     t = p.truth
     assert (abs(t.north_mm) < 700, abs(t.east_mm) < 700, t.up_mm) == (True, True, 0)
@@ -63,7 +63,7 @@ def test_out_and_home(
 def test_it_lands_as_fast_as_its_owner_says(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, land_mm_s=1_200)
     p.take_off(8)
-    p.mode(Mode.LAND)
+    p.mode(FlightMode.LAND)
     p.until(lambda: p.truth.up_mm < 2_000)
     assert -1_300 < p.truth.climb_mm_s < -1_100
     p.until(lambda: not p.truth.armed)
@@ -78,7 +78,7 @@ def test_return_climbs_first(pilot: Callable[..., Any], flavour: str) -> None:
     p.take_off(10)
     p.go_to(60, 0, 8)
     p.wait(20)
-    p.mode(Mode.RETURN)
+    p.mode(FlightMode.RETURN)
     highest = 0
     while p.truth.north_mm > 55_000:
         p.wait(0.1)
@@ -92,7 +92,7 @@ def test_landed_state_tells_the_parts_of_the_flight(pilot: Callable[..., Any], f
     p.take_off(12)
     p.go_to(10, 0, 12)
     p.wait(5)
-    p.mode(Mode.LAND)
+    p.mode(FlightMode.LAND)
     p.until(lambda: not p.truth.armed)
     p.wait(0.5)
     states = [f.message.landed_state for f in p.seen if f.name == "EXTENDED_SYS_STATE"]
@@ -102,7 +102,7 @@ def test_landed_state_tells_the_parts_of_the_flight(pilot: Callable[..., Any], f
 def test_hold_keeps_the_place_in_wind(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, wind=Wind(9_000, 45, 1_500))
     p.take_off(20)
-    p.mode(Mode.LOITER)
+    p.mode(FlightMode.LOITER)
     p.wait(3)
     start = p.truth
     p.wait(15)
@@ -113,9 +113,9 @@ def test_hold_keeps_the_place_in_wind(pilot: Callable[..., Any], flavour: str) -
 #: from the speed: the distance, and the time until it is slower than 0.4 m/s, as measured on the real ones
 STOPS = [
     ("px4", "pause", 4.5, 7.7, 3.6),
-    ("ardupilot", Mode.BRAKE, 10.1, 20.7, 4.6),
-    ("ardupilot", Mode.BRAKE, 4.0, 7.0, 3.5),
-    ("ardupilot", Mode.LOITER, 10.1, 18.0, 3.0),
+    ("ardupilot", FlightMode.BRAKE, 10.1, 20.7, 4.6),
+    ("ardupilot", FlightMode.BRAKE, 4.0, 7.0, 3.5),
+    ("ardupilot", FlightMode.LOITER, 10.1, 18.0, 3.0),
 ]
 
 
@@ -146,7 +146,7 @@ def test_told_to_stop_it_stops_and_stays_from_any_speed(
     p.go_to(400, 0, 20)
     p.wait(15)
     start = p.truth.north_mm
-    p.pause() if p.px4 else p.mode(Mode.BRAKE)
+    p.pause() if p.px4 else p.mode(FlightMode.BRAKE)
     furthest = start
     for _ in range(120):
         p.wait(0.1)

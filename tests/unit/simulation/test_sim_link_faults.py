@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode, Way
-from rtshcua.simulation.link import OVERTAKEN_US, Link
+from rtshcua.model.faults import Direction, FlightMode
+from rtshcua.simulation.link import OVERTAKEN_US, FaultyLink
 
 S = 1_000_000
 
@@ -44,21 +44,21 @@ def lag_us(p: Any) -> list[int]:
 
 
 def test_a_delay_of_one_direction(flying: Any) -> None:
-    inject(flying, faults.LinkDelay, 300_000, 8 * S, Way.DOWN)
+    inject(flying, faults.LinkDelay, 300_000, 8 * S, Direction.DOWN)
     flying.wait(1)
     assert set(lag_us(flying)) == {300_000}
-    flying.mode(Mode.LAND)
-    assert flying.truth.mode is Mode.LAND, "upwards nothing is late"
+    flying.mode(FlightMode.LAND)
+    assert flying.truth.mode is FlightMode.LAND, "upwards nothing is late"
     flying.wait(3)
     assert set(lag_us(flying)) == {0}
-    inject(flying, faults.LinkDelay, 300_000, None, Way.UP)
+    inject(flying, faults.LinkDelay, 300_000, None, Direction.UP)
     flying.wait(0.1)
     assert set(lag_us(flying)) == {0}
-    flying.mode(Mode.LOITER)
+    flying.mode(FlightMode.LOITER)
     flying.wait(0.28)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
     flying.wait(0.04)
-    assert flying.truth.mode is Mode.LOITER
+    assert flying.truth.mode is FlightMode.LOITER
 
 
 def test_jitter_varies_the_delay_and_keeps_the_order(flying: Any) -> None:
@@ -79,39 +79,39 @@ def test_what_is_overtaken_comes_out_of_order(flying: Any) -> None:
     assert turned > len(numbers) / 20
 
 
-@pytest.mark.parametrize("way", list(Way))
-def test_silence_of_each_direction(flying: Any, way: Way) -> None:
+@pytest.mark.parametrize("way", list(Direction))
+def test_silence_of_each_direction(flying: Any, way: Direction) -> None:
     inject(flying, faults.LinkSilence, 5 * S, way)
     flying.wait(0.1)
-    flying.mode(Mode.LAND)
-    assert (flying.truth.mode is Mode.LAND) is (way is Way.DOWN)
-    assert bool(of_autopilot(flying.wait(4.8))) is (way is Way.UP)
+    flying.mode(FlightMode.LAND)
+    assert (flying.truth.mode is FlightMode.LAND) is (way is Direction.DOWN)
+    assert bool(of_autopilot(flying.wait(4.8))) is (way is Direction.UP)
     assert of_autopilot(flying.wait(1))
-    assert (flying.truth.mode is Mode.LAND) is (way is Way.DOWN), "what was lost stays lost"
+    assert (flying.truth.mode is FlightMode.LAND) is (way is Direction.DOWN), "what was lost stays lost"
 
 
 def test_what_was_held_comes_in_a_burst(flying: Any) -> None:
-    inject(flying, faults.LinkSilence, 5 * S, Way.BOTH, True)
+    inject(flying, faults.LinkSilence, 5 * S, Direction.BOTH, True)
     flying.wait(0.1)
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     assert not flying.wait(4.8)
-    assert flying.truth.mode is not Mode.LAND
+    assert flying.truth.mode is not FlightMode.LAND
     burst = [f.message for f in flying.wait(0.12) if f.name == "GLOBAL_POSITION_INT"]
     assert 45 <= len(burst) <= 52
     assert burst[-1].time_boot_ms - burst[0].time_boot_ms > 4_500
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
 
 
 def test_loss_of_one_direction_ends(flying: Any) -> None:
-    inject(flying, faults.LinkLoss, 10_000, 2 * S, Way.UP)
+    inject(flying, faults.LinkLoss, 10_000, 2 * S, Direction.UP)
     flying.wait(0.1)
     assert of_autopilot(flying.wait(1))
-    flying.mode(Mode.LAND)
-    assert flying.truth.mode is not Mode.LAND
+    flying.mode(FlightMode.LAND)
+    assert flying.truth.mode is not FlightMode.LAND
     flying.wait(1.1)
     assert flying.last("RADIO_STATUS").txbuf in (0, 100)
-    flying.mode(Mode.LAND)
-    assert flying.truth.mode is Mode.LAND
+    flying.mode(FlightMode.LAND)
+    assert flying.truth.mode is FlightMode.LAND
 
 
 def test_a_stall_stops_its_time_and_its_flight_and_answers_all_at_once(flying: Any) -> None:
@@ -156,7 +156,7 @@ def test_frozen_measurements_go_on_with_old_stamps(flying: Any) -> None:
     assert len(positions) >= 29
     assert len({(m.time_boot_ms, m.lat) for m in positions}) == 1
     assert len({f.message.time_boot_ms for f in seen if f.name == "ATTITUDE"}) == 1
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     flying.wait(1.5)
     assert flying.last("HEARTBEAT").custom_mode == (100925440 if flying.px4 else 9), "the mode is still told"
     assert flying.simulation.now_us / 1000 - flying.last("GLOBAL_POSITION_INT").time_boot_ms < 200
@@ -183,7 +183,7 @@ def test_a_link_delivers_all_in_time_and_the_same_for_the_same_seed(
     seed: int, delay_us: int, jitter_us: int, reordered: int, gaps: list[int]
 ) -> None:
     def run() -> list[tuple[int, bytes]]:
-        link, now_us, came = Link(Random(seed)), 0, list[tuple[int, bytes]]()
+        link, now_us, came = FaultyLink(Random(seed)), 0, list[tuple[int, bytes]]()
         link.delay_us, link.jitter_us, link.reordered = delay_us, jitter_us, reordered
         for number, gap in enumerate(gaps):
             now_us += gap

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from virtual import plans as p
 
 Pilots = Callable[..., Any]
@@ -21,7 +21,7 @@ def loaded(a: Any, rows: list[Any]) -> Any:
 
 def armed(a: Any) -> Any:
     if not a.px4:
-        assert a.mode(Mode.GUIDED) == [0]
+        assert a.mode(FlightMode.GUIDED) == [0]
         assert a.arm() == [0]
     return a
 
@@ -59,10 +59,10 @@ def test_it_flies_a_survey_and_comes_home(pilot: Pilots, flavour: str) -> None:
     assert reached(a) == list(range(first, first + 4))
     if a.px4:
         assert a.last("MISSION_CURRENT").mission_state == 5
-        assert a.truth.mode is Mode.LOITER
+        assert a.truth.mode is FlightMode.LOITER
     else:
         assert a.last("MISSION_CURRENT").mission_state == 5
-        assert a.truth.mode is Mode.MISSION
+        assert a.truth.mode is FlightMode.MISSION
         texts = [text for text in a.texts() if text.startswith("Mission:")]
         assert texts == ["Mission: 1 Takeoff", "Mission: 1 Takeoff", "Mission: 2 WP", "Mission: 3 WP", "Mission: 4 RTL"]
 
@@ -79,7 +79,7 @@ def test_current_item_and_state_are_told(pilot: Pilots, flavour: str) -> None:
     assert a.last("MISSION_CURRENT").mission_state == 3
     a.until(lambda: 1 in reached(a))
     assert a.last("MISSION_CURRENT").seq == 2
-    a.mode(Mode.LOITER)
+    a.mode(FlightMode.LOITER)
     a.wait(0.5)
     assert a.last("MISSION_CURRENT").mission_state == 4
 
@@ -88,19 +88,19 @@ def test_it_pauses_where_it_is_and_goes_on(pilot: Pilots, flavour: str) -> None:
     a = armed(loaded(pilot(flavour).ready(), [p.takeoff(10), p.waypoint(60, 0, 10), p.waypoint(60, 40, 10)]))
     start(a)
     a.until(lambda: place(a)[0] > 20)
-    assert a.mode(Mode.LOITER)[-1] == 0
+    assert a.mode(FlightMode.LOITER)[-1] == 0
     a.wait(8)
     held = place(a)
     assert held[0] < 40
     a.wait(5)
     assert place(a) == pytest.approx(held, abs=0.5)
-    assert a.mode(Mode.MISSION)[-1] == 0
+    assert a.mode(FlightMode.MISSION)[-1] == 0
     last = 2 if a.px4 else 3
     a.until(lambda: last in reached(a))
     assert place(a) == pytest.approx((60, 40, 10), abs=2.5)
     a.wait(6)
     assert a.truth.in_air
-    assert a.truth.mode is (Mode.LOITER if a.px4 else Mode.MISSION)
+    assert a.truth.mode is (FlightMode.LOITER if a.px4 else FlightMode.MISSION)
     assert reached(a).count(last) == 1
 
 
@@ -109,7 +109,7 @@ def test_a_second_start_flies_it_again(pilot: Pilots, flavour: str) -> None:
     last = 1 if a.px4 else 2
     start(a)
     a.until(lambda: last in reached(a))
-    a.mode(Mode.LOITER)
+    a.mode(FlightMode.LOITER)
     a.wait(1)
     assert start(a) == [0]
     a.until(lambda: reached(a).count(last) == 2)
@@ -121,7 +121,7 @@ def test_a_start_that_is_sent_again_disturbs_nothing(pilot: Pilots) -> None:
     a.until(lambda: 2 in reached(a))
     a.wait(1)
     assert start(a) == [0]
-    assert a.mode(Mode.MISSION) == [0]
+    assert a.mode(FlightMode.MISSION) == [0]
     a.until(lambda: not a.truth.armed, seconds=120)
 
 
@@ -194,7 +194,7 @@ def test_set_current(pilot: Pilots, flavour: str) -> None:
 def test_without_a_mission_there_is_nothing_to_start(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     assert start(a) == [2 if a.px4 else 4]
-    assert a.mode(Mode.MISSION)[-1] == (1 if a.px4 else 4)
+    assert a.mode(FlightMode.MISSION)[-1] == (1 if a.px4 else 4)
     assert not a.truth.armed
 
 
@@ -250,12 +250,12 @@ def test_px4_leaves_a_mission_that_is_taken_away(pilot: Pilots) -> None:
     a.until(lambda: a.truth.north_mm > 20_000)
     a.send(mavlink.MAVLink_mission_clear_all_message(1, 1, p.MISSION))
     a.wait(0.5)
-    assert a.truth.mode is Mode.LOITER
+    assert a.truth.mode is FlightMode.LOITER
 
 
 def test_arducopter_waits_on_the_ground_for_mission_start(pilot: Pilots) -> None:
     a = armed(loaded(pilot("ardupilot").ready(), SURVEY))
-    assert a.mode(Mode.MISSION) == [0]
+    assert a.mode(FlightMode.MISSION) == [0]
     a.wait(5)
     assert not a.truth.in_air
     assert start(a) == [0]
@@ -286,5 +286,5 @@ def test_the_takeoff_mode_of_px4_climbs_by_its_parameter(pilot: Pilots) -> None:
     a = pilot("px4").ready()
     a.send(mavlink.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 7.0, 9))
     assert a.arm() == [0]
-    assert a.mode(Mode.TAKEOFF) == [0, 0]
+    assert a.mode(FlightMode.TAKEOFF) == [0, 0]
     a.until(lambda: abs(a.truth.up_mm - 7_000) < 300)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.simulation.battery import Battery, flight_load
-from rtshcua.simulation.config import Kind
+from rtshcua.simulation.config import AutopilotKind
 from rtshcua.simulation.guidance import towards
 from rtshcua.simulation.kinematics import GRAVITY, JERK, MAX_AIRSPEED, MAX_LEAN, Approach, Body
-from rtshcua.simulation.link import Link
+from rtshcua.simulation.link import FaultyLink
 from rtshcua.simulation.parameters import Parameters
 from rtshcua.simulation.px4.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.world import FLAVOURS
@@ -31,13 +31,13 @@ def test_the_distance_to_stop_is_the_inverse_of_the_speed_to_stop_from(
 
 @settings(max_examples=settings().max_examples * 2 // 5)
 @given(
-    st.sampled_from(list(Kind)),
+    st.sampled_from(list(AutopilotKind)),
     *[st.floats(-300, 300)] * 2,
     st.floats(1, 12),
     *[st.floats(-4, 4)] * 2,
 )
 def test_it_arrives_and_stops_without_much_overshoot(
-    flavour: Kind, north: float, east: float, speed: float, wind_north: float, wind_east: float
+    flavour: AutopilotKind, north: float, east: float, speed: float, wind_north: float, wind_east: float
 ) -> None:
     agility = FLAVOURS[flavour].handling.agility
     body, wind = Body(), (wind_north, wind_east)
@@ -122,7 +122,7 @@ def test_energy_never_rises(level: float, parts: list[tuple[float, float, float]
 
 
 def test_link_keeps_the_order_when_the_delay_shrinks() -> None:
-    link = Link(Random(1))
+    link = FaultyLink(Random(1))
     link.delay_us = 1_000
     link.send([b"first"], 0)
     link.delay_us = 0

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 
 S = 1_000_000
 
@@ -52,22 +52,22 @@ def test_sticks_take_px4_out_of_an_automatic_mode_and_copter_only_aside_while_it
     inject(flying, faults.PilotSticks, 2 * S)
     flying.wait(6)
     if flying.px4:
-        assert flying.truth.mode is Mode.POSITION
+        assert flying.truth.mode is FlightMode.POSITION
         assert flying.truth.speed_mm_s < 150
         return
-    assert flying.truth.mode is Mode.GUIDED
+    assert flying.truth.mode is FlightMode.GUIDED
     assert flying.truth.speed_mm_s > 4_000
     assert abs(flying.truth.east_mm) < 300
-    flying.mode(Mode.BRAKE)
+    flying.mode(FlightMode.BRAKE)
     flying.wait(6)
     inject(flying, faults.PilotSticks, 2 * S)
     flying.wait(5)
     assert abs(flying.truth.east_mm) < 300
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     flying.wait(1)
     inject(flying, faults.PilotSticks, 4 * S)
     flying.wait(8)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
     assert 3_000 < flying.truth.east_mm < 6_000, "1.25 m/s at most"
 
 
@@ -79,9 +79,9 @@ def test_sticks_do_not_end_offboard(pilot: Callable[..., Any]) -> None:
         p.target(latitude, longitude, 10)
         p.wait(0.1)
         if turn == 2:
-            assert p.mode(Mode.GUIDED) == [0, 0]
+            assert p.mode(FlightMode.GUIDED) == [0, 0]
             inject(p, faults.PilotSticks)
-    assert p.truth.mode is Mode.GUIDED
+    assert p.truth.mode is FlightMode.GUIDED
 
 
 def test_killed_in_the_air_it_falls_and_breaks(flying: Any) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from virtual.sampling import each_once
 
 AMSL = 488.0
@@ -66,7 +66,12 @@ def test_results_on_the_ground(px4: Any, command: int, params: tuple[float, ...]
 
 
 def test_custom_modes(px4: Any) -> None:
-    for mode, number in [(Mode.LOITER, LOITER), (Mode.TAKEOFF, TAKEOFF), (Mode.RETURN, RETURN), (Mode.LAND, LAND)]:
+    for mode, number in [
+        (FlightMode.LOITER, LOITER),
+        (FlightMode.TAKEOFF, TAKEOFF),
+        (FlightMode.RETURN, RETURN),
+        (FlightMode.LAND, LAND),
+    ]:
         assert px4.mode(mode) == [0, 0]
         px4.wait(1)
         assert px4.last("HEARTBEAT").custom_mode == number
@@ -89,9 +94,9 @@ def test_arming_before_ready_is_temporarily_rejected(pilot: Callable[..., Any]) 
 def test_takeoff_while_disarmed_only_changes_the_mode_and_arming_starts_it(px4: Any) -> None:
     assert px4.long(22, -1, 0, 0, nan, nan, nan, AMSL + 10) == [0]
     px4.wait(5)
-    assert (px4.truth.mode, px4.truth.in_air) == (Mode.TAKEOFF, False)
+    assert (px4.truth.mode, px4.truth.in_air) == (FlightMode.TAKEOFF, False)
     assert px4.arm() == [0]
-    px4.until(lambda: px4.truth.mode is Mode.LOITER)
+    px4.until(lambda: px4.truth.mode is FlightMode.LOITER)
     assert abs(px4.truth.up_mm - 10_000) < 900, "the mode changes a little before the height is reached"
 
 
@@ -105,7 +110,7 @@ def test_takeoff_altitude_is_above_sea(px4: Any) -> None:
 def test_takeoff_without_altitude_takes_the_parameter(px4: Any) -> None:
     assert px4.arm() == [0]
     assert px4.long(22, -1, 0, 0, nan, nan, nan, nan) == [0]
-    px4.until(lambda: px4.truth.mode is Mode.LOITER)
+    px4.until(lambda: px4.truth.mode is FlightMode.LOITER)
     px4.wait(3)
     assert abs(px4.truth.up_mm - 2_500) < 200
 
@@ -115,11 +120,11 @@ def test_a_takeoff_that_is_chosen_in_the_air_climbs_from_there(flying: Any) -> N
     before_mm = flying.truth.up_mm
     assert flying.long(22, -1, 0, 0, nan, nan, nan, AMSL + before_mm // 1_000 + 20) == [0]
     flying.wait(1)
-    flying.mode(Mode.LOITER)
+    flying.mode(FlightMode.LOITER)
     flying.wait(3)
     held_mm = flying.truth.up_mm
-    flying.mode(Mode.TAKEOFF)
-    flying.until(lambda: flying.truth.mode is Mode.LOITER)
+    flying.mode(FlightMode.TAKEOFF)
+    flying.until(lambda: flying.truth.mode is FlightMode.LOITER)
     flying.wait(3)
     assert abs(flying.truth.up_mm - held_mm - 2_500) < 200
 
@@ -154,26 +159,26 @@ def test_reposition_without_its_flag_is_not_known_and_flown_in_hold(flying: Any)
     assert flying.truth.north_mm == pytest.approx(20_000, abs=1_000)
 
 
-@pytest.mark.parametrize("mode", [Mode.LAND, Mode.RETURN, Mode.POSITION, Mode.TAKEOFF])
-def test_reposition_without_its_flag_changes_no_mode(flying: Any, mode: Mode) -> None:
+@pytest.mark.parametrize("mode", [FlightMode.LAND, FlightMode.RETURN, FlightMode.POSITION, FlightMode.TAKEOFF])
+def test_reposition_without_its_flag_changes_no_mode(flying: Any, mode: FlightMode) -> None:
     """`Loiter::on_active` alone looks at it, and for half a second at most."""
-    if mode is Mode.TAKEOFF:
+    if mode is FlightMode.TAKEOFF:
         flying.long(22, 0, 0, 0, nan, nan, nan, AMSL + 30)
     else:
         flying.mode(mode)
     assert unflagged(flying) == [3]
     flying.wait(1)
     assert flying.truth.mode is mode
-    flying.mode(Mode.LOITER)
+    flying.mode(FlightMode.LOITER)
     flying.wait(8)
     assert abs(flying.truth.north_mm) < 1_000
 
 
 def test_hold_within_half_a_second_flies_to_what_was_named_before(flying: Any) -> None:
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     unflagged(flying)
     flying.wait(0.3)
-    flying.mode(Mode.LOITER)
+    flying.mode(FlightMode.LOITER)
     flying.wait(8)
     assert flying.truth.north_mm == pytest.approx(20_000, abs=1_000)
 
@@ -182,10 +187,10 @@ def test_a_later_release_answers_a_reposition_without_its_flag_for_what_it_does(
     flying = pilot("px4", release=(1, 18)).ready()
     flying.take_off(10)
     assert unflagged(flying) == [0]
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     assert unflagged(flying) == [1]
     flying.wait(0.2)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
 
 
 @pytest.mark.parametrize("frame", [0, 3, 5, 6, 10])
@@ -227,14 +232,14 @@ def test_position_targets_fly_only_in_offboard(flying: Any) -> None:
         flying.target(latitude, longitude, 10)
         flying.wait(0.2)
     assert abs(flying.truth.north_mm - 30_000) < 300
-    assert flying.truth.mode is Mode.GUIDED
+    assert flying.truth.mode is FlightMode.GUIDED
     flying.wait(1.5)
-    assert flying.truth.mode is Mode.LOITER
+    assert flying.truth.mode is FlightMode.LOITER
 
 
 def test_set_mode_message_is_obeyed_and_never_acknowledged(flying: Any) -> None:
     assert all(f.name != "COMMAND_ACK" for f in flying.send(mavlink.MAVLink_set_mode_message(1, 1, LAND)))
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
 
 
 def test_no_texts_until_a_ground_station_was_seen(pilot: Callable[..., Any]) -> None:
@@ -258,7 +263,7 @@ def test_the_heartbeat_keeps_its_second_whatever_happens(flying: Any) -> None:
         if turn == 120:
             assert flying.long(511, 0, 100_000) == [4]
         if turn == 170:
-            flying.mode(Mode.LAND)
+            flying.mode(FlightMode.LAND)
         times += [flying.simulation.now_us for frame in flying.wait(0.02) if frame.name == "HEARTBEAT"]
     assert {after - before for before, after in pairwise(times)} == {1_000_000}
 
@@ -266,7 +271,7 @@ def test_the_heartbeat_keeps_its_second_whatever_happens(flying: Any) -> None:
 def test_asked_for_the_heartbeat_tells_the_new_mode_15_ms_late(flying: Any) -> None:
     """Recorded: Land was acknowledged at 2 ms, and a heartbeat that was asked for told of Hold at 7 ms."""
     asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 0, 0, 0, 0, 0, 0, 0)
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     for wait, mode in ((0.005, LOITER), (0.009, LOITER), (0.001, LAND)):
         flying.wait(wait)
         answers = flying.send(asked)
@@ -278,7 +283,7 @@ def test_a_land_that_is_taken_back_within_the_lag_hardly_shows(flying: Any) -> N
     """Recorded: by no heartbeat, no landed state and no target."""
     latitude, longitude = flying.config.home.globe(20, 0)
     flying.wait(0.001)
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     flying.wait(0.009)
     flying.int(192, 5, [-1, 1, 0, nan], latitude, longitude, AMSL + 10)
     told = flying.wait(5)
@@ -297,7 +302,7 @@ def test_the_current_mode_comes_slower_than_asked(px4: Any) -> None:
 
 def test_the_landed_state_tells_at_once_that_it_lands(flying: Any) -> None:
     assert flying.long(511, 245, 100_000) == [0]
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     states = [f.message.landed_state for f in flying.wait(1) if f.name == "EXTENDED_SYS_STATE"]
     assert (len(states), set(states)) == (10, {4})
 
@@ -306,7 +311,7 @@ def test_the_same_mode_again_does_not_stop_a_reposition(flying: Any) -> None:
     flying.go_to(150, 0, 10)
     flying.wait(5)
     north = flying.truth.north_mm
-    assert flying.mode(Mode.LOITER) == [0, 0]
+    assert flying.mode(FlightMode.LOITER) == [0, 0]
     flying.send(mavlink.MAVLink_set_mode_message(1, 1, LOITER))
     assert flying.long(17) == [0]
     flying.wait(9)
@@ -322,27 +327,30 @@ NOWHERE = (2**31 - 1, 2**31 - 1, nan)
 
 
 @pytest.mark.parametrize(
-    ("mode", "as_int"), each_once([Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.LAND, Mode.MISSION], [False, True])
+    ("mode", "as_int"),
+    each_once(
+        [FlightMode.LOITER, FlightMode.TAKEOFF, FlightMode.RETURN, FlightMode.LAND, FlightMode.MISSION], [False, True]
+    ),
 )
-def test_a_reposition_without_a_place_stops(flying: Any, mode: Mode, as_int: bool) -> None:
+def test_a_reposition_without_a_place_stops(flying: Any, mode: FlightMode, as_int: bool) -> None:
     def pause() -> list[int]:
         return flying.int(192, 0, [-1, 1, 0, nan], *NOWHERE) if as_int else flying.pause()
 
     home = flying.config.home
-    if mode is Mode.MISSION:
+    if mode is FlightMode.MISSION:
         upload(flying, [(16, 120, 0)])
         assert flying.long(300) == [0]
-    elif mode is Mode.TAKEOFF:
+    elif mode is FlightMode.TAKEOFF:
         assert flying.long(22, -1, 0, 0, nan, nan, nan, AMSL + 60) == [0]
     else:
         flying.go_to(120, 0, 10)
         flying.wait(8)
-        flying.mode(mode) if mode is not Mode.LOITER else None
-    flying.wait(6 if mode is Mode.MISSION else 2)
+        flying.mode(mode) if mode is not FlightMode.LOITER else None
+    flying.wait(6 if mode is FlightMode.MISSION else 2)
     before = flying.truth
     assert pause() == [0]
     target = targets(flying.wait(1))[0]
-    assert flying.truth.mode is Mode.LOITER
+    assert flying.truth.mode is FlightMode.LOITER
     flying.wait(9)
     assert flying.truth.speed_mm_s < 150
     assert abs(flying.truth.climb_mm_s) < 100
@@ -393,9 +401,9 @@ def test_the_target_is_told_in_every_mode_that_has_one(px4: Any) -> None:
     told = targets(px4.wait(5))
     assert len(told) == 50
     assert {(m.lat_int, m.lon_int, round(m.alt - amsl)) for m in told} == {(*home.globe(60, 30), 20)}
-    px4.mode(Mode.LAND)
+    px4.mode(FlightMode.LAND)
     assert {m.alt for m in targets(px4.wait(1))} == {0.0}
-    px4.mode(Mode.RETURN)
+    px4.mode(FlightMode.RETURN)
     here = (px4.truth.latitude, px4.truth.longitude)
     climb = targets(px4.wait(1))
     assert {round(m.alt - amsl) for m in climb} == {30}

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from pymavlink.dialects.v20 import development
 
-from rtshcua.model.faults import MessageSilence, Mode
+from rtshcua.model.faults import FlightMode, MessageSilence
 from rtshcua.simulation.simulated_mark import marked_speed
 from virtual import plans as p
 
@@ -35,8 +35,8 @@ def test_all_modes_and_one_by_one(pilot: Pilots, flavour: str) -> None:
     assert [m.mode_index for m in modes] == list(range(1, len(modes) + 1))
     assert {m.number_modes for m in modes} == {len(modes)}
     by_number = {m.custom_mode: m for m in modes}
-    assert by_number[table.numbers[Mode.MISSION]].standard_mode == 6
-    assert by_number[table.numbers[Mode.RETURN]].mode_name == table.name(Mode.RETURN)
+    assert by_number[table.numbers[FlightMode.MISSION]].standard_mode == 6
+    assert by_number[table.numbers[FlightMode.RETURN]].mode_name == table.name(FlightMode.RETURN)
     acks, modes = modes_asked(a, 2)
     assert (acks, [m.mode_index for m in modes]) == ([0], [2])
     refused = 2 if a.px4 else 4

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.config import Answers, Boot
 
 S = 1_000_000
@@ -48,7 +48,7 @@ def test_in_the_air_it_falls_silently(pilot: Callable[..., Any], flavour: str) -
 
 def test_it_begins_anew(pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour)
-    p.ready().mode(Mode.LAND)
+    p.ready().mode(FlightMode.LAND)
     p.wait(2)
     reboot(p)
     p.wait(1.6)
@@ -72,7 +72,7 @@ def test_it_comes_up_as_at_first_and_flies_again(pilot: Callable[..., Any], flav
     p = made(pilot, flavour)
     p.ready()
     reboot(p)
-    p.mode(Mode.GUIDED)
+    p.mode(FlightMode.GUIDED)
     assert not [f for f in p.seen if f.name == "COMMAND_ACK"], "nobody hears it"
     p.wait(1.6)
     if p.px4:

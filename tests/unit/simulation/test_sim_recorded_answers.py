@@ -11,23 +11,27 @@ import pytest
 from recorded import difference
 from recorded.replay import Replay
 from recorded.trace import SECOND, Heard, Trace
-from rtshcua.simulation.config import Boot, Kind, SimulationConfig
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
+from rtshcua.simulation.place import HomePosition
 
 LATE_US = 5 * SECOND // 2
 """So far apart in time may the same change be: heartbeats come once a second, and a landing takes long."""
 UP_M, AWAY_M = 2.0, 5.0
 
 COPTER = SimulationConfig(
-    Kind.ARDUPILOT,
-    home=Home(-353_632_621, 1_491_652_371, 584_080),
+    AutopilotKind.ARDUPILOT,
+    home=HomePosition(-353_632_621, 1_491_652_371, 584_080),
     cruise_mm_s=10_000,
     return_mm=15_000,
     noise=False,
     boot=Boot.RECORDED,
 )
 PX4 = SimulationConfig(
-    Kind.PX4, home=Home(473_977_432, 85_455_922, 487_889), cruise_mm_s=4_400, noise=False, boot=Boot.RECORDED
+    AutopilotKind.PX4,
+    home=HomePosition(473_977_432, 85_455_922, 487_889),
+    cruise_mm_s=4_400,
+    noise=False,
+    boot=Boot.RECORDED,
 )
 """It was set to 5 m/s, and came to that only at the end of long legs: its simulator's air is thick."""
 

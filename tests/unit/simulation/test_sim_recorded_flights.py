@@ -16,16 +16,16 @@ from recorded import difference
 from recorded.trace import SECOND, Heard, Trace
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
-from rtshcua.simulation.config import Boot, Kind, SimulationConfig
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
+from rtshcua.simulation.place import HomePosition
 from rtshcua.simulation.world import Simulation
 
 LATE_US = 5 * SECOND // 2
 UP_M, AWAY_M = 2.0, 5.0
 
 COPTER = SimulationConfig(
-    Kind.ARDUPILOT,
-    home=Home(-353_632_620, 1_491_652_370, 584_080),
+    AutopilotKind.ARDUPILOT,
+    home=HomePosition(-353_632_620, 1_491_652_370, 584_080),
     cruise_mm_s=10_000,
     return_mm=15_000,
     noise=False,
@@ -40,7 +40,11 @@ COPTER = SimulationConfig(
     ),
 )
 PX4 = SimulationConfig(
-    Kind.PX4, home=Home(473_977_440, 85_455_945, 488_140), cruise_mm_s=4_200, noise=False, boot=Boot.RECORDED
+    AutopilotKind.PX4,
+    home=HomePosition(473_977_440, 85_455_945, 488_140),
+    cruise_mm_s=4_200,
+    noise=False,
+    boot=Boot.RECORDED,
 )
 STREAMS = (1, 24, 33, 230, 193, 245)
 
@@ -49,11 +53,11 @@ def long(number: int, *params: float) -> Any:
     return mavlink.MAVLink_command_long_message(1, 1, number, 0, *params, *[0.0] * (7 - len(params)))
 
 
-def to(home: Home, north: float, east: float, amsl: float) -> Any:
+def to(home: HomePosition, north: float, east: float, amsl: float) -> Any:
     return mavlink.MAVLink_command_int_message(1, 1, 5, 192, 0, 0, -1, 1, 0, nan, *home.globe(north, east), amsl)
 
 
-def target(home: Home, north: float, east: float) -> Any:
+def target(home: HomePosition, north: float, east: float) -> Any:
     place = home.globe(north, east)
     return mavlink.MAVLink_set_position_target_global_int_message(0, 1, 1, 6, 0xDF8, *place, 15.0, *[0.0] * 8)
 

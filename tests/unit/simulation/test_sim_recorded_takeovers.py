@@ -18,8 +18,8 @@ from recorded.flight import LEAD_US, Flight
 from recorded.trace import SECOND, Heard, Trace
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
-from rtshcua.simulation.config import Kind, SimulationConfig
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
+from rtshcua.simulation.place import HomePosition
 
 LATE_US = 5 * SECOND // 2
 UP_M, AWAY_M = 2.3, 5.0
@@ -89,8 +89,8 @@ def again(name: str) -> Flight:
     home = next(h.message for h in trace.heard if h.name == "HOME_POSITION")
     speed = REACHED_MM_S.get(name, 9_400)
     config = SimulationConfig(
-        Kind.PX4 if name.startswith("px4") else Kind.ARDUPILOT,
-        home=Home(home.latitude, home.longitude, home.altitude),
+        AutopilotKind.PX4 if name.startswith("px4") else AutopilotKind.ARDUPILOT,
+        home=HomePosition(home.latitude, home.longitude, home.altitude),
         cruise_mm_s=speed,
         max_speed_mm_s=speed,
         noise=False,
@@ -126,7 +126,7 @@ def test_it_does_what_the_real_one_did(name: str) -> None:
     assert set(kept) == {d.key for d in differences}, "these differ no more"
 
 
-def moved_m(home: Home, heard: list[Heard], from_s: float, to_s: float) -> float:
+def moved_m(home: HomePosition, heard: list[Heard], from_s: float, to_s: float) -> float:
     """How far it is from where it was at one time to where it was at another."""
     places = [
         home.local(h.message.lat, h.message.lon)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from virtual.rows import rows
 
 
@@ -44,7 +44,7 @@ def test_the_height_of_the_way_home(
     made.take_off(up)
     made.go_to(away, 0, up)
     made.wait(25)
-    made.mode(Mode.RETURN)
+    made.mode(FlightMode.RETURN)
     highest = 0
     while made.truth.north_mm > 500 * away:
         made.wait(0.2)

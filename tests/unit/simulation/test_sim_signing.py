@@ -7,8 +7,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from recorded.trace import Trace
-from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State
-from rtshcua.model.faults import Mode
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, SigningState
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.config import SimulationConfig
 
 Pilots = Callable[..., Any]
@@ -22,7 +22,9 @@ class Signer:
 
     def __init__(self, pilot: Any, key: bytes = KEY, timestamp: int = START) -> None:
         self.pilot = pilot
-        self.link = SignedLink(key, State(timestamp + ahead(pilot), {}), EPOCH_US, pilot.simulation.now_us, link=1)
+        self.link = SignedLink(
+            key, SigningState(timestamp + ahead(pilot), {}), EPOCH_US, pilot.simulation.now_us, link=1
+        )
 
     def frame(self, message: Any) -> bytes:
         return self.link.sign(self.pilot.codec.pack(message), self.pilot.simulation.now_us)
@@ -89,7 +91,7 @@ def test_as_recorded_on_the_first_channel(pilot: Pilots) -> None:
     a = pilot("ardupilot", usb=True).ready()
     keyed(a)
     assert a.long(512, 148) == [0]
-    assert a.mode(Mode.GUIDED) == [0]
+    assert a.mode(FlightMode.GUIDED) == [0]
     assert a.arm() == [0]
 
 
@@ -102,7 +104,7 @@ def test_what_it_sends_is_signed_and_rises(pilot: Pilots, flavour: str) -> None:
     a = signing(pilot, flavour)
     keyed(a)
     seen = [f for f in a.wait(5) if f.component == 1]
-    ground = SignedLink(KEY, State(START, {}), EPOCH_US, 0)
+    ground = SignedLink(KEY, SigningState(START, {}), EPOCH_US, 0)
     assert len(seen) > 4
     assert all(f.signed for f in seen)
     assert all(ground.accept(f.frame, 0) for f in seen)

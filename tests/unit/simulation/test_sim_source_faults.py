@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Taker
 
 S = 1_000_000
@@ -59,7 +59,7 @@ def test_a_receiver_without_a_fix_does_not_stray(flying: Any) -> None:
 
 def test_an_estimator_that_is_not_healthy_says_so_and_goes_on(flying: Any) -> None:
     if not flying.px4:
-        flying.mode(Mode.LOITER)
+        flying.mode(FlightMode.LOITER)
     inject(flying, faults.EstimatorUnhealthy)
     flying.wait(0.5)
     flags = estimator(flying).flags
@@ -68,14 +68,14 @@ def test_an_estimator_that_is_not_healthy_says_so_and_goes_on(flying: Any) -> No
     assert flying.last("SYS_STATUS").onboard_control_sensors_present & AHRS
     assert flying.last("GPS_RAW_INT").fix_type >= 3
     stamp = flying.last("GLOBAL_POSITION_INT").time_boot_ms
-    assert (flying.truth.mode is Mode.LAND) is flying.px4, "ArduCopter waits for a second"
+    assert (flying.truth.mode is FlightMode.LAND) is flying.px4, "ArduCopter waits for a second"
     flying.wait(0.7)
     assert flying.last("GLOBAL_POSITION_INT").time_boot_ms - stamp >= 500, "it goes on"
     truth = flying.truth
-    assert (truth.mode, truth.taken_over_by) == (Mode.LAND, Taker.FAILSAFE)
+    assert (truth.mode, truth.taken_over_by) == (FlightMode.LAND, Taker.FAILSAFE)
     text = "Failsafe: no global position, landing blindly\t" if flying.px4 else "EKF Failsafe: changed to LAND Mode"
     assert text in flying.texts()
-    assert flying.mode(Mode.LOITER)[-1] != 0
+    assert flying.mode(FlightMode.LOITER)[-1] != 0
 
 
 def test_an_estimator_that_recovers_in_time_is_trusted_again(pilot: Callable[..., Any]) -> None:
@@ -88,7 +88,7 @@ def test_an_estimator_that_recovers_in_time_is_trusted_again(pilot: Callable[...
     p.wait(3)
     assert estimator(p).flags == 0x33F
     assert p.last("SYS_STATUS").onboard_control_sensors_health & AHRS
-    assert (p.truth.mode, p.truth.taken_over_us) == (Mode.GUIDED, None)
+    assert (p.truth.mode, p.truth.taken_over_us) == (FlightMode.GUIDED, None)
     p.until(lambda: abs(p.truth.north_mm - 100_000) < 1_500, 60)
 
 
@@ -105,7 +105,7 @@ def test_a_cell_that_fails_takes_voltage_and_more_of_it_under_load(flying: Any) 
     assert 1_200 + 100 < before - volts() < 1_200 + 250, "half as much again of what hovering takes off"
     assert abs(flying.last("BATTERY_STATUS").battery_remaining - percent) <= 1
     hovering = volts()
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     flying.until(lambda: not flying.truth.armed)
     flying.wait(0.5)
     assert volts() - hovering > 350, "without load it comes back, more than a sound one does"
@@ -118,9 +118,9 @@ def test_copters_voltage_failsafe_sees_a_failed_cell_and_px4_does_not(pilot: Cal
     p.take_off(20)
     inject(p, faults.BatteryCell, 6_000)
     p.wait(9)
-    assert p.truth.mode is not Mode.RETURN
+    assert p.truth.mode is not FlightMode.RETURN
     p.wait(3)
-    assert (p.truth.mode is Mode.RETURN) is not p.px4
+    assert (p.truth.mode is FlightMode.RETURN) is not p.px4
     assert (p.truth.taken_over_by is Taker.FAILSAFE) is not p.px4
 
 
@@ -183,9 +183,9 @@ def test_a_mode_may_stick(flying: Any) -> None:
     inject(flying, faults.MessageStuck, "HEARTBEAT")
     flying.wait(0.1)
     told = flying.last("HEARTBEAT").custom_mode
-    flying.mode(Mode.LAND)
+    flying.mode(FlightMode.LAND)
     flying.wait(3)
-    assert flying.truth.mode is Mode.LAND
+    assert flying.truth.mode is FlightMode.LAND
     assert flying.last("HEARTBEAT").custom_mode == told
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from virtual.rows import rows
 
 
@@ -11,7 +11,7 @@ def ascent(made: Any) -> float:
     """How fast it climbs at a take-off."""
     made.ready()
     if not made.px4:
-        made.mode(Mode.GUIDED)
+        made.mode(FlightMode.GUIDED)
     made.arm()
     made.long(22, -1, 0, 0, 0, 0, 0, 40 + made.px4 * made.config.home.amsl_mm / 1_000)
     made.until(lambda: made.truth.up_mm > 10_000)
@@ -24,7 +24,7 @@ def home(made: Any) -> float:
     made.go_to(80, 0, 30)
     made.until(lambda: made.truth.north_mm > 79_000)
     made.wait(5)
-    made.mode(Mode.RETURN)
+    made.mode(FlightMode.RETURN)
     made.until(lambda: made.truth.north_mm < 40_000)
     return float(made.truth.speed_mm_s)
 
@@ -40,7 +40,7 @@ def gained(made: Any) -> float:
 def landing(made: Any) -> float:
     """How fast it comes down at 15 m."""
     made.take_off(20)
-    made.mode(Mode.LAND)
+    made.mode(FlightMode.LAND)
     made.until(lambda: made.truth.up_mm < 15_000)
     return -float(made.truth.climb_mm_s)
 

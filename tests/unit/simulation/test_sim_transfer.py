@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.simulation.plans import from_message
 from rtshcua.simulation.world import Simulation
 from virtual import plans as p
@@ -233,8 +233,11 @@ _MESSAGES = st.one_of(
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.sampled_from(list(Kind)), st.lists(st.tuples(_MESSAGES, st.sampled_from([0, 20_000, 400_000])), max_size=20))
-def test_no_order_of_messages_stops_it(kind: Kind, script: list[tuple[Any, int]]) -> None:
+@given(
+    st.sampled_from(list(AutopilotKind)),
+    st.lists(st.tuples(_MESSAGES, st.sampled_from([0, 20_000, 400_000])), max_size=20),
+)
+def test_no_order_of_messages_stops_it(kind: AutopilotKind, script: list[tuple[Any, int]]) -> None:
     simulation, codec = Simulation(SimulationConfig(flavour=kind)), Codec(255, 190)
     simulation.advance(1_500_000)
     for message, pause in script:

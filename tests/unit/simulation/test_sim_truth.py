@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Taker
 from rtshcua.simulation.surroundings import Wind
 
@@ -32,7 +32,7 @@ def taken(p: Any, kind: Callable[..., faults.Fault], *args: Any) -> tuple[int | 
 @pytest.mark.parametrize(
     ("kind", "args"),
     [
-        (faults.PilotMode, (Mode.LAND,)),
+        (faults.PilotMode, (FlightMode.LAND,)),
         (faults.PilotPause, ()),
         (faults.PilotGoto, (0, 90_000, 20_000)),
         (faults.Kill, ()),
@@ -49,15 +49,15 @@ def test_a_pilot_takes_it_over(
 
 def test_a_pilot_without_effect_does_not(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
-    kind, args = (faults.PilotMode, (Mode.LOITER,)) if p.px4 else (faults.PilotSticks, (S,))
+    kind, args = (faults.PilotMode, (FlightMode.LOITER,)) if p.px4 else (faults.PilotSticks, (S,))
     assert taken(p, kind, *args) == (None, None)
 
 
 def test_a_switch_to_a_mode_that_cannot_fly_now_is_refused(pilot: Callable[..., Any]) -> None:
     """PX4's `UserModeIntention::change`: Offboard without targets was entered for a moment, and Hold anew."""
     p = on_its_way(pilot, "px4")
-    assert taken(p, faults.PilotMode, Mode.GUIDED) == (None, None)
-    assert p.truth.mode is Mode.LOITER
+    assert taken(p, faults.PilotMode, FlightMode.GUIDED) == (None, None)
+    assert p.truth.mode is FlightMode.LOITER
 
 
 def test_a_switch_to_position_without_one_gets_altitude_from_px4_alone(pilot: Callable[..., Any], flavour: str) -> None:
@@ -65,9 +65,9 @@ def test_a_switch_to_position_without_one_gets_altitude_from_px4_alone(pilot: Ca
     p.simulation.inject(faults.EstimatorUnhealthy(p.simulation.now_us))
     p.wait(2)
     before = p.truth.mode
-    p.simulation.inject(faults.PilotMode(p.simulation.now_us, Mode.POSITION))
+    p.simulation.inject(faults.PilotMode(p.simulation.now_us, FlightMode.POSITION))
     p.wait(0.1)
-    assert p.truth.mode is (Mode.ALTITUDE if p.px4 else before)
+    assert p.truth.mode is (FlightMode.ALTITUDE if p.px4 else before)
 
 
 def test_sticks_take_px4_over(pilot: Callable[..., Any]) -> None:
@@ -76,12 +76,12 @@ def test_sticks_take_px4_over(pilot: Callable[..., Any]) -> None:
 
 def test_on_the_ground_there_is_nothing_to_take_over(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour).ready()
-    assert taken(p, faults.PilotMode, Mode.ALTITUDE) == (None, None)
+    assert taken(p, faults.PilotMode, FlightMode.ALTITUDE) == (None, None)
 
 
 def test_our_own_commands_take_nothing_over(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
-    p.mode(Mode.LAND)
+    p.mode(FlightMode.LAND)
     p.until(lambda: not p.truth.armed)
     assert p.truth.taken_over_us is None
 
@@ -90,14 +90,14 @@ def test_failsafes_take_it_over_and_the_first_counts(pilot: Callable[..., Any], 
     p = on_its_way(pilot, flavour)
     first = taken(p, faults.BatteryLevel, 300)
     assert first[1] is Taker.FAILSAFE
-    assert taken(p, faults.PilotMode, Mode.ALTITUDE) == first
+    assert taken(p, faults.PilotMode, FlightMode.ALTITUDE) == first
 
 
 def test_a_breached_fence_takes_it_over(pilot: Callable[..., Any]) -> None:
     p = on_its_way(pilot, "ardupilot")
     for name, value in ((b"FENCE_RADIUS", 30), (b"FENCE_ENABLE", 1)):
         p.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
-    p.until(lambda: p.truth.mode is Mode.RETURN, 30)
+    p.until(lambda: p.truth.mode is FlightMode.RETURN, 30)
     assert p.truth.taken_over_by is Taker.FAILSAFE
 
 
@@ -119,7 +119,7 @@ def test_whoever_wants_to_know_hears_each_frame_that_comes(pilot: Callable[..., 
     p.long(511, 33, 100_000, system=9)
     assert heard == [(now_us, p.sent[-2]), (now_us, p.sent[-1])], "those for others as well"
     p.simulation.receive(b"no frame", now_us)
-    p.simulation.inject(faults.LinkDelay(now_us, 300_000, None, faults.Way.UP))
+    p.simulation.inject(faults.LinkDelay(now_us, 300_000, None, faults.Direction.UP))
     p.wait(0.1)
     p.long(512, 0)
     p.wait(0.28)

@@ -9,15 +9,18 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
-from rtshcua.simulation.config import Boot, Kind, SimulationConfig
+from rtshcua.model.faults import FlightMode
+from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
 from rtshcua.simulation.kinematics import MAX_FALL
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 
 S = 1_000_000
 COMMANDS = (20, 21, 22, 22, 34, 115, 176, 176, 178, 186, 192, 193, 300, 400, 400, 400)
-MODES = {Kind.PX4: [(4, sub) for sub in range(2, 7)] + [(3, 0), (6, 0)], Kind.ARDUPILOT: [(n, 0) for n in range(18)]}
+MODES = {
+    AutopilotKind.PX4: [(4, sub) for sub in range(2, 7)] + [(3, 0), (6, 0)],
+    AutopilotKind.ARDUPILOT: [(n, 0) for n in range(18)],
+}
 
 
 def some_fault(chance: Random, at_us: int) -> Any:
@@ -35,14 +38,14 @@ def some_fault(chance: Random, at_us: int) -> Any:
             faults.LinkLoss(at_us, chance.randrange(0, 9_000)),
             faults.Obstacle(at_us, chance.randrange(0, 50_000), for_us),
             faults.Pillar(at_us, *metres, chance.randrange(100, 5_000), chance.randrange(1_000, 60_000), for_us),
-            faults.PilotMode(at_us, chance.choice(list(Mode))),
+            faults.PilotMode(at_us, chance.choice(list(FlightMode))),
             faults.PilotPause(at_us),
             faults.PilotGoto(at_us, *metres, chance.randrange(0, 60_000)),
             faults.PilotSticks(at_us),
             faults.Kill(at_us),
-            faults.LinkJitter(at_us, chance.randrange(1, S), for_us, chance.choice(list(faults.Way))),
+            faults.LinkJitter(at_us, chance.randrange(1, S), for_us, chance.choice(list(faults.Direction))),
             faults.LinkReorder(at_us, chance.randrange(1, 5_000), for_us),
-            faults.LinkSilence(at_us, for_us, chance.choice(list(faults.Way)), chance.choice([True, False])),
+            faults.LinkSilence(at_us, for_us, chance.choice(list(faults.Direction)), chance.choice([True, False])),
             faults.Stall(at_us, chance.randrange(1, 8) * S, chance.randrange(3)),
             faults.Freeze(at_us, for_us),
             faults.MessageSilence(at_us, "GLOBAL_POSITION_INT", for_us),
@@ -57,7 +60,9 @@ def some_command(chance: Random, config: SimulationConfig) -> Any:
     if number == 176:
         params[:3] = [1, *chance.choice(MODES[config.flavour])]
     elif number in (22, 186):
-        params[0 if number == 186 else 6] = config.home.amsl_mm / 1000 + 20 if config.flavour is Kind.PX4 else 20
+        params[0 if number == 186 else 6] = (
+            config.home.amsl_mm / 1000 + 20 if config.flavour is AutopilotKind.PX4 else 20
+        )
     elif number == 192:
         altitude = config.home.amsl_mm / 1000 + chance.uniform(-10, 80)
         return mavlink.MAVLink_command_int_message(1, 1, 5, 192, 0, 0, -1, 1, 0, 0, *place, altitude)
@@ -71,7 +76,7 @@ def some_command(chance: Random, config: SimulationConfig) -> Any:
 def fly(seed: int) -> None:
     chance = Random(seed)
     config = SimulationConfig(
-        flavour=chance.choice(list(Kind)),
+        flavour=chance.choice(list(AutopilotKind)),
         seed=seed,
         wind=Wind(chance.randrange(0, 12_000), chance.randrange(360), chance.randrange(0, 2_000)),
         boot=chance.choice([Boot.FAST, Boot.FAST, Boot.FAST, Boot.RECORDED]),

@@ -12,9 +12,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
-from rtshcua.model.faults import Mode
-from rtshcua.simulation.config import HOME, Kind, SimulationConfig
-from rtshcua.simulation.place import Home
+from rtshcua.model.faults import FlightMode
+from rtshcua.simulation.config import HOME, AutopilotKind, SimulationConfig
+from rtshcua.simulation.place import HomePosition
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 from virtual.rows import rows
@@ -22,7 +22,7 @@ from virtual.rows import rows
 S = 1_000_000
 
 
-def flight(kind: Kind, seed: int, steps_us: list[int]) -> tuple[list[bytes], Any]:
+def flight(kind: AutopilotKind, seed: int, steps_us: list[int]) -> tuple[list[bytes], Any]:
     """Twenty seconds, advanced in the steps given, with two commands at fixed times."""
     simulation = Simulation(
         SimulationConfig(flavour=kind, seed=seed, wind=Wind(5_000, 10, 1_000), faults=(faults.LinkLoss(4 * S, 500),))
@@ -49,14 +49,14 @@ def flight(kind: Kind, seed: int, steps_us: list[int]) -> tuple[list[bytes], Any
     return frames, simulation.truth()
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_same_seed_same_bytes_however_time_is_cut(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", list(AutopilotKind))
+def test_same_seed_same_bytes_however_time_is_cut(kind: AutopilotKind) -> None:
     reference = flight(kind, 1, [S])
     assert flight(kind, 1, [S]) == reference
     assert flight(kind, 1, [20_000]) == reference
     assert flight(kind, 1, [7_001, 333, 190_000]) == reference
     assert reference[1].in_air
-    if kind is Kind.PX4:
+    if kind is AutopilotKind.PX4:
         assert flight(kind, 2, [S])[0] != reference[0]
 
 
@@ -67,8 +67,8 @@ def test_time_does_not_go_back() -> None:
     assert simulation.now_us == S
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_first_heartbeat_comes_at_once_then_each_second(pilot: Callable[..., Any], kind: Kind) -> None:
+@pytest.mark.parametrize("kind", list(AutopilotKind))
+def test_first_heartbeat_comes_at_once_then_each_second(pilot: Callable[..., Any], kind: AutopilotKind) -> None:
     p = pilot(kind.value)
     times = []
     for _ in range(500):
@@ -199,7 +199,7 @@ def frame_of(number: int, kind: Any, payload: bytes) -> bytes:
 
 @settings(max_examples=settings().max_examples // 5)
 @given(
-    st.sampled_from(list(Kind)),
+    st.sampled_from(list(AutopilotKind)),
     st.lists(
         st.tuples(
             st.sampled_from([20, 21, 22, 400, 192, 17]),
@@ -212,13 +212,13 @@ def frame_of(number: int, kind: Any, payload: bytes) -> bytes:
     st.integers(0, 15_000),
 )
 def test_whatever_it_is_told_it_stays_within_bounds_and_uses_energy(
-    kind: Kind, orders: list[tuple[int, int, int, int]], wind: int
+    kind: AutopilotKind, orders: list[tuple[int, int, int, int]], wind: int
 ) -> None:
     simulation = Simulation(SimulationConfig(flavour=kind, wind=Wind(wind, 77, wind // 10)))
     codec = Codec(255, 190)
     simulation.advance(2 * S)
     last = simulation.truth()
-    px4 = kind is Kind.PX4
+    px4 = kind is AutopilotKind.PX4
     start = [(176, 0, 0, 0), (400, 0, 0, 0), (22, 0, 0, 20)]
     for command, north, east, up in [*start, *orders]:
         latitude, longitude = HOME.globe(north, east)
@@ -252,7 +252,7 @@ def test_whatever_it_is_told_it_stays_within_bounds_and_uses_energy(
         {"hover_us": 0},
         {"cruise_mm_s": 13_000},
         {"max_speed_mm_s": 20_000},
-        {"home": Home(900_000_000, 0, 0)},
+        {"home": HomePosition(900_000_000, 0, 0)},
     ],
 )
 def test_impossible_configurations(bad: dict[str, Any]) -> None:
@@ -267,7 +267,7 @@ def test_impossible_configurations(bad: dict[str, Any]) -> None:
     st.floats(-3000, 3000),
 )
 def test_places_go_there_and_back(latitude: int, longitude: int, north: float, east: float) -> None:
-    home = Home(latitude, longitude, 0)
+    home = HomePosition(latitude, longitude, 0)
     back = home.local(*home.globe(north, east))
     assert abs(back[0] - north) < 0.02
     assert abs(back[1] - east) < 0.02
@@ -279,4 +279,4 @@ def test_every_mode_has_a_name_and_a_base_in_both_flavours(pilot: Callable[..., 
     assert set(table.numbers) <= set(table.base)
     assert len(set(table.numbers.values())) == len(table.numbers)
     assert all(table.mode(number) is mode for mode, number in table.numbers.items())
-    assert Mode.RETURN in table.numbers
+    assert FlightMode.RETURN in table.numbers

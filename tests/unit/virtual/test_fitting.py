@@ -7,7 +7,7 @@ from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
-from rtshcua.simulation.config import Kind
+from rtshcua.simulation.config import AutopilotKind
 from rtshcua.virtual.fitting import fitting, with_room
 
 
@@ -22,7 +22,7 @@ def standard() -> tuple[Policy, Mission]:
 
 def test_a_fence_of_its_own_is_as_wide_and_high_as_the_mission_goes() -> None:
     policy, mission = standard()
-    copter = fitting(policy, flavour=Kind.ARDUPILOT)
+    copter = fitting(policy, flavour=AutopilotKind.ARDUPILOT)
     assert with_room(copter, policy, mission.invocations) == copter
     step = mission.invocations[1]
     far = replace(step, plan=replace(step.plan, path=(300_000, 400_000), altitude=120_000))

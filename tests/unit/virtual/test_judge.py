@@ -11,7 +11,7 @@ from msgspec.structs import replace as with_fields
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.model import faults
-from rtshcua.model.faults import Fault, Mode
+from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import AREA, Zone, unproject
 from rtshcua.model.scenario import Start
@@ -45,7 +45,7 @@ def sample(at_s: float, east_m: float = 0, north_m: float = 0, up_m: float = 10,
         True,
         True,
         False,
-        Mode.GUIDED,
+        FlightMode.GUIDED,
         9_000,
         None,
         None,
@@ -216,10 +216,10 @@ def test_a_landing_of_arducopter_that_began_without_a_position_stays_without(
     good: ScenarioFlown, fault: Fault, flavour: str, from_s: int, cause: str | None
 ) -> None:
     """It is carried off by the wind long after the receiver is right again (`ModeLand::init`)."""
-    modes = [(at_s, Mode.LAND if at_s >= from_s else Mode.BRAKE) for at_s in range(18, 29)]
+    modes = [(at_s, FlightMode.LAND if at_s >= from_s else FlightMode.BRAKE) for at_s in range(18, 29)]
     samples = [
         *(sample(at_s, mode=mode) for at_s, mode in modes),
-        sample(29, 508, mode=Mode.LAND if from_s < 30 else Mode.BRAKE),
+        sample(29, 508, mode=FlightMode.LAND if from_s < 30 else FlightMode.BRAKE),
         sample(30, 480),
     ]
     found = judged(good, samples, fault, flavour=flavour)
@@ -418,9 +418,9 @@ def test_a_takeover_by_the_mode_that_a_lost_frame_asked_for(good: ScenarioFlown)
     land, hold = long(176, 1, 9), long(176, 1, 17)
     since_us, again_us = 30 * S, 33 * S
 
-    def sent_again(before: Frame, *modes: tuple[float, Mode], heard_us: int | None = None) -> Judgement:
+    def sent_again(before: Frame, *modes: tuple[float, FlightMode], heard_us: int | None = None) -> Judgement:
         samples = [
-            sample(at_us / S, mode=next((mode for to_s, mode in modes if at_us < to_s * S), Mode.LAND))._replace(
+            sample(at_us / S, mode=next((mode for to_s, mode in modes if at_us < to_s * S), FlightMode.LAND))._replace(
                 taken_over_us=since_us if at_us >= since_us else None, taken_over_by="failsafe"
             )
             for at_us in range(0, 40 * S, S // 10)
@@ -434,8 +434,8 @@ def test_a_takeover_by_the_mode_that_a_lost_frame_asked_for(good: ScenarioFlown)
     assert taken(sent_again(lost)) == [("motion-after-takeover", "unseen")]
     assert "motion-after-takeover" in slugs(sent_again(Frame(20 * S, 20 * S, land)))
     assert "motion-after-takeover" in slugs(sent_again(Frame(20 * S, None, hold)))
-    assert "motion-after-takeover" in slugs(sent_again(lost, (60, Mode.POSITION)))
-    assert "motion-after-takeover" in slugs(sent_again(lost, (31, Mode.LAND), (60, Mode.POSITION)))
+    assert "motion-after-takeover" in slugs(sent_again(lost, (60, FlightMode.POSITION)))
+    assert "motion-after-takeover" in slugs(sent_again(lost, (31, FlightMode.LAND), (60, FlightMode.POSITION)))
 
 
 def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
@@ -443,7 +443,7 @@ def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
 
     def paused(flavour: str, up_m: float, *others: Fault, frames: tuple[Frame, ...] = (frame,)) -> Judgement:
         since_us = frame.sent_us - 5 * S
-        before = sample(since_us / S, up_m=up_m, mode=Mode.TAKEOFF)
+        before = sample(since_us / S, up_m=up_m, mode=FlightMode.TAKEOFF)
         after = [each for each in good.samples if each.at_us > since_us]
         samples = [before, *(each._replace(taken_over_us=since_us, taken_over_by="pilot") for each in after)]
         happened = (faults.PilotPause(since_us), *others)
@@ -478,7 +478,7 @@ def test_what_does_not_show_in_arducopters_takeoff(
     after = [each for each in good.samples if each.at_us > since_us]
     samples = [
         sample(0),
-        sample(since_us / S, up_m=2, mode=Mode.GUIDED),
+        sample(since_us / S, up_m=2, mode=FlightMode.GUIDED),
         *(each._replace(taken_over_us=since_us, taken_over_by="pilot") for each in after),
     ]
     found = judged(good, samples, replace(fault, at_us=since_us), frames=(frame,), flavour="ardupilot")
@@ -491,8 +491,8 @@ def test_a_pause_of_what_stops_already(good: ScenarioFlown, climb_mm_s: int, cau
     frame = motion(good)[-1]
     since_us = frame.sent_us - 5 * S
     stop = Frame(since_us - S // 10, since_us - S // 10, reposition(0x7FFFFFFF, 0x7FFFFFFF))
-    told = sample(stop.sent_us / S, up_m=2, mode=Mode.TAKEOFF, climb_mm_s=700)
-    paused = sample(since_us / S, up_m=2, mode=Mode.LOITER, climb_mm_s=climb_mm_s)
+    told = sample(stop.sent_us / S, up_m=2, mode=FlightMode.TAKEOFF, climb_mm_s=700)
+    paused = sample(since_us / S, up_m=2, mode=FlightMode.LOITER, climb_mm_s=climb_mm_s)
     after = [each for each in good.samples if each.at_us > since_us]
     samples = [told, *(each._replace(taken_over_us=since_us, taken_over_by="pilot") for each in (paused, *after))]
     found = judged(good, samples, faults.PilotPause(since_us), frames=(stop, frame), flavour="px4")

@@ -452,7 +452,7 @@ def test_motors_that_stop_on_the_way_down_are_no_landing(flavour: str, at_s: flo
     found = flown(scenario(incident(at_s, faults.Kill(0))), flavour, bundle=shipped("short"))
     before = next(each for each in found.samples if each.at_us >= round(at_s * S) - 50_000)
     assert before.up_mm > 3 * M
-    assert before.mode is faults.Mode.RETURN
+    assert before.mode is faults.FlightMode.RETURN
     assert found.ending == "crashed"
     assert judge(found).failures == ()
 

@@ -6,7 +6,7 @@ import pytest
 
 from reference.world import ROOT, VEHICLE
 from rtshcua.onboard.enforcement import isolated as calls
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Ending
 from rtshcua.virtual.served import Served
 from virtual.flight import Flight
@@ -20,7 +20,7 @@ FLAVOURS = ("px4", "ardupilot")
 def test_a_flight_by_calls_is_the_one_without(flavour: str) -> None:
     one, other = (
         Flight(shipped("short"), simulated(flavour), attested=True, mode=mode).fly()
-        for mode in (Mode.SOFTWARE, Mode.PROCESS)
+        for mode in (EnforcementMode.SOFTWARE, EnforcementMode.PROCESS)
     )
     assert one.ending is other.ending is Ending.COMPLETED
     apart = {

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire import artefact, cose, names
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.keys import Duty, SigningKey, WrongDuty
 from rtshcua.wire.statement import MAX_STATEMENT, Statement, claimed, open_statement, sign
 from rtshcua.wire.untrusted import Untrusted
@@ -16,7 +16,7 @@ KEY = SigningKey.from_seed(b"b" * 32, duty=Duty.BOUNDARY)
 KEYS = {KEY.kid: KEY.verification()}
 SAID = Statement(
     b"f" * 16, 1, bytes(32), 2, b"d" * 32, b"m" * 16, 3, b"l" * 32, 4, 5, 6, 7, b"a" * 32,
-    Source.KERNEL, 8, 9, 10, final=False,
+    ClockSource.KERNEL, 8, 9, 10, final=False,
 )  # fmt: skip
 
 

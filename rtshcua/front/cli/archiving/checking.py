@@ -23,16 +23,16 @@ from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.wire.untrusted import Untrusted
 
 if TYPE_CHECKING:
-    from rtshcua.adapters.archive.adding import Check, Done
-    from rtshcua.adapters.archive.examine import Workers
-    from rtshcua.adapters.archive.folder import Folder
+    from rtshcua.adapters.archive.adding import Done, VerificationOptions
+    from rtshcua.adapters.archive.examine import LogVerifiers
+    from rtshcua.adapters.archive.folder import ArchiveFolder
 
 _TOLD = 20  # logs that are told of one by one
 
 
 def checked(
     where: Path,
-    work: "Callable[[Folder, Check], Iterator[Done]]",
+    work: "Callable[[ArchiveFolder, VerificationOptions], Iterator[Done]]",
     *,
     make: bool,
     skipped: list[Skipped],
@@ -43,19 +43,19 @@ def checked(
     as_json: bool,
 ) -> ExitCode:
     """Does `work` on an archive, and tells what came of it."""
-    from rtshcua.adapters.archive.adding import Check
+    from rtshcua.adapters.archive.adding import VerificationOptions
     from rtshcua.adapters.archive.entry import AUDIT, RECORDS
-    from rtshcua.adapters.archive.folder import Folder
+    from rtshcua.adapters.archive.folder import ArchiveFolder
 
     try:
         pinned = pin(root)
     except Untrusted as error:
         return distrust(error, "`--root` takes the trust root of whoever flew, or its public key")
-    folder = Folder(where, make=make)
+    folder = ArchiveFolder(where, make=make)
     done: list[Done] = []
     try:
         with closing(_workers(jobs, cluster)) as workers:
-            check = Check(pinned.key, AUDIT if audit else RECORDS, time.time_ns() // 1000, workers)
+            check = VerificationOptions(pinned.key, AUDIT if audit else RECORDS, time.time_ns() // 1000, workers)
             for each in work(folder, check):
                 done.append(each)
                 _progress(len(done))
@@ -72,14 +72,14 @@ def checked(
     return _told(folder, done, skipped, pinned, check.root, as_json=as_json)
 
 
-def _workers(jobs: int | None, cluster: str | None) -> "Workers":
+def _workers(jobs: int | None, cluster: str | None) -> "LogVerifiers":
     if cluster is not None:
-        from rtshcua.adapters.archive.cluster import Cluster
+        from rtshcua.adapters.archive.cluster import SchedulerWorkers
 
-        return Cluster(cluster)
-    from rtshcua.adapters.archive.examine import Processes
+        return SchedulerWorkers(cluster)
+    from rtshcua.adapters.archive.examine import VerifierProcesses
 
-    return Processes(jobs)
+    return VerifierProcesses(jobs)
 
 
 def _progress(count: int) -> None:
@@ -89,11 +89,11 @@ def _progress(count: int) -> None:
 
 
 def _told(
-    folder: "Folder", done: "list[Done]", skipped: list[Skipped], pinned: Pin, root: str, *, as_json: bool
+    folder: "ArchiveFolder", done: "list[Done]", skipped: list[Skipped], pinned: Pin, root: str, *, as_json: bool
 ) -> ExitCode:
-    from rtshcua.adapters.archive.asking import Asker, canned
+    from rtshcua.adapters.archive.asking import ArchiveReader, canned
 
-    asker = Asker(folder)
+    asker = ArchiveReader(folder)
     try:
         missing = asker.ask(canned()["missing"].sql)
         conflicts = asker.ask(canned()["conflicts"].sql)

@@ -5,7 +5,7 @@ from datetime import date
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from rtshcua.adapters.archive.folder import Source
+from rtshcua.adapters.archive.folder import LogSource
 from rtshcua.adapters.store.logs import begins_as_log
 from rtshcua.adapters.store.runs import LOG, logs_of
 from rtshcua.app.documents import no_log
@@ -28,7 +28,7 @@ class Skipped(NamedTuple):
 class Given(NamedTuple):
     """The logs of a command line, and what is no log in the folders that it names."""
 
-    logs: list[Source]
+    logs: list[LogSource]
     skipped: list[Skipped]
 
 
@@ -51,7 +51,7 @@ def logs_in(given: Iterable[Path]) -> Given | ExitCode:
                     raise
                 wrong = (error.strerror or str(error)).lower()
             if wrong is None:
-                found.logs.append(Source(log, root))
+                found.logs.append(LogSource(log, root))
             elif root is None:
                 return fail(ExitCode.INPUT, *no_log(log, log, "name logs, or folders of runs"))
             else:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from rtshcua.adapters.store.git import Changes, NoChanges, changed_files
+from rtshcua.adapters.store.git import GitChanges, NoChanges, changed_files
 from rtshcua.app.exit_codes import exit_code, exit_code_of, words_of
 from rtshcua.app.files import overwriting_a_source
 from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE, Severity
@@ -40,7 +40,7 @@ def run(options: Options) -> ExitCode:
     if isinstance(about, Refusal):
         return findings.end(about)
     session = Session([*about.files, *(each for further in about.further.values() for each in further)])
-    changed: Changes | None = None
+    changed: GitChanges | None = None
     if options.changed or options.base is not None:
         try:
             changed = changed_files(options.paths, options.base)
@@ -84,7 +84,7 @@ def _misused(options: Options, form: str) -> Refusal | None:
 
 
 def _told(
-    options: Options, about: Scope, session: Session, changed: Changes | None
+    options: Options, about: Scope, session: Session, changed: GitChanges | None
 ) -> tuple[Gathered, tuple[str, ...]]:
     """The findings, and the names of the files that were looked at."""
     if not about.files:

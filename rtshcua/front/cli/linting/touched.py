@@ -4,11 +4,11 @@ import os
 from collections.abc import Sequence
 
 from rtshcua import library
-from rtshcua.adapters.store.git import Changes
+from rtshcua.adapters.store.git import GitChanges
 from rtshcua.front.cli.linting.examined import Examined
 
 
-def touched(programs: Sequence[Examined], changed: Changes) -> list[Examined]:
+def touched(programs: Sequence[Examined], changed: GitChanges) -> list[Examined]:
     """The programs that read a file that has changed, or one of which no repository that was asked can tell; what was
     installed, such as the library, counts as unchanged.
     """

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from rtshcua.app.fly.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, tenths
 from rtshcua.front.cli.live.lines import alarm, sentence, waiting_for
 from rtshcua.model.quantity import Dimension, display
-from rtshcua.onboard.runtime.view import Reading, Stage, View
+from rtshcua.onboard.runtime.view import RunStage, RuntimeView, SignalReading
 
 _LATEST = 40
 _TRACK = 2_000
@@ -42,7 +42,7 @@ class Board:
 
     def __init__(self) -> None:
         self.plan: Plan | None = None
-        self.view: View | None = None
+        self.view: RuntimeView | None = None
         self.summary: Summary | None = None
         self.note = ""
         self.steps: dict[int, str] = {}
@@ -79,12 +79,12 @@ class Board:
         waits, view = self._waits, self.view
         if self._alarm is not None or waits is None:
             return [] if self._alarm is None else alarm(self._alarm, width)
-        if view is not None and (view.stage is not Stage.DECIDING or view.step != waits.step):
+        if view is not None and (view.stage is not RunStage.DECIDING or view.step != waits.step):
             return []
         left_us = waits.asks.until_us - view.at_us if view is not None else None
         return waiting_for(waits.step, waits.subject, waits.asks, left_us, waits.agreed, width)
 
-    def value(self, reading: Reading) -> str:
+    def value(self, reading: SignalReading) -> str:
         """A signal's value with its unit, `?` while it is not known."""
         signal = next((each for each in self.plan.signals if each.name == reading.name), None) if self.plan else None
         if signal is None or None in reading.values:
@@ -100,7 +100,7 @@ class Board:
             return f"{tenths(values[0])} {'m/s' if dimension is Dimension.SPEED else 'm'}"
         return display(values[0], dimension)
 
-    def _look(self, view: View) -> None:
+    def _look(self, view: RuntimeView) -> None:
         self.view = view
         counting = (view.stage, view.step, view.contract)
         if counting != self._counting:
@@ -110,7 +110,7 @@ class Board:
             if self.plan is not None and reading.name == self.plan.position:
                 self._follow(reading)
 
-    def _follow(self, reading: Reading) -> None:
+    def _follow(self, reading: SignalReading) -> None:
         x, y = reading.values
         if x is not None and y is not None and (x, y) != self.here:
             self.track.append((x, y))

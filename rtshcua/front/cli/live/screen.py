@@ -18,7 +18,7 @@ from rtshcua.front.cli.live.board import Board
 from rtshcua.front.cli.live.chart import FENCE, FLOWN, HOMEWARD, KEEP_OUT, MARK, ZONE, Cell, Chart, chart
 from rtshcua.front.cli.live.lines import ending
 from rtshcua.model.step_number import number_of
-from rtshcua.onboard.runtime.view import Stage
+from rtshcua.onboard.runtime.view import RunStage
 
 _FRAME_S = 0.125
 _BAR: Final = 16
@@ -189,7 +189,7 @@ def _contract(board: Board) -> Text:
     if view.left_us is None or not board.longest_us or board.banner(1):  # a person has another time than the step
         return text
     filled = max(0, min(_BAR, _BAR * view.left_us // board.longest_us))
-    what = "to be dispatched within" if view.stage is Stage.DECIDING else "may go on for"
+    what = "to be dispatched within" if view.stage is RunStage.DECIDING else "may go on for"
     left_us = max(0, view.left_us)
     text.append(f"  {what} {tenths(left_us // 1_000)} s  " if left_us < 60_000_000 else
                 f"  {what} {duration(left_us)}  ")  # fmt: skip

@@ -1,7 +1,7 @@
 """A decision on a link on a page: what it needed, what else might have flown, and the state that was recorded."""
 
 from rtshcua.decision.prepare import PreparedInvocation
-from rtshcua.evidence.records import Decision
+from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.why import truth_of
@@ -14,7 +14,7 @@ from rtshcua.model.step_number import number_of, step_words
 
 
 def show_link(
-    page: Page, record: Decision, found: LinkTrace, of: PreparedInvocation | None, policy: Policy
+    page: Page, record: DecisionRecord, found: LinkTrace, of: PreparedInvocation | None, policy: Policy
 ) -> dict[str, object]:
     """Adds a decision on a link to the page, and gives it for a program."""
     whose = (

@@ -15,7 +15,7 @@ from rtshcua.evidence.gaps import STALLED
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Seal
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.document import recorded
@@ -124,7 +124,9 @@ def _entry(record: AnyRecord, what: str) -> dict[str, object]:
     """A record for a program, without the genesis' bulk."""
     fields: dict[str, object] = msgspec.to_builtins(record)
     about = (
-        {"step_number": number_of(record.step)} if isinstance(record, Decision | Effect) and record.step >= 0 else {}
+        {"step_number": number_of(record.step)}
+        if isinstance(record, DecisionRecord | Effect) and record.step >= 0
+        else {}
     )
     return {"what": what, **{name: value for name, value in fields.items() if name not in ("bundle", "root")}, **about}
 
@@ -166,7 +168,7 @@ class Names:
 
     def tell(self, record: AnyRecord) -> str:
         """A record in one line."""
-        if isinstance(record, Decision):
+        if isinstance(record, DecisionRecord):
             subject = self._subject(record.kind, record.step, record.link)
             clause = f" because {self._quoted(record)}" if record.clause is not None else ""
             target = f", to {record.target}" if record.target is not None else ""
@@ -183,7 +185,7 @@ class Names:
             return f"recovered, {record.discarded_bytes} bytes discarded; epoch {record.epoch} sealed"
         return f"begun in mode {record.mode}"
 
-    def _quoted(self, record: Decision) -> str:
+    def _quoted(self, record: DecisionRecord) -> str:
         steps = () if self._bundle is None else self._bundle.mission.invocations
         if record.kind == STEP and 0 <= record.step < len(steps) and self._bundle is not None:
             of, policy = steps[record.step], self._bundle.policy

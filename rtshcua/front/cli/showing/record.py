@@ -8,8 +8,8 @@ import msgspec
 from rtshcua.app.documents import claimed
 from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import true_to, utc
-from rtshcua.evidence.records import AnyRecord, Close, Decision, Effect, Genesis, Recover, Sealing, Signed
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Sealing, Signed
+from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.log import Names, detail_of
 from rtshcua.front.cli.showing.page import Page
@@ -37,14 +37,14 @@ class Told:
         self.genesis: Genesis | None = None
         self.signed_by: Signed | None = None  # the signed record that names the key of the next
         self.sealed_by: Sealing | None = None  # the first that signs for the record
-        self.permit: Decision | None = None  # what permitted a command
+        self.permit: DecisionRecord | None = None  # what permitted a command
         self.sent: Effect | None = None  # the command that a decision permitted
         self.what = ""
         self.simulated = ""  # what the log says of a vehicle that was
         self._number = number
         self._names = Names(None)
         self.people = NOBODY
-        self._allowed: dict[Ref, Decision] = {}
+        self._allowed: dict[Ref, DecisionRecord] = {}
 
     def take(self, record: AnyRecord) -> None:
         """Takes the next record."""
@@ -56,18 +56,18 @@ class Told:
             self.record, self.what = record, self._names.tell(record)
             if isinstance(record, Effect):
                 self.permit = self._allowed.get(record.ref)
-        if isinstance(record, Decision) and record.outcome == "allow" and record.seq < self._number:
+        if isinstance(record, DecisionRecord) and record.outcome == "allow" and record.seq < self._number:
             self._allowed[record.ref] = record
         if isinstance(record, Effect):
             self._follow(record)
-        elif not isinstance(record, Decision):
+        elif not isinstance(record, DecisionRecord):
             self._signed(record)
 
     def _follow(self, record: Effect) -> None:
         asked = self.record
         if record.event == SIMULATED:
             self.simulated = record.detail
-        if self.sent is not None or not isinstance(asked, Decision) or record.event != "dispatched":
+        if self.sent is not None or not isinstance(asked, DecisionRecord) or record.event != "dispatched":
             return
         if asked.ref == record.ref:
             self.sent = record
@@ -79,7 +79,7 @@ class Told:
             self.sealed_by = record
 
 
-def show_record(page: Page, told: Told, report: Report) -> dict[str, object]:
+def show_record(page: Page, told: Told, report: LogReport) -> dict[str, object]:
     """Adds the record to the page, and gives it for a program."""
     record, genesis = told.record, told.genesis
     assert record is not None
@@ -90,7 +90,7 @@ def show_record(page: Page, told: Told, report: Report) -> dict[str, object]:
     page.row("when", f"{utc(record.utc_us)}, {true_to(record.utc_error_us)}; {ago}")
     if told.simulated:
         page.row("times", f"those of {told.simulated}")
-    if isinstance(record, Decision):
+    if isinstance(record, DecisionRecord):
         _decision(page, record, told, genesis)
     elif isinstance(record, Effect):
         _effect(page, record, told)
@@ -106,7 +106,9 @@ def show_record(page: Page, told: Told, report: Report) -> dict[str, object]:
     return {
         "record": {name: value for name, value in fields.items() if name not in ("bundle", "root")},
         "what": told.what.strip(" ·"),
-        "step_number": number_of(record.step) if isinstance(record, Decision | Effect) and record.step >= 0 else None,
+        "step_number": number_of(record.step)
+        if isinstance(record, DecisionRecord | Effect) and record.step >= 0
+        else None,
         "permitted_by": None if told.permit is None else told.permit.seq,
         "sent_by": None if told.sent is None else told.sent.seq,
         "sealed_by": None if told.sealed_by is None else told.sealed_by.seq,
@@ -115,7 +117,7 @@ def show_record(page: Page, told: Told, report: Report) -> dict[str, object]:
     }
 
 
-def _decision(page: Page, record: Decision, told: Told, genesis: Genesis) -> None:
+def _decision(page: Page, record: DecisionRecord, told: Told, genesis: Genesis) -> None:
     of = f", for invocation {record.invocation}" if record.invocation else ""
     page.row("asked", f"{_ASKED.get(record.kind, 'something')}{of}")
     page.row("decided", f"{record.outcome}: {record.reason}, at step {record.rule_step} of the rules")
@@ -144,7 +146,7 @@ def _given(granted: int, person: int, people: People) -> str:
     return f"{'granted' if granted else 'refused'}{f' by {by}' if by else ''}"
 
 
-def _state(record: Decision, genesis: Genesis) -> list[str]:
+def _state(record: DecisionRecord, genesis: Genesis) -> list[str]:
     state = record.state
     slots = list(zip(state.values, state.ages, strict=False))
     with suppress(Untrusted, ValueError):
@@ -154,7 +156,7 @@ def _state(record: Decision, genesis: Genesis) -> list[str]:
     return [f"slot {number} = {_number(value)}, {_age(age_us)}" for number, (value, age_us) in enumerate(slots)]
 
 
-def _signal(policy: Policy, signal: Signal, record: Decision) -> str:
+def _signal(policy: Policy, signal: Signal, record: DecisionRecord) -> str:
     value, other = record.state.values[signal.slot], record.state.values[signal.slot + (signal.kind == POSITION)]
     if value is None or other is None:
         known = "unknown"
@@ -183,12 +185,12 @@ def _effect(page: Page, record: Effect, told: Told) -> None:
         page.row("permitted", "by a standing permit" if told.permit is None else f"by record {told.permit.seq}")
 
 
-def _firmness(told: Told, report: Report) -> dict[str, str]:
+def _firmness(told: Told, report: LogReport) -> dict[str, str]:
     record, sealed, genesis = told.record, told.sealed_by, told.genesis
     assert record is not None
     assert genesis is not None
     found = {"verified": _verified(report)}
-    if isinstance(record, Decision | Effect):
+    if isinstance(record, DecisionRecord | Effect):
         word = DURABILITIES[record.durability].replace("_", " ")
         meaning = _MEANS[record.durability]
         text = meaning.format(f"{genesis.sync_us / 1_000:g}") if record.durability == SYNCED else meaning
@@ -206,7 +208,7 @@ def _firmness(told: Told, report: Report) -> dict[str, str]:
     return found
 
 
-def _outside(number: int, report: Report) -> str:
+def _outside(number: int, report: LogReport) -> str:
     if number < report.anchored:
         return "yes: witnesses outside saw it"
     outside = report.outside
@@ -223,10 +225,10 @@ def _key(told: Told, genesis: Genesis, sealed: Sealing) -> str:
     return f"epoch key {before.next_key}, which record {before.seq} names"
 
 
-def _verified(report: Report) -> str:
+def _verified(report: LogReport) -> str:
     finding = report.failure or report.shortfall
     if finding is None:
         return "yes: the log is whole and signed to its end"
-    if report.verdict is Verdict.INCOMPLETE:
+    if report.verdict is LogVerdict.INCOMPLETE:
         return f"as far as it goes: the log is incomplete, {finding.text}"
     return f"NO, the log fails at record {finding.record}, {finding.slug}: {finding.text}"

@@ -16,7 +16,7 @@ from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.calls import is_own
@@ -151,7 +151,7 @@ def _milliseconds(us: int) -> str:
     return words.duration(-(-us // 1_000) * 1_000) if us else "0 ms"
 
 
-def _answer(policy: Policy, given: Approval, now: Now, people: People) -> str:
+def _answer(policy: Policy, given: ConfirmAnswer, now: Now, people: People) -> str:
     """Who answered, what, and when."""
     role = policy.roles[given.role] if 0 <= given.role < len(policy.roles) else f"role {given.role}"
     ago_us = max(now.monotonic_us - given.monotonic_us, 0)

@@ -135,7 +135,7 @@ def phases(frame: CaseFrame) -> Iterator[Block]:
 def over_time(frame: CaseFrame, parts: Sequence[PolicyPart]) -> Iterator[Block]:
     """A table for each condition over time that some part reads: each truth, whatever the signals are."""
     read = {
-        atom.monitor for part in parts if part.node for atom in atoms(part.node) if isinstance(atom, tree.Monitored)
+        atom.monitor for part in parts if part.node for atom in atoms(part.node) if isinstance(atom, tree.MonitorSays)
     }
     for number in sorted(read):
         column = f"({case_values.monitor_text(frame.policy.monitors[number])})"

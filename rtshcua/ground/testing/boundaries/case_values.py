@@ -89,9 +89,9 @@ def variables(parts: Iterable[PolicyPart], invocation: PreparedInvocation) -> Se
                     found |= {SceneVariable(False, term.at) for term in terms if not term.argument}
                 case tree.Member(False, at, _):
                     found.add(SceneVariable(False, at))
-                case tree.Known(at):
+                case tree.SlotKnown(at):
                     found.add(SceneVariable(False, vehicle.position if at == vehicle.position + 1 else at))
-                case tree.Inside() | tree.InsideArgument():
+                case tree.InsideZone() | tree.InsideArgument():
                     found |= {SceneVariable(False, vehicle.position), SceneVariable(False, vehicle.height)}
                 case _:
                     pass

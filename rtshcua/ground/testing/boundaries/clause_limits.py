@@ -13,7 +13,7 @@ from typing import NamedTuple
 from rtshcua.decision import tree
 from rtshcua.decision.decide import decide
 from rtshcua.decision.evaluate import Environment, Tables, build, total
-from rtshcua.decision.nearest import Changes, nearest_in
+from rtshcua.decision.nearest import ChangeSearch, nearest_in
 from rtshcua.decision.outline import rings
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.temporal import lasting
@@ -67,7 +67,7 @@ def comparison_turns(atom: tree.Atom, at: Environment, tables: Tables) -> Iterat
             continue
         alone = tree.AtMost((term,), atom.bound - low)
         present = build(alone, tables)(at)
-        for change in Changes(at, tables).find(alone, present != TRUE) or ():
+        for change in ChangeSearch(at, tables).find(alone, present != TRUE) or ():
             turned = nearest_in(change, (at.arguments if term.argument else at.slots)[term.at])
             yield variable, turned, turned - 1 if turned == change.low else turned + 1
 
@@ -107,7 +107,7 @@ def zones_of(part: PolicyPart, invocation: PreparedInvocation) -> tuple[Zone, ..
         numbers += (zone.number for zone in (*part.airspace.inside, *part.airspace.outside))
     for atom in () if part.node is None else atoms(part.node):
         match atom:
-            case tree.Inside(zone) | tree.PointInside(_, zone):
+            case tree.InsideZone(zone) | tree.PointInside(_, zone):
                 numbers.append(zone)
             case tree.InsideArgument(cell, table):
                 chosen = invocation.invocation.arguments[cell]
@@ -202,7 +202,7 @@ def _bands(zone: Zone) -> Iterator[tuple[str, int]]:
 
 def _asks_where(part: PolicyPart) -> bool:
     """Whether a part asks where the vehicle is."""
-    return part.airspace is not None or isinstance(part.node, tree.Inside | tree.InsideArgument)
+    return part.airspace is not None or isinstance(part.node, tree.InsideZone | tree.InsideArgument)
 
 
 def _place_variables(question: PolicyPart, scene: Scene) -> Iterator[SceneVariable]:

@@ -37,7 +37,7 @@ from rtshcua.ground.testing.boundaries.scene import (
 from rtshcua.ground.testing.coverage_goals import ENERGY
 
 #: what has no limit, only sides: all of them are asked for in the scene as it is (`blocks`)
-_WHOLE = (tree.Member, tree.Known, tree.Monitored, tree.InPhase)
+_WHOLE = (tree.Member, tree.SlotKnown, tree.MonitorSays, tree.PhaseIn)
 #: the limit of what a skill needs, in words
 _CHARGE = "the charge that is needed"
 
@@ -155,11 +155,11 @@ def _question_words(asked: _Question, scene: Scene) -> str:
             return " and ".join(_number(term, scene) for term in terms) or "a number"
         case tree.Member(argument, at, _):
             return _number(SceneVariable(argument, at), scene)
-        case tree.Known(at):
+        case tree.SlotKnown(at):
             return _number(SceneVariable(False, at), scene)
-        case tree.Monitored():
+        case tree.MonitorSays():
             return "the condition over time"
-        case tree.InPhase():
+        case tree.PhaseIn():
             return "the phase"
         case tree.InWindow() | tree.InWeek():
             return "the time"
@@ -188,7 +188,7 @@ def _wanted_limits(asked: _Question, scene: Scene) -> Iterator[str]:
     yield from in_time(asked.question, scene)
 
 
-def _number(term: tree.Term | SceneVariable, scene: Scene) -> str:
+def _number(term: tree.LinearTerm | SceneVariable, scene: Scene) -> str:
     """What a comparison reads, by its name."""
     policy, contract = scene.invocation.policy.policy, scene.invocation.invocation.contract
     cells = {each.cell: each.name for each in contract.parameters}

@@ -38,8 +38,8 @@ def put(node: tree.Node, atom: tree.Atom, value: tree.Node) -> tree.Node:
             return tree.Both(put(left, atom, value), put(right, atom, value))
         case tree.Either(left, right):
             return tree.Either(put(left, atom, value), put(right, atom, value))
-        case tree.Not(operand):
-            return tree.Not(put(operand, atom, value))
+        case tree.Negation(operand):
+            return tree.Negation(put(operand, atom, value))
         case _:
             return value if node is atom else node
 
@@ -56,7 +56,7 @@ def _denied(node: tree.Node, atom: tree.Atom) -> bool:
     match node:
         case tree.Both(left, right) | tree.Either(left, right):
             return _denied(left, atom) or _denied(right, atom)
-        case tree.Not(operand):
+        case tree.Negation(operand):
             inner = _denied(operand, atom)
             return not inner if _holds(operand, atom) else inner
         case _:
@@ -67,7 +67,7 @@ def _holds(node: tree.Node, atom: tree.Atom) -> bool:
     match node:
         case tree.Both(left, right) | tree.Either(left, right):
             return _holds(left, atom) or _holds(right, atom)
-        case tree.Not(operand):
+        case tree.Negation(operand):
             return _holds(operand, atom)
         case _:
             return node is atom

@@ -181,9 +181,9 @@ def questions(part: PolicyPart, invocation: PreparedInvocation) -> Iterator[tupl
 def airspace_tree(part: PolicyPart) -> tuple[PolicyPart, tuple[tree.Atom, ...]]:
     """An airspace as a condition on the vehicle's place, as the analysis has it, and its zones as in `questions`."""
     assert part.airspace is not None
-    inside = [tree.Inside(zone.number) for zone in part.airspace.inside]
-    outside = [tree.Inside(zone.number) for zone in part.airspace.outside]
-    nodes: list[tree.Node] = [*inside, *(tree.Not(zone) for zone in outside)]
+    inside = [tree.InsideZone(zone.number) for zone in part.airspace.inside]
+    outside = [tree.InsideZone(zone.number) for zone in part.airspace.outside]
+    nodes: list[tree.Node] = [*inside, *(tree.Negation(zone) for zone in outside)]
     whole = nodes[0]
     for node in nodes[1:]:
         whole = tree.Both(whole, node)
@@ -196,7 +196,7 @@ def atoms(node: tree.Node) -> Iterator[tree.Atom]:
         case tree.Both(left, right) | tree.Either(left, right):
             yield from atoms(left)
             yield from atoms(right)
-        case tree.Not(operand):
+        case tree.Negation(operand):
             yield from atoms(operand)
         case _:
             yield node

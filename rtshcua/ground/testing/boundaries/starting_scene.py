@@ -147,8 +147,8 @@ def _content(scene: Scene, asked: Questions) -> SceneChanges | None:
 def _in_airspace(invocation: PreparedInvocation) -> Iterator[Goal]:
     airspace = invocation.policy.policy.airspace
     if airspace is not None:
-        yield from ((tree.Inside(zone), TRUE) for zone in airspace.inside)
-        yield from ((tree.Inside(zone), FALSE) for zone in airspace.outside)
+        yield from ((tree.InsideZone(zone), TRUE) for zone in airspace.inside)
+        yield from ((tree.InsideZone(zone), FALSE) for zone in airspace.outside)
 
 
 def _sketch(

@@ -7,8 +7,8 @@ from shutil import copytree
 import pytest
 
 from reference.archived import CHECK, write_fleet
-from rtshcua.adapters.archive.adding import Check, Done, add
-from rtshcua.adapters.archive.folder import Folder, Source
+from rtshcua.adapters.archive.adding import Done, VerificationOptions, add
+from rtshcua.adapters.archive.folder import ArchiveFolder, LogSource
 from rtshcua.adapters.archive.index import lay_out
 
 Add = Callable[..., list[Done]]
@@ -25,30 +25,30 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def empty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of an archive that has its tables, with nothing in them: the engine takes its time to make them."""
-    folder = Folder(tmp_path_factory.mktemp("empty") / "archive", make=True)
+    folder = ArchiveFolder(tmp_path_factory.mktemp("empty") / "archive", make=True)
     lay_out(folder)
     return folder.path
 
 
 @pytest.fixture
-def folder(empty: Path, tmp_path: Path) -> Folder:
+def folder(empty: Path, tmp_path: Path) -> ArchiveFolder:
     """An archive with nothing in it."""
-    return Folder(Path(copytree(empty, tmp_path / "archive")), make=True)
+    return ArchiveFolder(Path(copytree(empty, tmp_path / "archive")), make=True)
 
 
 @pytest.fixture
-def take(folder: Folder) -> Add:
+def take(folder: ArchiveFolder) -> Add:
     """Adds logs to that archive."""
 
-    def take(logs: Iterable[Path], check: Check = CHECK) -> list[Done]:
-        return list(add(folder, map(Source, logs), check))
+    def take(logs: Iterable[Path], check: VerificationOptions = CHECK) -> list[Done]:
+        return list(add(folder, map(LogSource, logs), check))
 
     return take
 
 
 @pytest.fixture(scope="session")
-def filled(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
+def filled(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> ArchiveFolder:
     """The archive of the whole fleet, for tests that only ask."""
-    folder = Folder(tmp_path_factory.mktemp("filled") / "archive", make=True)
-    list(add(folder, map(Source, sorted(fleet.glob("*.jsonl"))), CHECK))
+    folder = ArchiveFolder(tmp_path_factory.mktemp("filled") / "archive", make=True)
+    list(add(folder, map(LogSource, sorted(fleet.glob("*.jsonl"))), CHECK))
     return folder

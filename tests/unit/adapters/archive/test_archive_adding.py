@@ -12,9 +12,9 @@ from reference import world as small_world
 from reference.archived import CHECK, NOW_US, records, refused
 from rtshcua.adapters.archive import adding, index
 from rtshcua.adapters.archive.adding import Done, reindex, verify
-from rtshcua.adapters.archive.asking import Asker, canned
-from rtshcua.adapters.archive.entry import AUDIT, Entry
-from rtshcua.adapters.archive.folder import TABLES, Folder
+from rtshcua.adapters.archive.asking import ArchiveReader, canned
+from rtshcua.adapters.archive.entry import AUDIT, ArchiveEntry
+from rtshcua.adapters.archive.folder import TABLES, ArchiveFolder
 from rtshcua.adapters.store.writing import UNFINISHED
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.note import split
@@ -28,23 +28,23 @@ from virtual.sampling import each_once
 Add = Callable[..., list[Done]]
 
 
-def asked(folder: Folder, sql: str) -> list[tuple[object, ...]]:
-    asker = Asker(folder)
+def asked(folder: ArchiveFolder, sql: str) -> list[tuple[object, ...]]:
+    asker = ArchiveReader(folder)
     try:
         return list(asker.ask(sql).rows)
     finally:
         asker.close()
 
 
-def question(folder: Folder, name: str) -> list[tuple[object, ...]]:
+def question(folder: ArchiveFolder, name: str) -> list[tuple[object, ...]]:
     return asked(folder, canned()[name].sql)
 
 
-def entries(folder: Folder) -> list[Entry]:
+def entries(folder: ArchiveFolder) -> list[ArchiveEntry]:
     return list(index.read_catalogue(folder).values())
 
 
-def test_what_is_known_of_a_log(take: Add, fleet: Path, folder: Folder) -> None:
+def test_what_is_known_of_a_log(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     first, second = take([fleet / "quad-07-0.jsonl", fleet / "quad-07-1.jsonl"])
     data = (fleet / "quad-07-0.jsonl").read_bytes()
     lines = data.splitlines(keepends=True)
@@ -65,7 +65,7 @@ def test_what_is_known_of_a_log(take: Add, fleet: Path, folder: Folder) -> None:
 
 
 def test_copies_of_one_log_that_come_together_are_one_log_and_all_are_told_of(
-    take: Add, fleet: Path, folder: Folder, tmp_path: Path
+    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
 ) -> None:
     """A sound one is never called failed: what came of the first came of each."""
     sound, broken = fleet / "quad-08-0.jsonl", tmp_path / "broken.jsonl"
@@ -85,7 +85,7 @@ def test_copies_of_one_log_that_come_together_are_one_log_and_all_are_told_of(
     assert len(entries(folder)) == 2
 
 
-def test_a_log_is_kept_octet_for_octet_under_its_digest(take: Add, fleet: Path, folder: Folder) -> None:
+def test_a_log_is_kept_octet_for_octet_under_its_digest(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     (done,) = take([fleet / "quad-08-0.jsonl"])
     kept = folder.log(done.entry.log)
     assert kept.read_bytes() == (fleet / "quad-08-0.jsonl").read_bytes()
@@ -95,7 +95,7 @@ def test_a_log_is_kept_octet_for_octet_under_its_digest(take: Add, fleet: Path, 
 
 
 @pytest.mark.slow
-def test_every_record_has_its_row(filled: Folder, fleet: Path) -> None:
+def test_every_record_has_its_row(filled: ArchiveFolder, fleet: Path) -> None:
     wanted = {"decision": 0, "effect": 0, "signed": 0}
     for log in fleet.glob("*.jsonl"):
         for record in records(log):
@@ -104,7 +104,7 @@ def test_every_record_has_its_row(filled: Folder, fleet: Path) -> None:
     assert found == list(wanted.values())
 
 
-def test_refusals_are_those_of_the_lines(filled: Folder, fleet: Path) -> None:
+def test_refusals_are_those_of_the_lines(filled: ArchiveFolder, fleet: Path) -> None:
     columns = "utc_us, vehicle, skill, outcome, reason, clause, policy_version, seq"
     found = asked(filled, f"SELECT {columns} FROM decided WHERE outcome <> 'allow' ORDER BY ALL")
     assert found == refused(fleet.glob("*.jsonl"))
@@ -112,7 +112,7 @@ def test_refusals_are_those_of_the_lines(filled: Folder, fleet: Path) -> None:
 
 
 @pytest.mark.slow
-def test_adding_again_changes_nothing(take: Add, fleet: Path, folder: Folder) -> None:
+def test_adding_again_changes_nothing(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     logs = sorted(fleet.glob("*.jsonl"))
     before = take(logs)
     rows = question(folder, "refused")
@@ -124,7 +124,7 @@ def test_adding_again_changes_nothing(take: Add, fleet: Path, folder: Folder) ->
 
 @pytest.mark.slow
 def test_a_log_that_fails_is_kept_and_nothing_of_it_is_indexed(
-    take: Add, fleet: Path, folder: Folder, tmp_path: Path
+    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
 ) -> None:
     data = bytearray((fleet / "quad-07-1.jsonl").read_bytes())
     data[len(data) // 2] ^= 1
@@ -144,7 +144,9 @@ def test_a_log_that_fails_is_kept_and_nothing_of_it_is_indexed(
     assert (log, name, status, finding) == (failed.entry.log, str(changed), "failed", failed.entry.finding)
 
 
-def test_a_log_under_another_root_says_nothing_until_its_own_is_named(take: Add, fleet: Path, folder: Folder) -> None:
+def test_a_log_under_another_root_says_nothing_until_its_own_is_named(
+    take: Add, fleet: Path, folder: ArchiveFolder
+) -> None:
     stranger = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.ROOT, development=True)
     (untrusted,) = take([fleet / "quad-07-0.jsonl"], CHECK._replace(pinned=stranger.public))
     assert (untrusted.entry.status, untrusted.entry.vehicle) == ("failed", None)
@@ -162,7 +164,7 @@ def test_the_root_may_be_named_by_its_key_or_its_name(take: Add, fleet: Path) ->
 
 
 def test_of_an_unclosed_log_only_what_is_signed_for_is_indexed(
-    take: Add, fleet: Path, folder: Folder, tmp_path: Path
+    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
 ) -> None:
     whole = b"".join(generated_logs.lines("quad-07", 9, records=1_500, ending=None))
     torn = tmp_path / "torn.jsonl"
@@ -177,7 +179,9 @@ def test_of_an_unclosed_log_only_what_is_signed_for_is_indexed(
 
 
 @pytest.mark.slow
-def test_what_is_changed_in_the_archive_is_found_and_no_longer_answers(take: Add, fleet: Path, folder: Folder) -> None:
+def test_what_is_changed_in_the_archive_is_found_and_no_longer_answers(
+    take: Add, fleet: Path, folder: ArchiveFolder
+) -> None:
     one, other = take([fleet / "quad-07-0.jsonl", fleet / "quad-08-0.jsonl"])
     path = folder.log(one.entry.log)
     data = bytearray(path.read_bytes())
@@ -201,7 +205,7 @@ def test_what_is_changed_in_the_archive_is_found_and_no_longer_answers(take: Add
 
 @pytest.mark.slow
 def test_a_crash_before_the_catalogue_leaves_nothing_twice(
-    take: Add, fleet: Path, folder: Folder, monkeypatch: pytest.MonkeyPatch
+    take: Add, fleet: Path, folder: ArchiveFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     take([fleet / "quad-07-0.jsonl"])
     rows = question(folder, "refused")
@@ -226,7 +230,7 @@ def test_a_crash_before_the_catalogue_leaves_nothing_twice(
 @pytest.mark.slow
 @pytest.mark.parametrize(("damage", "seen"), each_once(["changed", "shorter", "gone"], [False, True]))
 def test_a_copy_that_was_damaged_is_replaced_by_the_log_taken_in_again(
-    take: Add, fleet: Path, folder: Folder, damage: str, seen: bool
+    take: Add, fleet: Path, folder: ArchiveFolder, damage: str, seen: bool
 ) -> None:
     source = fleet / "quad-07-0.jsonl"
     (one,) = take([source])
@@ -252,14 +256,14 @@ def test_a_copy_that_was_damaged_is_replaced_by_the_log_taken_in_again(
 
 
 @pytest.mark.slow
-def test_an_index_that_was_changed_is_made_anew(take: Add, fleet: Path, folder: Folder) -> None:
+def test_an_index_that_was_changed_is_made_anew(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     """Who can write in the folder can let the index say anything; the logs still say what they said."""
     done = take(sorted(fleet.glob("*.jsonl")))
     rows, known = question(folder, "refused"), entries(folder)
     for path in [folder.catalogue, *folder.parts()]:
         path.write_bytes(b"nothing of the kind")
     with pytest.raises(Untrusted, match="cannot be read"):
-        Asker(folder)
+        ArchiveReader(folder)
     later = CHECK._replace(now_us=NOW_US + 1)
     assert [each.entry.status for each in reindex(folder, later)].count("verified") == len(done) - 1
     assert question(folder, "refused") == rows
@@ -272,18 +276,18 @@ def test_an_index_that_was_changed_is_made_anew(take: Add, fleet: Path, folder: 
     assert question(folder, "refused") == rows
 
 
-def test_only_one_at_a_time_changes_an_archive(folder: Folder, take: Add, fleet: Path) -> None:
+def test_only_one_at_a_time_changes_an_archive(folder: ArchiveFolder, take: Add, fleet: Path) -> None:
     with folder.writing(), pytest.raises(BlockingIOError):
         take([fleet / "quad-07-0.jsonl"])
 
 
-def test_what_cannot_be_read_ends_it_with_the_others_done(take: Add, fleet: Path, folder: Folder) -> None:
+def test_what_cannot_be_read_ends_it_with_the_others_done(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     with pytest.raises(FileNotFoundError):
         take([fleet / "quad-07-0.jsonl", fleet / "gone.jsonl", fleet / "quad-07-1.jsonl"])
     assert len(entries(folder)) == 1
 
 
-def test_a_real_flight_is_audited_whole(take: Add, tmp_path: Path, folder: Folder) -> None:
+def test_a_real_flight_is_audited_whole(take: Add, tmp_path: Path, folder: ArchiveFolder) -> None:
     log = tmp_path / "flight.jsonl"
     log.write_bytes(b"".join(forgery.flight()))
     (done,) = take([log], CHECK._replace(depth=AUDIT))
@@ -301,7 +305,9 @@ def test_a_generated_log_does_not_pass_the_audit(take: Add, fleet: Path) -> None
 
 
 @pytest.mark.parametrize("depth", ["records", "audit"])
-def test_after_a_replacement_steps_have_other_skills(depth: str, take: Add, tmp_path: Path, folder: Folder) -> None:
+def test_after_a_replacement_steps_have_other_skills(
+    depth: str, take: Add, tmp_path: Path, folder: ArchiveFolder
+) -> None:
     run = small_world.Run(small_world.renewed(documents.low())).until_flies("goto")
     assert documents.hand(run, documents.replacement(run.loaded)) == "accepted"
     run.until_over()
@@ -323,7 +329,9 @@ def anchored(log: Path, key: SigningKey) -> str:
 
 
 @pytest.mark.slow
-def test_anchors_beside_a_log_come_along_and_count(take: Add, fleet: Path, folder: Folder, tmp_path: Path) -> None:
+def test_anchors_beside_a_log_come_along_and_count(
+    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
+) -> None:
     log = tmp_path / "run" / "log.jsonl"
     log.parent.mkdir()
     log.write_bytes((fleet / "quad-07-0.jsonl").read_bytes())
@@ -358,7 +366,7 @@ SAID = (
 )  # fmt: skip
 
 
-def test_what_the_world_said_is_kept_as_it_is(take: Add, tmp_path: Path, folder: Folder) -> None:
+def test_what_the_world_said_is_kept_as_it_is(take: Add, tmp_path: Path, folder: ArchiveFolder) -> None:
     key, now = case.KEYS[Duty.LOG], Now(5_000_000, generated_logs.BEGUN_US, 1_000)
     recorder = Recorder(lambda text: key.sign(text, duty=Duty.LOG), key.public, lambda: bytes(32))
     lines = [
@@ -380,39 +388,39 @@ def test_what_the_world_said_is_kept_as_it_is(take: Add, tmp_path: Path, folder:
 def test_an_archive_that_was_only_begun_is_made_whole(tmp_path: Path) -> None:
     (tmp_path / "begun").mkdir()
     (tmp_path / "begun" / f"{UNFINISHED}1.new").write_bytes(b"{")
-    Folder(tmp_path / "begun", make=True)
+    ArchiveFolder(tmp_path / "begun", make=True)
     (tmp_path / "begun" / "tmp").rmdir()
-    assert Folder(tmp_path / "begun", make=True).scratch.is_dir()
+    assert ArchiveFolder(tmp_path / "begun", make=True).scratch.is_dir()
 
 
 def test_no_archive_is_made_among_other_things(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("x")
     with pytest.raises(Untrusted, match="other things"):
-        Folder(tmp_path, make=True)
+        ArchiveFolder(tmp_path, make=True)
     with pytest.raises(Untrusted, match="is not an archive"):
-        Folder(tmp_path)
+        ArchiveFolder(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["a*b", "a[b]", "a?b", "{a}"])
 def test_no_archive_at_a_path_that_is_a_pattern(name: str, tmp_path: Path) -> None:
     with pytest.raises(Untrusted, match="the path of an archive"):
-        Folder(tmp_path / name, make=True)
+        ArchiveFolder(tmp_path / name, make=True)
 
 
-def test_an_archive_of_another_version_is_left_alone(folder: Folder) -> None:
+def test_an_archive_of_another_version_is_left_alone(folder: ArchiveFolder) -> None:
     (folder.path / "archive.json").write_text('{"format": "rtshcua/archive", "version": 2}')
     with pytest.raises(Untrusted, match="another version"):
-        Folder(folder.path)
+        ArchiveFolder(folder.path)
 
 
-def test_an_archive_that_nothing_was_added_to_has_no_answer(folder: Folder) -> None:
+def test_an_archive_that_nothing_was_added_to_has_no_answer(folder: ArchiveFolder) -> None:
     with pytest.raises(Untrusted, match="nothing was ever added"):
-        Asker(folder)
+        ArchiveReader(folder)
 
 
 @pytest.mark.slow
 def test_a_witness_holds_both_flights_of_a_bundle_that_flew_twice(
-    take: Add, fleet: Path, folder: Folder, tmp_path: Path
+    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
 ) -> None:
     """What keeps used bundles was put back, which nobody aboard can tell. Each flight's log is sound and cosigned: side
     by side they tell, and whoever has every key of the vehicle cannot write the first one anew without that flight.

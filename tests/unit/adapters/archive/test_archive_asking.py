@@ -11,8 +11,8 @@ from reference.archived import SKILLS, records, refused
 from reference.generated_logs import BEGUN_US
 from rtshcua.adapters.archive import index
 from rtshcua.adapters.archive.adding import Done
-from rtshcua.adapters.archive.asking import Asker, Conditions, canned
-from rtshcua.adapters.archive.folder import Folder
+from rtshcua.adapters.archive.asking import ArchiveReader, DecisionQuery, canned
+from rtshcua.adapters.archive.folder import ArchiveFolder
 from rtshcua.wire.untrusted import Untrusted
 
 Add = Callable[..., list[Done]]
@@ -20,8 +20,8 @@ UTC, VEHICLE, SKILL, OUTCOME, REASON, CLAUSE, VERSION, SEQ = range(8)
 
 
 @pytest.fixture(scope="module")
-def asker(filled: Folder) -> Iterator[Asker]:
-    asker = Asker(filled)
+def asker(filled: ArchiveFolder) -> Iterator[ArchiveReader]:
+    asker = ArchiveReader(filled)
     yield asker
     asker.close()
 
@@ -32,8 +32,8 @@ def wanted(fleet: Path) -> list[tuple[object, ...]]:
     return refused(fleet.glob("*.jsonl"))
 
 
-def rows(folder: Folder, name: str, **conditions: object) -> list[tuple[object, ...]]:
-    asker = Asker(folder, Conditions(**conditions))  # type: ignore[arg-type]
+def rows(folder: ArchiveFolder, name: str, **conditions: object) -> list[tuple[object, ...]]:
+    asker = ArchiveReader(folder, DecisionQuery(**conditions))  # type: ignore[arg-type]
     try:
         return list(asker.ask(canned()[name].sql).rows)
     finally:
@@ -42,14 +42,14 @@ def rows(folder: Folder, name: str, **conditions: object) -> list[tuple[object, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", canned())
-def test_what_ships_says_what_it_tells_and_answers(name: str, asker: Asker) -> None:
+def test_what_ships_says_what_it_tells_and_answers(name: str, asker: ArchiveReader) -> None:
     question = canned()[name]
     assert len(question.tells) > 20
     assert not question.tells.startswith("--")
     assert asker.ask(question.sql).columns
 
 
-def test_who_was_refused_what(wanted: list[tuple[object, ...]], filled: Folder) -> None:
+def test_who_was_refused_what(wanted: list[tuple[object, ...]], filled: ArchiveFolder) -> None:
     found = rows(filled, "refused-by-vehicle")
     keys = [(row[0], row[2], row[3], row[4], row[5]) for row in found]
     counts = Counter((each[VEHICLE], each[VERSION], each[SKILL], each[OUTCOME], each[REASON]) for each in wanted)
@@ -65,7 +65,9 @@ def test_who_was_refused_what(wanted: list[tuple[object, ...]], filled: Folder) 
 
 
 @pytest.mark.slow
-def test_by_skill_reason_clause_rule_and_day(wanted: list[tuple[object, ...]], filled: Folder, fleet: Path) -> None:
+def test_by_skill_reason_clause_rule_and_day(
+    wanted: list[tuple[object, ...]], filled: ArchiveFolder, fleet: Path
+) -> None:
     decisions = [r for log in fleet.glob("*.jsonl") for r in records(log) if r["type"] == "decision"]
     by_skill = {row[0]: (row[1], row[2]) for row in rows(filled, "refused-by-skill")}
     asked, no = Counter(SKILLS[r["step"]] for r in decisions), Counter(each[SKILL] for each in wanted)
@@ -81,7 +83,7 @@ def test_by_skill_reason_clause_rule_and_day(wanted: list[tuple[object, ...]], f
     assert by_day[0][0] == "2025-06-15"
 
 
-def test_policies(filled: Folder) -> None:
+def test_policies(filled: ArchiveFolder) -> None:
     found = rows(filled, "policies")
     assert [row[:4] for row in found] == [("bridge_inspection", 7, 2, 4), ("bridge_inspection", 8, 1, 1)]
 
@@ -108,7 +110,7 @@ def test_policies(filled: Folder) -> None:
     ],
 )  # fmt: skip
 def test_conditions(
-    conditions: dict[str, object], holds: Callable[..., bool], wanted: list[tuple[object, ...]], filled: Folder
+    conditions: dict[str, object], holds: Callable[..., bool], wanted: list[tuple[object, ...]], filled: ArchiveFolder
 ) -> None:
     found = rows(filled, "refused", **conditions)
     assert sorted((row[0], row[1], row[12]) for row in found) == sorted(
@@ -128,7 +130,7 @@ def test_conditions(
     ],
 )  # fmt: skip
 def test_only_one_select_over_the_archive(
-    sql: str, asker: Asker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sql: str, asker: ArchiveReader, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Untrusted) as refusal:
@@ -138,14 +140,14 @@ def test_only_one_select_over_the_archive(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_question_of_ones_own(asker: Asker, fleet: Path) -> None:
+def test_a_question_of_ones_own(asker: ArchiveReader, fleet: Path) -> None:
     sql = "WITH v AS (SELECT DISTINCT vehicle FROM decided) SELECT COUNT(*) AS vehicles FROM v"
     assert asker.ask(sql) == (("vehicles",), [(2,)])
     assert len(asker.ask("SELECT * FROM decided", 5).rows) == 5
 
 
 @pytest.mark.slow
-def test_a_log_that_is_not_there_is_missing(take: Add, fleet: Path, folder: Folder) -> None:
+def test_a_log_that_is_not_there_is_missing(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     first, last = take([fleet / "quad-07-0.jsonl", fleet / "quad-07-2.jsonl"])
     assert [row[:2] for row in rows(folder, "missing")] == [("quad-07", last.entry.log)]
     (between,) = take([fleet / "quad-07-1.jsonl"])
@@ -155,7 +157,7 @@ def test_a_log_that_is_not_there_is_missing(take: Add, fleet: Path, folder: Fold
 
 
 def test_a_log_that_failed_does_not_stand_for_the_one_before(
-    take: Add, fleet: Path, folder: Folder, tmp_path: Path
+    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
 ) -> None:
     data = (fleet / "quad-07-0.jsonl").read_bytes()
     (tmp_path / "changed.jsonl").write_bytes(data.replace(b'"outcome":"deny"', b'"outcome":"defer"', 1))
@@ -163,7 +165,7 @@ def test_a_log_that_failed_does_not_stand_for_the_one_before(
     assert len(rows(folder, "missing")) == 1
 
 
-def test_two_stories_of_one_boot_are_a_conflict(take: Add, fleet: Path, folder: Folder, tmp_path: Path) -> None:
+def test_two_stories_of_one_boot_are_a_conflict(take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path) -> None:
     """Who holds all keys wrote the flight anew: both verify, and only side by side they give themselves away."""
     other = tmp_path / "rewritten.jsonl"
     lines = list(generated_logs.lines("quad-07", 0, records=300, ending="aborted"))
@@ -176,7 +178,7 @@ def test_two_stories_of_one_boot_are_a_conflict(take: Add, fleet: Path, folder: 
     assert sorted(logs) == sorted([one.entry.log, two.entry.log])
 
 
-def test_the_beginning_of_a_log_does_not_contradict_it(take: Add, folder: Folder, tmp_path: Path) -> None:
+def test_the_beginning_of_a_log_does_not_contradict_it(take: Add, folder: ArchiveFolder, tmp_path: Path) -> None:
     lines = list(generated_logs.lines("quad-07", 4, records=1_200))
     (tmp_path / "whole.jsonl").write_bytes(b"".join(lines))
     (tmp_path / "early.jsonl").write_bytes(b"".join(lines[:1_100]))
@@ -185,7 +187,7 @@ def test_the_beginning_of_a_log_does_not_contradict_it(take: Add, folder: Folder
 
 
 @pytest.mark.slow
-def test_a_bundle_that_flew_twice_is_told(take: Add, fleet: Path, folder: Folder) -> None:
+def test_a_bundle_that_flew_twice_is_told(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     """What kept used bundles was emptied, put back or made anew: each log is whole, and an archive has both."""
     (first,) = take([fleet / "quad-07-0.jsonl"])
     assert rows(folder, "twice") == []
@@ -197,7 +199,9 @@ def test_a_bundle_that_flew_twice_is_told(take: Add, fleet: Path, folder: Folder
 
 
 @pytest.mark.slow
-def test_two_flights_after_the_same_one_are_a_fork(take: Add, fleet: Path, folder: Folder, tmp_path: Path) -> None:
+def test_two_flights_after_the_same_one_are_a_fork(
+    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
+) -> None:
     (first,) = take([fleet / "quad-07-0.jsonl"])
     generated_logs.write(tmp_path / "other.jsonl", "quad-07", 5, before=first.entry.last_leaf)
     take([fleet / "quad-07-1.jsonl", tmp_path / "other.jsonl"])

@@ -10,8 +10,8 @@ import pytest
 
 from reference import generated_logs
 from reference.archived import refused
-from rtshcua.adapters.archive.asking import Asker
-from rtshcua.adapters.archive.folder import Folder
+from rtshcua.adapters.archive.asking import ArchiveReader
+from rtshcua.adapters.archive.folder import ArchiveFolder
 
 KILLS = 20
 
@@ -38,7 +38,7 @@ def test_nothing_is_lost_or_there_twice(fleet: Path, tmp_path: Path) -> None:
             add.wait()
         done = subprocess.run(adding(folder), check=False, capture_output=True, text=True)
         assert "5 verified, 1 incomplete" in done.stdout, done.stderr
-        asker = Asker(Folder(folder))
+        asker = ArchiveReader(ArchiveFolder(folder))
         columns = "utc_us, vehicle, skill, outcome, reason, clause, policy_version, seq"
         found = asker.ask(f"SELECT {columns} FROM decided WHERE outcome <> 'allow' ORDER BY ALL").rows
         asker.close()

@@ -9,16 +9,16 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from rtshcua.adapters.archive.asking import VIEWS, Asker, canned, view
-from rtshcua.adapters.archive.folder import TABLES, Folder
+from rtshcua.adapters.archive.asking import VIEWS, ArchiveReader, canned, view
+from rtshcua.adapters.archive.folder import TABLES, ArchiveFolder
 
 Rows = Sequence[Sequence[object]]
 Engine = Callable[[str], Rows]
 
 
-def sqlite(folder: Folder) -> Engine:
+def sqlite(folder: ArchiveFolder) -> Engine:
     engine = sqlite3.connect(":memory:")
-    asker = Asker(folder)
+    asker = ArchiveReader(folder)
     for name in ("logs", *TABLES):
         answer = asker.ask(f"SELECT * FROM {name}")
         engine.execute(f"CREATE TABLE {name} ({', '.join(answer.columns)})")
@@ -30,7 +30,7 @@ def sqlite(folder: Folder) -> Engine:
     return lambda sql: engine.execute(sql).fetchall()
 
 
-def datafusion(folder: Folder) -> Engine:
+def datafusion(folder: ArchiveFolder) -> Engine:
     engine = pytest.importorskip("datafusion").SessionContext()
     engine.register_parquet("logs", str(folder.catalogue))
     for name in TABLES:
@@ -44,7 +44,7 @@ def datafusion(folder: Folder) -> Engine:
     return ask
 
 
-def clickhouse(folder: Folder) -> Engine:
+def clickhouse(folder: ArchiveFolder) -> Engine:
     import json
 
     engine = pytest.importorskip("chdb.session").Session()
@@ -64,8 +64,8 @@ def clickhouse(folder: Folder) -> Engine:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", [sqlite, datafusion, clickhouse], ids=lambda engine: engine.__name__)
-def test_every_question_has_the_same_answer(engine: Callable[[Folder], Engine], filled: Folder) -> None:
-    ask, asker = engine(filled), Asker(filled)
+def test_every_question_has_the_same_answer(engine: Callable[[ArchiveFolder], Engine], filled: ArchiveFolder) -> None:
+    ask, asker = engine(filled), ArchiveReader(filled)
     try:
         for question in canned().values():
             wanted = [list(row) for row in asker.ask(question.sql).rows]

@@ -11,14 +11,14 @@ import pytest
 from reference.archived import CHECK
 from rtshcua.adapters.archive import examine
 from rtshcua.adapters.archive.adding import Done, add, verify
-from rtshcua.adapters.archive.entry import Entry
-from rtshcua.adapters.archive.examine import Processes
-from rtshcua.adapters.archive.folder import Folder, Source
+from rtshcua.adapters.archive.entry import ArchiveEntry
+from rtshcua.adapters.archive.examine import VerifierProcesses
+from rtshcua.adapters.archive.folder import ArchiveFolder, LogSource
 
 Add = Callable[..., list[Done]]
 
 
-def entries(done: Sequence[Done]) -> list[Entry]:
+def entries(done: Sequence[Done]) -> list[ArchiveEntry]:
     return [each.entry for each in done]
 
 
@@ -26,9 +26,9 @@ def entries(done: Sequence[Done]) -> list[Entry]:
 def test_processes_come_to_the_same(take: Add, fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(examine, "_LITTLE", 0)
     logs = sorted(fleet.glob("*.jsonl"))
-    other = Folder(tmp_path / "other", make=True)
-    with closing(Processes(2)) as two:
-        found = list(add(other, map(Source, logs), CHECK._replace(workers=two)))
+    other = ArchiveFolder(tmp_path / "other", make=True)
+    with closing(VerifierProcesses(2)) as two:
+        found = list(add(other, map(LogSource, logs), CHECK._replace(workers=two)))
         again = list(verify(other, CHECK._replace(workers=two)))
     assert entries(found) == entries(take(logs))
     assert sorted(each.entry.log for each in again) == sorted(each.entry.log for each in found)

@@ -8,13 +8,13 @@ from msgspec.structs import replace
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding
 from rtshcua.adapters.qualification.checks import ends_after, judge
 from rtshcua.adapters.qualification.observed import (
+    MotionSample,
     ObservedAnswer,
     ObservedCommand,
     ObservedQualification,
     ObservedSilence,
     ObservedSortie,
     ObservedTakeover,
-    Sample,
     TakeoverKind,
 )
 from rtshcua.model.flat.contract import MotionKind
@@ -42,10 +42,10 @@ def checks(policy: Any = BRAKED, *sorties: ObservedSortie, **about: Any) -> dict
 
 def leg(way_mm: int, took_us: int, **about: Any) -> ObservedSortie:
     """A leg at 4 m/s that is told to stop at 10 s, stands after so long, so far on, and stays."""
-    samples = [Sample(at, 0, 0, 10 * M, 4 * M, 0) for at in (9_900_000, 10 * S)]
+    samples = [MotionSample(at, 0, 0, 10 * M, 4 * M, 0) for at in (9_900_000, 10 * S)]
     samples = [each._replace(latitude=place(0)) for each in samples]
-    samples += [Sample(10 * S + took_us // 2, place(way_mm // 2), 0, 10 * M, 3 * M, 0)]
-    samples += [Sample(10 * S + took_us + at, place(way_mm), 0, 10 * M, 0, 0) for at in (0, S, 2 * S)]
+    samples += [MotionSample(10 * S + took_us // 2, place(way_mm // 2), 0, 10 * M, 3 * M, 0)]
+    samples += [MotionSample(10 * S + took_us + at, place(way_mm), 0, 10 * M, 0, 0) for at in (0, S, 2 * S)]
     flown = ObservedCommand(MotionKind.FLY, "goto", 5 * S, 4 * M, True, 5 * S, 10 * S, "succeeded")
     hold = ObservedCommand(MotionKind.HOLD, "hover", 10 * S, 0, False, 10 * S, 30 * S, "succeeded")
     return ObservedSortie("leg", samples, [flown, hold], ending="completed", down=True, **about)
@@ -181,7 +181,7 @@ def test_gaps_between_heartbeats_count_but_for_those_of_a_silence() -> None:
 
 
 def climbed(climb: int, mean: int) -> ObservedSortie:
-    samples = [Sample(at * S, 0, 0, mean * at, 0, climb) for at in range(1, 5)]
+    samples = [MotionSample(at * S, 0, 0, mean * at, 0, climb) for at in range(1, 5)]
     command = ObservedCommand(MotionKind.CLIMB, "takeoff", S, 0, False, S, 4 * S, "succeeded")
     return ObservedSortie("climb", samples, [command], ending="completed", down=True)
 
@@ -192,7 +192,7 @@ def test_a_climb_is_judged_by_the_speed_that_it_comes_to() -> None:
     for at in range(50):
         climb = min(1_500, 30 * at)
         height += climb // 10
-        samples.append(Sample(at * tenth, 0, 0, height, 0, climb))
+        samples.append(MotionSample(at * tenth, 0, 0, height, 0, climb))
     rising = [each for each in samples if each.climb >= 300]
     passed = rising[-1].at_us - rising[0].at_us
     assert (rising[-1].height - rising[0].height) * S // passed < 990
@@ -251,9 +251,11 @@ def test_whatever_does_not_go_as_planned_ends_it() -> None:
 
 def returned(from_mm: int, *heights: int) -> ObservedSortie:
     """A return from so far north, at 12 m, with these heights on its way, each a metre nearer than the one before."""
-    way = [Sample(20 * S + at * S, place(from_mm - 6 * M - at * M), 0, up, 4 * M, 0) for at, up in enumerate(heights)]
-    samples = [Sample(0, place(0), 0, 0, 0, 0), Sample(19 * S, place(from_mm), 0, 12 * M, 0, 0), *way]
-    samples += [Sample(40 * S, place(0), 0, 5 * M, 0, -M)]
+    way = [
+        MotionSample(20 * S + at * S, place(from_mm - 6 * M - at * M), 0, up, 4 * M, 0) for at, up in enumerate(heights)
+    ]
+    samples = [MotionSample(0, place(0), 0, 0, 0, 0), MotionSample(19 * S, place(from_mm), 0, 12 * M, 0, 0), *way]
+    samples += [MotionSample(40 * S, place(0), 0, 5 * M, 0, -M)]
     home = ObservedCommand(MotionKind.HOME, "return_home", 19 * S, 0, True, 19 * S, 50 * S, "succeeded")
     return ObservedSortie("leg", samples, [home], ending="completed", down=True)
 

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from reference.crashed import signer, unverified, writes
-from rtshcua.adapters.store.last_log import Earlier, LastLog
+from rtshcua.adapters.store.last_log import LastLog, PreviousLog
 from rtshcua.adapters.store.recovery import InUse, Recovered, recover
 
 
@@ -28,13 +28,13 @@ def unfinished(folder: Path, more: bytes = b"") -> tuple[Path, list[bytes]]:
 
 
 def test_the_first_log_has_none_before_it(last: LastLog) -> None:
-    assert last.settle(mend) == Earlier(None)
+    assert last.settle(mend) == PreviousLog(None)
 
 
 def test_a_closed_log_is_remembered_and_not_read_again(last: LastLog, tmp_path: Path) -> None:
     last.begin(tmp_path / "gone", None)
     last.end(tmp_path / "gone", None, "ab" * 32)
-    assert last.settle(mend) == Earlier("ab" * 32, log=tmp_path / "gone")
+    assert last.settle(mend) == PreviousLog("ab" * 32, log=tmp_path / "gone")
     assert [entry.name for entry in last.path.parent.iterdir()] == ["vehicle-quad%2007%2F%C3%A9"]
 
 
@@ -46,13 +46,13 @@ def test_a_log_that_broke_off_is_recovered(last: LastLog, tmp_path: Path, more: 
     assert earlier.last == recover(path, signer(Random(2))).last
     assert told in earlier.note
     assert unverified(path, lines, len(lines)) == ""
-    assert last.settle(mend) == Earlier(earlier.last, broken_off=path, log=path)
+    assert last.settle(mend) == PreviousLog(earlier.last, broken_off=path, log=path)
 
 
 def test_a_log_that_never_began_is_passed_over(last: LastLog, tmp_path: Path) -> None:
     (tmp_path / "log.jsonl").write_bytes(b'{"_prev":"000')
     last.begin(tmp_path / "log.jsonl", "cd" * 32)
-    assert last.settle(mend) == Earlier("cd" * 32, broken_off=tmp_path / "log.jsonl")
+    assert last.settle(mend) == PreviousLog("cd" * 32, broken_off=tmp_path / "log.jsonl")
 
 
 def test_a_log_that_was_tampered_with_is_told_and_named_as_far_as_it_goes(last: LastLog, tmp_path: Path) -> None:

@@ -16,11 +16,11 @@ from rtshcua.adapters.store.signing import (
     read_link_key,
     write_link_key,
 )
-from rtshcua.mavlink.signing import EPOCH_US, SignedLink, State, timestamp_of
+from rtshcua.mavlink.signing import EPOCH_US, SignedLink, SigningState, timestamp_of
 
 KEY = bytes(range(32))
 UTC = EPOCH_US + 10**15
-STATE = State(77, {(1, 1, 0): 70, (1, 68, 2): 60})
+STATE = SigningState(77, {(1, 1, 0): 70, (1, 68, 2): 60})
 
 
 def put(path: Path, data: bytes, mode: int = 0o600) -> Path:
@@ -92,13 +92,13 @@ def test_the_fingerprint_tells_keys_apart_and_nothing_of_them() -> None:
 
 def test_what_was_saved_is_loaded_by_vehicle_and_key(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad/07", KEY)
-    assert store.load() == State(0, {})
+    assert store.load() == SigningState(0, {})
     store.save(STATE)
     assert store.load() == STATE
     store.save(STATE, ahead=5)
-    assert store.load() == State(82, STATE.streams), "the reserve is for our own timestamp"
+    assert store.load() == SigningState(82, STATE.streams), "the reserve is for our own timestamp"
     for other in (LinkStore(tmp_path, "quad-08", KEY), LinkStore(tmp_path, "quad/07", bytes(32))):
-        assert other.load() == State(0, {})
+        assert other.load() == SigningState(0, {})
         other.close()
     assert stat.S_IMODE(store.path.stat().st_mode) == 0o600
     assert str(tmp_path / "link" / "vehicle-quad%2F07") == str(store.path.parent)
@@ -128,7 +128,7 @@ def test_after_a_crash_no_timestamp_comes_again_and_nothing_old_is_heard(tmp_pat
     """The clock is set back besides; what is on the disk is all that is left."""
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, store.load(), UTC, 0)
-    heard = SignedLink(KEY, State(0, {}), UTC, 0).sign(a_frame(), 0)
+    heard = SignedLink(KEY, SigningState(0, {}), UTC, 0).sign(a_frame(), 0)
     assert link.accept(heard, 0)
     keeper = LinkKeeper(store, link, us_in)
     last = [link.sign(a_frame(), now_us) for now_us in range(0, 2_900_000, 100_000)][-1]
@@ -147,7 +147,7 @@ def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_beli
     """ArduPilot's timestamp rises by one a frame (recorded), so one second of frames is a millisecond of timestamps."""
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, store.load(), UTC, 0)
-    vehicle = SignedLink(KEY, State(timestamp_of(UTC) + 6_000_000, {}), EPOCH_US, 0, as_library=True)
+    vehicle = SignedLink(KEY, SigningState(timestamp_of(UTC) + 6_000_000, {}), EPOCH_US, 0, as_library=True)
     keeper = LinkKeeper(store, link, us_in)
     heard = [vehicle.sign(a_vehicles_frame(), 0) for _ in range(moment)]
     assert all(link.accept(frame, 10_000 * at) for at, frame in enumerate(heard))
@@ -164,7 +164,7 @@ def test_without_memory_that_outlives_the_process_the_disk_is_at_most_a_second_b
     monkeypatch.setattr(memory, "_FOLDER", tmp_path / "none")
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, store.load(), UTC, 0)
-    vehicle = SignedLink(KEY, State(timestamp_of(UTC), {}), EPOCH_US, 0, as_library=True)
+    vehicle = SignedLink(KEY, SigningState(timestamp_of(UTC), {}), EPOCH_US, 0, as_library=True)
     first, *others = (vehicle.sign(a_vehicles_frame(), 0) for _ in range(5))
     assert link.accept(first, 0)
     keeper = LinkKeeper(store, link, us_in)
@@ -214,20 +214,20 @@ def test_memory_keeps_the_newest_streams_and_is_given_back_at_an_orderly_end(
 
 def test_an_orderly_end_keeps_the_exact_state(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad-07", KEY)
-    link = SignedLink(KEY, State(5, {}), 0, 0)
+    link = SignedLink(KEY, SigningState(5, {}), 0, 0)
     keeper = LinkKeeper(store, link, us_in)
     link.sign(a_frame(), 0)
     keeper.close()
     assert keeper.trouble is None
     again = LinkStore(tmp_path, "quad-07", KEY)
-    assert again.load() == link.state == State(6, {})
+    assert again.load() == link.state == SigningState(6, {})
     again.close()
 
 
 def test_the_thread_keeps_what_is_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(signing, "EVERY_S", 0.001)
     store = LinkStore(tmp_path, "quad-07", KEY)
-    link = SignedLink(KEY, State(5, {}), 0, 0)
+    link = SignedLink(KEY, SigningState(5, {}), 0, 0)
     keeper = LinkKeeper(store, link, us_in)
     link.sign(a_frame(), 0)
     while store.load().timestamp != 6 + 300_000:
@@ -237,9 +237,9 @@ def test_the_thread_keeps_what_is_new(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_a_leap_of_time_is_kept_at_once(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad-07", KEY)
-    link = SignedLink(KEY, State(5, {}), 0, 0)
+    link = SignedLink(KEY, SigningState(5, {}), 0, 0)
     keeper = LinkKeeper(store, link, us_in)
-    later = SignedLink(KEY, State(10_000_000, {}), 0, 0)
+    later = SignedLink(KEY, SigningState(10_000_000, {}), 0, 0)
     assert link.accept(later.sign(a_frame(), 0), 0)
     while store.load().timestamp != 10_000_001 + 300_000:
         keeper._thread.join(0.001)
@@ -249,9 +249,9 @@ def test_a_leap_of_time_is_kept_at_once(tmp_path: Path) -> None:
 
 def test_a_disk_that_fails_stops_the_run_before_it_and_not_during_it(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad-07", KEY)
-    link = SignedLink(KEY, State(5, {}), 0, 0)
+    link = SignedLink(KEY, SigningState(5, {}), 0, 0)
 
-    def full(state: State, ahead: int = 0) -> None:
+    def full(state: SigningState, ahead: int = 0) -> None:
         raise OSError(28, "no space left on device")
 
     keeper = LinkKeeper(store, link, us_in)

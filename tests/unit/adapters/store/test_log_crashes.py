@@ -14,7 +14,7 @@ from reference.power import Died, PowerDisk
 from rtshcua.adapters.store.evidence import EvidenceFile
 from rtshcua.adapters.store.recovery import examine, recover
 from rtshcua.adapters.store.writer import Keeper
-from rtshcua.evidence.recovery import State
+from rtshcua.evidence.recovery import LogState
 
 KINDS = ("died", "torn", "late", "failed", "short", "refused")
 
@@ -74,12 +74,12 @@ def outcome(log: Crashed, chance: Random, *, cut: bool, doubtful: bool) -> str:
 
     `doubtful`: a sync had failed; if the power then goes, what is lost may stand before a signed record.
     """
-    if not log.path.exists() or examine(log.path, LOG_KEY.public).state is State.UNBEGUN:
+    if not log.path.exists() or examine(log.path, LOG_KEY.public).state is LogState.UNBEGUN:
         return "" if log.synced == 0 and (cut or log.written == 0) else "the beginning is lost"
     done = recover(log.path, signer(chance))
-    if cut and doubtful and done.found.state is State.TAMPERED:
+    if cut and doubtful and done.found.state is LogState.TAMPERED:
         return ""
-    if done.found.state not in (State.TORN, State.WHOLE, State.CLOSED):
+    if done.found.state not in (LogState.TORN, LogState.WHOLE, LogState.CLOSED):
         return f"{done.found.state} {done.found.reason}"
     return unverified(log.path, log.lines, log.synced if cut else log.written)
 

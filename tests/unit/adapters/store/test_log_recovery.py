@@ -15,7 +15,7 @@ from rtshcua.adapters.store.evidence import EvidenceFile
 from rtshcua.adapters.store.recovery import InUse, alone, recover
 from rtshcua.adapters.store.writer import Keeper
 from rtshcua.evidence.records import is_signed
-from rtshcua.evidence.recovery import State
+from rtshcua.evidence.recovery import LogState
 
 
 def torn(folder: Path, more: bytes = b'{"_prev":') -> tuple[Path, list[bytes]]:
@@ -29,7 +29,7 @@ def torn(folder: Path, more: bytes = b'{"_prev":') -> tuple[Path, list[bytes]]:
 def test_what_is_discarded_lies_beside_the_log(tmp_path: Path) -> None:
     path, lines = torn(tmp_path)
     done = recover(path, signer(Random(1)))
-    assert (done.done, done.found.state, done.discarded) == (True, State.TORN, tmp_path / "log.discarded")
+    assert (done.done, done.found.state, done.discarded) == (True, LogState.TORN, tmp_path / "log.discarded")
     assert (tmp_path / "log.discarded").read_bytes() == b'{"_prev":'
     log = path.read_bytes().splitlines(keepends=True)
     assert log[:-2] == lines
@@ -38,7 +38,7 @@ def test_what_is_discarded_lies_beside_the_log(tmp_path: Path) -> None:
     assert unverified(path, lines, len(lines)) == ""
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["log.discarded", "log.jsonl"]
     again = recover(path, signer(Random(2)))
-    assert (again.done, again.found.state, again.last) == (False, State.CLOSED, done.last)
+    assert (again.done, again.found.state, again.last) == (False, LogState.CLOSED, done.last)
     assert path.read_bytes() == b"".join(log)
 
 
@@ -54,7 +54,7 @@ def test_what_was_tampered_with_is_left_as_it_is(tmp_path: Path) -> None:
     lines[3] = lines[3].replace(b"quad", b"kwad")
     path.write_bytes(b"".join(lines))
     done = recover(path, signer(Random(1)))
-    assert (done.done, done.found.state) == (False, State.TAMPERED)
+    assert (done.done, done.found.state) == (False, LogState.TAMPERED)
     assert path.read_bytes() == b"".join(lines)
     assert [entry.name for entry in tmp_path.iterdir()] == ["log.jsonl"]
 
@@ -146,7 +146,7 @@ def test_it_may_be_broken_off_anywhere_and_called_again(tmp_path: Path, what: st
             if power is not None and what in ("died", "torn", "late"):
                 disk.cut_power(power)
             done = recover(path, signer(Random(number + 1)))
-            assert done.found.state in (State.TORN, State.CLOSED)
+            assert done.found.state in (LogState.TORN, LogState.CLOSED)
             assert unverified(path, lines, len(lines)) == ""
             recorded = json.loads(path.read_bytes().splitlines()[-2])
             assert recorded["discarded_bytes"] == len(more)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters.store.replay import FileReplayStore
-from rtshcua.onboard.ports import Opening
+from rtshcua.onboard.ports import MissionOpening
 
 ONE, TWO = bytes(32), b"\x01" * 32
 MOST = 60
@@ -44,7 +44,7 @@ class Disk:
 def survived(tmp_path: Path, changes: int, *, half: bool) -> tuple[bool, bool]:
     """Whether the second opening got through, and whether it counts as opened afterwards."""
     store = FileReplayStore(tmp_path, "quad-07")
-    assert store.open_once(ONE, 1000, 10, "bridge", 7) is Opening.OPENED
+    assert store.open_once(ONE, 1000, 10, "bridge", 7) is MissionOpening.OPENED
     through = True
     with pytest.MonkeyPatch.context() as patch:
         Disk(patch, changes, half=half)
@@ -53,12 +53,12 @@ def survived(tmp_path: Path, changes: int, *, half: bool) -> tuple[bool, bool]:
         except Crash:
             through = False
     after = FileReplayStore(tmp_path, "quad-07")
-    assert after.open_once(ONE, 1000, 10, "bridge", 8) is Opening.REPLAYED, "the first came back"
+    assert after.open_once(ONE, 1000, 10, "bridge", 8) is MissionOpening.REPLAYED, "the first came back"
     second = after.open_once(TWO, 9000, 2000, "bridge", 8)
-    assert not (through and second is Opening.OPENED), "it was opened twice"
-    assert after.open_once(TWO, 9000, 2000, "bridge", 8) is Opening.REPLAYED
-    assert after.open_once(b"\x02" * 32, 9000, 2000, "bridge", 7) is Opening.OLD_POLICY
-    return through, second is Opening.REPLAYED
+    assert not (through and second is MissionOpening.OPENED), "it was opened twice"
+    assert after.open_once(TWO, 9000, 2000, "bridge", 8) is MissionOpening.REPLAYED
+    assert after.open_once(b"\x02" * 32, 9000, 2000, "bridge", 7) is MissionOpening.OLD_POLICY
+    return through, second is MissionOpening.REPLAYED
 
 
 @pytest.mark.parametrize("half", [False, True])
@@ -87,6 +87,6 @@ def test_a_version_that_a_crash_left_on_disk_alone_stays_in_force(tmp_path: Path
                 pass
         after = FileReplayStore(folder, "quad-07")
         opened = after.open_once(ONE, 9000, 10, "bridge", 8)
-        assert opened in (Opening.OPENED, Opening.REPLAYED)
-        assert after.open_once(TWO, 9000, 10, "bridge", 7) is Opening.OLD_POLICY
+        assert opened in (MissionOpening.OPENED, MissionOpening.REPLAYED)
+        assert after.open_once(TWO, 9000, 10, "bridge", 7) is MissionOpening.OLD_POLICY
     raise AssertionError("it never got through")

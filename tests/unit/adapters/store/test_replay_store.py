@@ -9,11 +9,16 @@ import pytest
 
 from rtshcua.adapters.store import replay
 from rtshcua.adapters.store.replay import FileReplayStore
-from rtshcua.onboard.ports import Opening
+from rtshcua.onboard.ports import MissionOpening
 
 ONE, TWO, THREE = bytes(32), b"\x01" * 32, b"\x02" * 32
 POLICY = ("bridge", 7)
-OPENED, REPLAYED, OLD_POLICY, DAMAGED = Opening.OPENED, Opening.REPLAYED, Opening.OLD_POLICY, Opening.DAMAGED
+OPENED, REPLAYED, OLD_POLICY, DAMAGED = (
+    MissionOpening.OPENED,
+    MissionOpening.REPLAYED,
+    MissionOpening.OLD_POLICY,
+    MissionOpening.DAMAGED,
+)
 
 
 def test_once_and_never_again(tmp_path: Path) -> None:
@@ -189,8 +194,8 @@ def test_damage_is_told_from_absence_and_opens_nothing(tmp_path: Path, name: str
     assert store.open_once(TWO, 9000, 2000, *POLICY) is OPENED
     (store.folder / name).write_bytes(data)
     before = sorted(path.name for path in store.folder.iterdir())
-    assert store.open_once(THREE, 9000, 2000, *POLICY) is Opening.DAMAGED
-    assert replay.looked_up(tmp_path, "quad-07", THREE, 9000, *POLICY) is Opening.DAMAGED
+    assert store.open_once(THREE, 9000, 2000, *POLICY) is MissionOpening.DAMAGED
+    assert replay.looked_up(tmp_path, "quad-07", THREE, 9000, *POLICY) is MissionOpening.DAMAGED
     assert store.open_once(TWO, 9000, 2000, *POLICY) is REPLAYED, "its own marker says so"
     assert (store.folder / name).read_bytes() == data
     assert sorted(path.name for path in store.folder.iterdir()) == before

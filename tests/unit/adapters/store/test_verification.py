@@ -6,12 +6,12 @@ import pytest
 
 from reference.forgery import ROOT_KEY, edit, flight, signed
 from rtshcua.adapters.store import verification
-from rtshcua.adapters.store.verification import Asked, verify_carefully, verify_quickly
+from rtshcua.adapters.store.verification import VerificationInputs, verify_carefully, verify_quickly
 from rtshcua.evidence.records import AnyRecord
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from virtual import case
 
-ASKED = Asked(ROOT_KEY)
+ASKED = VerificationInputs(ROOT_KEY)
 
 
 @pytest.fixture
@@ -23,14 +23,14 @@ def log(tmp_path: Path) -> Path:
 
 def test_every_way_comes_to_the_same(log: Path) -> None:
     careful = verify_carefully(log, ASKED, derive=False).report
-    assert careful.verdict is Verdict.VERIFIED
+    assert careful.verdict is LogVerdict.VERIFIED
     for found in (
         verify_quickly(log, ASKED),
         verify_quickly(log, ASKED, fast=True),
         verify_quickly(log, ASKED, jobs=3),
     ):
         report = found.report
-        assert (report.verdict, report.records, report.epochs) == (Verdict.VERIFIED, careful.records, careful.epochs)
+        assert (report.verdict, report.records, report.epochs) == (LogVerdict.VERIFIED, careful.records, careful.epochs)
         assert report.root in (b"", careful.root)
         assert [claim.slug for claim in report.proven[:2]] == ["trust", "bundle"]
 
@@ -38,7 +38,7 @@ def test_every_way_comes_to_the_same(log: Path) -> None:
 def test_several_processes_share_the_segments(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verification, "_GROUP", 2)
     report = verify_quickly(log, ASKED, jobs=2).report
-    assert report.verdict is Verdict.VERIFIED
+    assert report.verdict is LogVerdict.VERIFIED
     assert "form" in [claim.slug for claim in report.unproven]
     lines = list(flight())
     lines[9] = edit(lines[9], at_us=0)
@@ -59,22 +59,25 @@ def test_what_is_out_of_place_is_named_by_the_careful_way(log: Path) -> None:
 
 def test_an_incomplete_log_is_read_line_by_line(log: Path) -> None:
     log.write_bytes(b"".join(flight()[:-1]))
-    assert verify_quickly(log, ASKED).report.verdict is Verdict.INCOMPLETE
+    assert verify_quickly(log, ASKED).report.verdict is LogVerdict.INCOMPLETE
     log.write_bytes(b"")
-    assert verify_quickly(log, ASKED).report.verdict is Verdict.FAILED
+    assert verify_quickly(log, ASKED).report.verdict is LogVerdict.FAILED
 
 
 def test_trust_and_bundle_are_looked_at_too(log: Path) -> None:
     for asked, slug in (
-        (Asked(bytes(32)), "trust/root-unknown-key"),
-        (Asked(ROOT_KEY, bundle=case.seal(case.mission())), "genesis/other-bundle"),
+        (VerificationInputs(bytes(32)), "trust/root-unknown-key"),
+        (VerificationInputs(ROOT_KEY, bundle=case.seal(case.mission())), "genesis/other-bundle"),
     ):
         for fast in (False, True):
             failure = verify_quickly(log, asked, fast=fast).report.failure
             assert failure is not None
             assert failure.slug == slug
     assert (
-        verify_quickly(log, Asked(ROOT_KEY, bundle=case.seal(case.mission(case.short_steps())))).report.failure is None
+        verify_quickly(
+            log, VerificationInputs(ROOT_KEY, bundle=case.seal(case.mission(case.short_steps())))
+        ).report.failure
+        is None
     )
 
 
@@ -82,7 +85,7 @@ def test_a_segment_that_is_too_long_is_read_line_by_line(log: Path, monkeypatch:
     monkeypatch.setattr(verification, "LONGEST_SEGMENT", 100)
     for fast in (False, True):
         report = verify_quickly(log, ASKED, fast=fast).report
-        assert report.verdict is Verdict.VERIFIED
+        assert report.verdict is LogVerdict.VERIFIED
         assert "decision" in report.counts
 
 
@@ -116,7 +119,7 @@ def test_each_sound_record_is_handed_on(log: Path) -> None:
 def test_what_the_signers_forged_is_seen_by_reading_only(log: Path) -> None:
     lines = list(flight())
     log.write_bytes(b"".join(signed([*lines[:3], edit(lines[3], outcome="deny"), *lines[4:]])))
-    assert verify_quickly(log, ASKED).report.verdict is Verdict.VERIFIED
+    assert verify_quickly(log, ASKED).report.verdict is LogVerdict.VERIFIED
     failure = verify_carefully(log, ASKED, derive=True).report.failure
     assert failure is not None
     assert failure.slug == "decision/outcome"

@@ -11,7 +11,7 @@ from rtshcua.adapters.store import witness
 from rtshcua.adapters.store.witness import FileWitness, WitnessError, WitnessStore
 from rtshcua.evidence.note import Checkpoint, sign, split
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
-from rtshcua.evidence.witnessing.witness import CONFLICT, Answer, Declined, Request, Seen
+from rtshcua.evidence.witnessing.witness import CONFLICT, CosignRequest, Declined, LastCosigned, WitnessResponse
 from rtshcua.wire.keys import Duty
 
 
@@ -28,14 +28,14 @@ def made(folder: Path, time_s: int = 1_000) -> FileWitness:
     return FileWitness(WitnessStore(folder, WITNESSES[0]), WITNESSES[0], log_keys, lambda: time_s)
 
 
-def asked(log: Log, known: int | None, records: int = 99) -> Request:
+def asked(log: Log, known: int | None, records: int = 99) -> CosignRequest:
     request = log.submission.request(known, records)
     assert request is not None
     return request
 
 
-def time_of(answer: Answer | Declined, request: Request) -> int:
-    assert isinstance(answer, Answer), answer
+def time_of(answer: WitnessResponse | Declined, request: CosignRequest) -> int:
+    assert isinstance(answer, WitnessResponse), answer
     found = read_cosignature(answer.body, split(request.note)[0], PUBLIC)
     assert isinstance(found, Cosignature)
     assert found.public == WITNESSES[0].public
@@ -109,7 +109,7 @@ def test_killed_at_any_point_it_contradicts_nothing(tmp_path: Path, log: Log, mo
         known = second.known(ORIGIN)
         assert known == (9 if turn == 2 else 3)
         if known == 3:
-            assert isinstance(second.consider(asked(log, 3)), Answer)
+            assert isinstance(second.consider(asked(log, 3)), WitnessResponse)
         second.store.close()
 
 
@@ -118,7 +118,7 @@ def test_it_is_kept_before_it_is_cosigned(tmp_path: Path, log: Log, monkeypatch:
     keep, cosign = WitnessStore.keep, witness.cosign
     monkeypatch.setattr(WitnessStore, "keep", lambda *a: (order.append("keep"), keep(*a)))
     monkeypatch.setattr(witness, "cosign", lambda *a: (order.append("cosign"), cosign(*a))[1])
-    assert isinstance(made(tmp_path).consider(asked(log, None)), Answer)
+    assert isinstance(made(tmp_path).consider(asked(log, None)), WitnessResponse)
     assert order == ["keep", "cosign"]
 
 
@@ -131,7 +131,7 @@ def test_the_proof_of_a_lie_is_kept(tmp_path: Path, log: Log, monkeypatch: pytes
     monkeypatch.setattr(witness, "MOST_CONTRADICTIONS", 2)
     found = []
     for fork in forks:
-        refusal = first.consider(Request(9, (), fork))
+        refusal = first.consider(CosignRequest(9, (), fork))
         assert isinstance(refusal, Declined)
         assert refusal.contradiction
         found.append(first.store.contradicted(fork))
@@ -147,7 +147,7 @@ def signed(data: bytes) -> bytes:
 
 def test_seen_round_trip(tmp_path: Path, log: Log) -> None:
     store = WitnessStore(tmp_path, WITNESSES[0])
-    seen = Seen(split(log.notes[1])[0], bytes(range(32)))
+    seen = LastCosigned(split(log.notes[1])[0], bytes(range(32)))
     store.keep(ORIGIN, seen, 7)
     assert store.seen(ORIGIN) == (seen, 7)
     assert store.seen("other") is None

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rtshcua.adapters.vehicle.address import Address, AddressError, Way, parse
+from rtshcua.adapters.vehicle.address import Address, AddressError, LinkCarrier, parse
 
 
 @pytest.mark.parametrize(("text", "loopback", "capacity"), [
@@ -19,8 +19,8 @@ def test_good_ones(text: str, loopback: bool, capacity: int | None) -> None:
 
 
 def test_parts() -> None:
-    assert parse("udpin:10.0.0.7:14551") == Address(Way.UDP_IN, "10.0.0.7", 14551)
-    assert parse("serial:/dev/ttyUSB0:57600") == Address(Way.SERIAL, "/dev/ttyUSB0", 57_600)
+    assert parse("udpin:10.0.0.7:14551") == Address(LinkCarrier.UDP_IN, "10.0.0.7", 14551)
+    assert parse("serial:/dev/ttyUSB0:57600") == Address(LinkCarrier.SERIAL, "/dev/ttyUSB0", 57_600)
 
 
 @pytest.mark.parametrize(("text", "marked", "says", "accepted"), [
@@ -56,5 +56,5 @@ def test_each_bad_one_says_what_is_wrong_where_and_what_is_accepted(
 
 def test_a_way_that_is_not_for_this_option_is_told_from_one_that_is_none() -> None:
     with pytest.raises(AddressError, match="is no way to connect here") as error:
-        parse("tcp:127.0.0.1:5760", (Way.UDP_OUT,))
+        parse("tcp:127.0.0.1:5760", (LinkCarrier.UDP_OUT,))
     assert error.value.help == "write `udpout:127.0.0.1:14550`"

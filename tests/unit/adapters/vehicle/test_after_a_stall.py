@@ -6,7 +6,7 @@ from functools import cache
 
 import pytest
 
-from rtshcua.model.faults import Mode, PilotMode
+from rtshcua.model.faults import FlightMode, PilotMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Succeeded, TakenOver
 from virtual.copying import copied
@@ -45,9 +45,9 @@ def test_where_it_came_to_stand_for_us_meanwhile_is_ours(flavour: str) -> None:
 def test_a_pilot_who_took_over_meanwhile_is_not_flown_over(taken_us: int, kind: MotionKind, flavour: str) -> None:
     """Reports of the mode before that waited are no answer to who flies."""
     one = copied(in_a_leg(flavour))
-    one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us + taken_us, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us + taken_us, FlightMode.POSITION))
     one.vehicle.stand_still(6 * S)
     one.begin(kind)
     end = one.until((Succeeded, TakenOver), 20)
     assert isinstance(end, TakenOver), end
-    assert one.truth.mode is Mode.POSITION
+    assert one.truth.mode is FlightMode.POSITION

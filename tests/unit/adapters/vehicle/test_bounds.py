@@ -4,7 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
-from rtshcua.adapters.vehicle.bounds import Reach, airspace_reach, narrower, reach_of, unknown
+from rtshcua.adapters.vehicle.bounds import FlightReach, airspace_reach, narrower, reach_of, unknown
 from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
@@ -25,7 +25,7 @@ def test_a_mission_reaches_as_far_as_its_targets_from_where_it_stands() -> None:
     assert here.highest >= max(step.plan.altitude for step in steps)
     aside = reach_of(steps, case.policy(), (-100 * M, 0))
     assert aside.farthest > here.farthest or all(x < 0 for x, _ in points)
-    assert reach_of((), case.policy(), (0, 0)) == Reach()
+    assert reach_of((), case.policy(), (0, 0)) == FlightReach()
 
 
 @pytest.mark.parametrize(("shape", "data"), [
@@ -38,29 +38,29 @@ def test_an_airspace_reaches_as_far_as_its_narrowest_zone(shape: int, data: tupl
     reach = airspace_reach(policy)
     assert abs(reach.farthest - 141_421) <= 1
     assert reach.highest == 60 * M
-    assert airspace_reach(POLICY) == Reach()
+    assert airspace_reach(POLICY) == FlightReach()
 
 
 @pytest.mark.parametrize(("changed", "armed", "reach", "found"), [
-    ({}, True, Reach(97 * M, 47 * M, 10 * M), []),
-    ({}, True, Reach(98 * M, 47 * M, 10 * M), [("FENCE_RADIUS", 101)]),
-    ({}, True, Reach(97 * M, 48 * M, 10 * M), [("FENCE_ALT_MAX", 51)]),
-    ({"FENCE_MARGIN": 5.0}, True, Reach(97 * M, 40 * M, 20 * M), [("FENCE_RADIUS", 102)]),
-    ({"FENCE_TYPE": 4.0}, True, Reach(900 * M, 900 * M, 0), []),
-    ({"FENCE_TYPE": 15.0}, True, Reach(9 * M, 9 * M, 7 * M), [("FENCE_ALT_MIN", 4)]),
-    ({}, False, Reach(900 * M, 900 * M, 0), []),
-    ({"FENCE_ENABLE": 1.0}, False, Reach(900 * M, 9 * M, 0), [("FENCE_RADIUS", 903)]),
-    ({"FENCE_TYPE": float("nan")}, True, Reach(900 * M, 900 * M, 0), []),
+    ({}, True, FlightReach(97 * M, 47 * M, 10 * M), []),
+    ({}, True, FlightReach(98 * M, 47 * M, 10 * M), [("FENCE_RADIUS", 101)]),
+    ({}, True, FlightReach(97 * M, 48 * M, 10 * M), [("FENCE_ALT_MAX", 51)]),
+    ({"FENCE_MARGIN": 5.0}, True, FlightReach(97 * M, 40 * M, 20 * M), [("FENCE_RADIUS", 102)]),
+    ({"FENCE_TYPE": 4.0}, True, FlightReach(900 * M, 900 * M, 0), []),
+    ({"FENCE_TYPE": 15.0}, True, FlightReach(9 * M, 9 * M, 7 * M), [("FENCE_ALT_MIN", 4)]),
+    ({}, False, FlightReach(900 * M, 900 * M, 0), []),
+    ({"FENCE_ENABLE": 1.0}, False, FlightReach(900 * M, 9 * M, 0), [("FENCE_RADIUS", 903)]),
+    ({"FENCE_TYPE": float("nan")}, True, FlightReach(900 * M, 900 * M, 0), []),
 ])  # fmt: skip
 def test_what_is_armed_and_too_narrow_is_found(
-    changed: dict[str, float], armed: bool, reach: Reach, found: list[tuple[str, int]]
+    changed: dict[str, float], armed: bool, reach: FlightReach, found: list[tuple[str, int]]
 ) -> None:
     bounds = narrower(ARDUPILOT.own_fence, COPTER | changed, reach, 3 * M, armed=armed)
     assert [(each.parameter, each.needed) for each in bounds] == found
 
 
 def test_px4s_bounds_are_off_at_zero() -> None:
-    far = Reach(900 * M, 900 * M)
+    far = FlightReach(900 * M, 900 * M)
     assert not list(narrower(PX4.own_fence, {"GF_MAX_HOR_DIST": 0.0, "GF_MAX_VER_DIST": 0.0}, far, 0, armed=False))
     found = list(narrower(PX4.own_fence, {"GF_MAX_HOR_DIST": 10.0, "GF_MAX_VER_DIST": 0.0}, far, 0, armed=False))
     assert [each.parameter for each in found] == ["GF_MAX_HOR_DIST"]

@@ -13,7 +13,7 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.codec.frames import Codec
-from rtshcua.mavlink.signing import EPOCH_US, MINUTE, SignedLink, State, timestamp_of
+from rtshcua.mavlink.signing import EPOCH_US, MINUTE, SignedLink, SigningState, timestamp_of
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -123,9 +123,9 @@ def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
 def test_a_vehicle_whose_signing_clock_is_behind_is_greeted_and_then_believed(key: str) -> None:
     """ArduPilot that heard nobody for over a minute: it counts frames, and takes a later timestamp."""
     now, frames = SystemClock().now(), FrameSession()
-    ours = SignedLink(bytes(range(32)), State(0, {}), now.utc_us, now.monotonic_us)
+    ours = SignedLink(bytes(range(32)), SigningState(0, {}), now.utc_us, now.monotonic_us)
     theirs = SignedLink(
-        bytes(range(32)) if key == "the link's" else bytes(32), State(timestamp_of(now.utc_us) - 2 * MINUTE, {}),
+        bytes(range(32)) if key == "the link's" else bytes(32), SigningState(timestamp_of(now.utc_us) - 2 * MINUTE, {}),
         EPOCH_US, 0, as_library=True,
     )  # fmt: skip
     frames.sign_with(ours)

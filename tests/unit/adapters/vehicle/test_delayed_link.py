@@ -11,7 +11,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.faults import LinkDelay
 from rtshcua.onboard.ports import Readings, Ready
 from rtshcua.onboard.runtime.monitor import StateMonitor
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.virtual.vehicle import SECOND, VirtualVehicle
 from virtual.copying import copied
 from virtual.policy import POLICY
@@ -28,7 +28,7 @@ class Watched:
     def __init__(self, flavour: str) -> None:
         prepared = prepare(LATE)
         assert not isinstance(prepared, Refusal)
-        self.vehicle = VirtualVehicle(LATE, SimulationConfig(flavour=Kind(flavour)))
+        self.vehicle = VirtualVehicle(LATE, SimulationConfig(flavour=AutopilotKind(flavour)))
         self.monitor = StateMonitor(prepared)
         self.events: list[object] = []
 

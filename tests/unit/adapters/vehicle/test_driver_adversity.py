@@ -9,12 +9,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.codec.frames import Codec
-from rtshcua.model.faults import BatteryLevel, GpsLoss, LinkDelay, LinkLoss, LinkSilence, Mode, PilotMode
+from rtshcua.model.faults import BatteryLevel, FlightMode, GpsLoss, LinkDelay, LinkLoss, LinkSilence, PilotMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import (
     AirState,
-    Answering,
-    Failed,
+    CommandFailed,
     LinkBack,
     LinkLost,
     Noted,
@@ -22,9 +21,10 @@ from rtshcua.onboard.ports import (
     Ready,
     Succeeded,
     TakenOver,
+    VehicleAnswers,
 )
 from rtshcua.simulation.kinematics import Body
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.place import HomePosition
 from rtshcua.virtual.vehicle import SECOND
 from virtual.policy import BATTERY, FIX, HEIGHT, POLICY, POSITION_X
 from virtual.sampling import each_once
@@ -57,19 +57,19 @@ def test_pilot_takes_over_while_it_flies(aloft: Make, flavour: str) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(3)
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     begun = one.now_us
     taken = one.until(TakenOver, 5)
     assert taken.how == {"px4": "Position", "ardupilot": "POSHOLD"}[flavour]
     assert taken.at_us - begun < 500_000  # the heartbeat was asked for at 5 Hz
-    assert not any(isinstance(event, (TakenOver, Failed, Succeeded)) for event in one.wait(10))
+    assert not any(isinstance(event, (TakenOver, CommandFailed, Succeeded)) for event in one.wait(10))
 
 
 @OTHER_FLAVOUR
 def test_pilot_takes_over_after_the_last_command_succeeded(aloft: Make) -> None:
     one = aloft()
     one.wait(5)
-    one.vehicle.simulation.inject(PilotMode(0, Mode.ALTITUDE))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.ALTITUDE))
     one.until(TakenOver, 5)
 
 
@@ -101,12 +101,12 @@ def test_refused_arming_fails_with_the_reason(flyer: Make, flavour: str) -> None
     one.vehicle.simulation.inject(GpsLoss(0))
     one.wait(10)
     end = one.fly(MotionKind.CLIMB, altitude=20_000)
-    assert isinstance(end, Failed)
+    assert isinstance(end, CommandFailed)
     assert end.reason in ("refused/temporarily", "refused/failed")
     if flavour == "ardupilot":  # PX4 says nothing to an onboard controller
         assert "requires position" in end.text
     assert not one.truth.armed
-    assert one.truth.mode is not Mode.TAKEOFF, "nor does it take off once somebody else arms it"
+    assert one.truth.mode is not FlightMode.TAKEOFF, "nor does it take off once somebody else arms it"
 
 
 @pytest.mark.parametrize("kind", [MotionKind.FLY, MotionKind.COVER, MotionKind.HOLD])
@@ -114,7 +114,7 @@ def test_what_stands_disarmed_cannot_go_anywhere(flyer: Make, kind: MotionKind) 
     one = flyer()
     one.until(Ready)
     end = one.fly(kind, *([(30_000, 0)] if kind != MotionKind.HOLD else []), altitude=20_000)
-    assert (type(end), end.reason) == (Failed, "disarmed")
+    assert (type(end), end.reason) == (CommandFailed, "disarmed")
 
 
 def goes_on(one: Any, command: int) -> None:
@@ -179,11 +179,11 @@ def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
     token = one.begin(MotionKind.CLIMB, altitude=20_000)
     happened = one.wait(30)
     assert "it is heard, but answers nothing" in [event.text for event in happened if isinstance(event, Noted)]
-    assert not any(isinstance(event, (Succeeded, Failed, LinkLost)) for event in happened)
-    assert [event.answers for event in happened if isinstance(event, Answering)] == [False]
+    assert not any(isinstance(event, (Succeeded, CommandFailed, LinkLost)) for event in happened)
+    assert [event.answers for event in happened if isinstance(event, VehicleAnswers)] == [False]
     one.vehicle.lose = lambda frame: False
-    assert one.until((Succeeded, Failed), 60) == Succeeded(one.now_us, token)
-    assert [event.answers for event in one.events if isinstance(event, Answering)] == [False, True]
+    assert one.until((Succeeded, CommandFailed), 60) == Succeeded(one.now_us, token)
+    assert [event.answers for event in one.events if isinstance(event, VehicleAnswers)] == [False, True]
 
 
 def test_in_the_air_it_is_ready_once_it_answers_and_what_it_says_has_its_time(aloft: Make) -> None:
@@ -192,7 +192,7 @@ def test_in_the_air_it_is_ready_once_it_answers_and_what_it_says_has_its_time(al
     one.vehicle.lose = lambda frame: True
     one.vehicle.driver = Driver(POLICY, one.vehicle.frames, fence=False)
     happened = one.wait(30)
-    assert [event.answers for event in happened if isinstance(event, Answering)] == [False]
+    assert [event.answers for event in happened if isinstance(event, VehicleAnswers)] == [False]
     assert not any(isinstance(event, (Ready, LinkLost)) for event in happened)
     assert one.vehicle.driver.unready == "it answers nothing that it is asked"
     one.vehicle.lose = lambda frame: False
@@ -202,7 +202,7 @@ def test_in_the_air_it_is_ready_once_it_answers_and_what_it_says_has_its_time(al
     known = {slot for values in told for slot, value in values if value is not None}
     assert known >= {BATTERY, HEIGHT, FIX, POSITION_X}, "one report of each kind"
     token = one.begin(MotionKind.HOME)
-    assert one.until((Succeeded, Failed, TakenOver), 120) == Succeeded(one.now_us, token)
+    assert one.until((Succeeded, CommandFailed, TakenOver), 120) == Succeeded(one.now_us, token)
 
 
 def test_in_the_air_one_that_tells_no_time_is_ready_all_the_same(aloft: Make) -> None:
@@ -236,7 +236,7 @@ def test_a_heartbeat_that_a_newer_one_overtook_is_no_takeover(aloft: Make) -> No
     one.vehicle.hurt = overtake
     one.wait(1)
     token = one.begin(MotionKind.HOME)
-    assert one.until((Succeeded, Failed, TakenOver), 120) == Succeeded(one.now_us, token)
+    assert one.until((Succeeded, CommandFailed, TakenOver), 120) == Succeeded(one.now_us, token)
     assert overtaken
 
 
@@ -252,14 +252,14 @@ def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -
         noted = one.until(Noted, 10)
     one.vehicle.simulation.inject(LinkSilence(one.vehicle.simulation.now_us, 5_000_000))
     begun = one.now_us
-    answering = sum(isinstance(event, Answering) for event in one.events)
+    answering = sum(isinstance(event, VehicleAnswers) for event in one.events)
     lost = one.until(LinkLost, 3)
     assert 900_000 <= lost.at_us - begun <= 1_400_000
     one.vehicle.lose = lambda frame: False
-    said = one.until((LinkBack, Noted, Answering), 10)
+    said = one.until((LinkBack, Noted, VehicleAnswers), 10)
     assert isinstance(said, LinkBack), "not that it answers again, before it was heard"
-    assert one.until(Answering, 3).answers, "it goes on to answer nothing until it is heard to answer"
-    assert sum(isinstance(event, Answering) for event in one.events) == answering + 1
+    assert one.until(VehicleAnswers, 3).answers, "it goes on to answer nothing until it is heard to answer"
+    assert sum(isinstance(event, VehicleAnswers) for event in one.events) == answering + 1
 
 
 @OTHER_FLAVOUR
@@ -268,7 +268,7 @@ def test_a_command_that_is_never_answered_while_questions_are_has_failed(flyer: 
     one.until(Ready)
     one.vehicle.lose = lambda frame: of_command(frame, mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
     end = one.fly(MotionKind.CLIMB, altitude=20_000)
-    assert (type(end), end.reason) == (Failed, "unknown/no-answer")
+    assert (type(end), end.reason) == (CommandFailed, "unknown/no-answer")
 
 
 @ONE_FLAVOUR
@@ -292,7 +292,7 @@ def test_stopping_short_is_a_failure(aloft: Make, monkeypatch: pytest.MonkeyPatc
     one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
     one.wait(6)
     monkeypatch.setattr(Body, "track", lambda body, *_: body.crash())
-    assert one.until(Failed, 40).reason == "stopped-short"
+    assert one.until(CommandFailed, 40).reason == "stopped-short"
 
 
 @OTHER_FLAVOUR
@@ -365,7 +365,7 @@ def test_streams_that_stop_are_asked_for_again(flyer: Make) -> None:
 
 @ONE_FLAVOUR
 def test_a_vehicle_far_from_the_policys_home_is_not_ready(flyer: Make) -> None:
-    one = flyer(home=Home(473_977_400, 85_475_900, 488_000))
+    one = flyer(home=HomePosition(473_977_400, 85_475_900, 488_000))
     assert not any(isinstance(event, Ready) for event in one.wait(10))
     assert one.vehicle.driver.unready == "it stands 150 m from the policy's home, more than 50 m"
 
@@ -399,7 +399,7 @@ def test_a_pilot_who_changes_the_mode_before_it_is_armed_has_taken_over(flyer: M
     one.begin(MotionKind.CLIMB, altitude=20_000)
     one.wait(1)
     assert armings
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.until(TakenOver, 2)
     armings.clear()
     one.wait(10)

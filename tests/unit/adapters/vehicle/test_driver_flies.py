@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.model.faults import Mode
+from rtshcua.model.faults import FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import AirState, Crashed, Ready, Sent, Succeeded
 from virtual.policy import WIND
@@ -113,5 +113,5 @@ def test_one_command_replaces_another_without_a_false_take_over(aloft: Make) -> 
         one.begin(kind)
         one.wait(0.06)
     assert isinstance(one.fly(MotionKind.HOME), Succeeded)
-    assert one.vehicle.simulation.truth().mode in (Mode.LOITER, Mode.RETURN)
+    assert one.vehicle.simulation.truth().mode in (FlightMode.LOITER, FlightMode.RETURN)
     assert abs(one.truth.east_mm) < 2_000

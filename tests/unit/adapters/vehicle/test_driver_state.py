@@ -9,10 +9,10 @@ from rtshcua.adapters.vehicle.driver import KEYLESS, Driver
 from rtshcua.adapters.vehicle.observed import NoDatum, ObservedVehicle
 from rtshcua.codec.frames import Codec
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.ports import Command, Event, Failed, Noted, Readings, Ready, Said, TakenOver
+from rtshcua.onboard.ports import Command, CommandFailed, Event, Noted, Readings, Ready, StatusText, TakenOver
 from virtual.policy import POLICY, PROJECTION
 
 S = 1_000_000
@@ -22,7 +22,7 @@ PX4, ARDUPILOT = 12, 3
 
 
 def link() -> SignedLink:
-    return SignedLink(bytes(range(32)), State(0, {}), 1_800_000_000_000_000, 0)
+    return SignedLink(bytes(range(32)), SigningState(0, {}), 1_800_000_000_000_000, 0)
 
 
 class Bench:
@@ -287,9 +287,9 @@ def test_no_altitude_is_commanded_before_home_is_known(kind: MotionKind) -> None
     one = Bench()
     one.landed(2)
     (failed,) = one.begin(kind, 1, 1, altitude=20_000)
-    assert isinstance(failed, Failed)
+    assert isinstance(failed, CommandFailed)
     assert (failed.token, failed.reason) == (7, "no-datum")
-    assert not any(isinstance(event, Failed) for event in one.begin(MotionKind.LAND)), "a landing needs none"
+    assert not any(isinstance(event, CommandFailed) for event in one.begin(MotionKind.LAND)), "a landing needs none"
 
 
 def test_altitudes_are_converted_in_one_place() -> None:
@@ -312,14 +312,14 @@ def test_the_gravest_text_since_a_command_began_is_its_reason() -> None:
     for severity, text in ((6, "chatter"), (2, "Arm: Accels inconsistent"), (6, "more chatter")):
         one.say(text, severity)
     one.tick(6)
-    (failed,) = [event for event in one.events if isinstance(event, Failed)]
+    (failed,) = [event for event in one.events if isinstance(event, CommandFailed)]
     assert (failed.reason, failed.text) == ("unknown/no-answer", "Arm: Accels inconsistent")
 
 
 def test_what_it_says_is_told_and_quoted() -> None:
     one = Bench()
     one.say("allow\x1b[2J takeoff", 3)
-    assert [(event.severity, event.text) for event in one.events if isinstance(event, Said)] == [
+    assert [(event.severity, event.text) for event in one.events if isinstance(event, StatusText)] == [
         (3, "allow\\x1b[2J takeoff")
     ]
 

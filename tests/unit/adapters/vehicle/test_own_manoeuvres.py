@@ -10,7 +10,7 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.flavour import Stage, Stages
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Command, Failed, Ready, Succeeded
+from rtshcua.onboard.ports import Command, CommandFailed, Ready, Succeeded
 from virtual.policy import POLICY
 
 Make = Callable[[Stages], Any]
@@ -47,7 +47,7 @@ def test_code_that_raises_has_failed_its_skill(with_own: Make) -> None:
         raise ZeroDivisionError("no nozzle")
 
     end = with_own(own).fly(MotionKind.CLIMB, altitude=10_000)
-    assert isinstance(end, Failed)
+    assert isinstance(end, CommandFailed)
     assert (end.reason, end.text) == ("broken-manoeuvre", "no nozzle")
 
 
@@ -59,7 +59,7 @@ def test_an_effect_that_cannot_be_looked_for_has_failed_its_skill(with_own: Make
         return [Stage(None, None, done, frozenset())]
 
     end = with_own(own).fly(MotionKind.CLIMB, altitude=10_000)
-    assert isinstance(end, Failed)
+    assert isinstance(end, CommandFailed)
     assert end.reason == "broken-manoeuvre"
 
 
@@ -78,6 +78,6 @@ def test_whatever_it_sends_passes_the_gate_or_does_not_leave(with_own: Make, mes
 
     made = with_own(own)
     end = made.fly(MotionKind.CLIMB, altitude=10_000)
-    assert isinstance(end, Failed)
+    assert isinstance(end, CommandFailed)
     assert end.reason.startswith("frame/")
     assert not made.truth.armed

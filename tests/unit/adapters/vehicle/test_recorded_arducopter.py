@@ -4,7 +4,7 @@ import pytest
 
 from recorded.flown import Recorded, at_home, command
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import AirState, Failed, LinkLost, Noted, Ready, Said, Succeeded, TakenOver
+from rtshcua.onboard.ports import AirState, CommandFailed, LinkLost, Noted, Ready, StatusText, Succeeded, TakenOver
 
 HOME = (-353_632_621, 1_491_652_371)
 NORTH_40 = (HOME[0] + 3_593, HOME[1])
@@ -93,7 +93,7 @@ def test_it_says_when_it_is_armed_and_in_the_air(watched: Recorded) -> None:
 
 
 def test_its_texts_are_heard_whole(watched: Recorded) -> None:
-    texts = {event.text: (at, event.severity) for at, event in watched.of(Said)}
+    texts = {event.text: (at, event.severity) for at, event in watched.of(StatusText)}
     assert len(texts) == 31
     assert texts["EKF3 IMU0 is using GPS"] == (USING_GPS, 6)
     assert abs(texts["EKF Failsafe: changed to LAND Mode"][0] - TAKEN) < 0.2
@@ -107,7 +107,7 @@ def test_the_effects_of_our_commands_are_seen_in_the_recording(flown: Recorded) 
     assert 52 < ends[0][0] < 53.8, "15 m reached"
     assert 58 < ends[1][0] < 65.9
     assert 70 < ends[2][0] < 77
-    assert not flown.of(Failed)
+    assert not flown.of(CommandFailed)
 
 
 def test_after_our_last_command_the_failsafe_takes_over(flown: Recorded) -> None:

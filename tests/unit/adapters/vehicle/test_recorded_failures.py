@@ -17,7 +17,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.signal import CELL
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.ports import Failed, LinkBack, LinkLost, Said, TakenOver
+from rtshcua.onboard.ports import CommandFailed, LinkBack, LinkLost, StatusText, TakenOver
 
 BRIDGE = (473_987_600, 85_469_800)
 NOWHERE = (1 << 31) - 1
@@ -48,7 +48,7 @@ def legs_sent(of: Recorded) -> list[float]:
 def test_a_hover_that_does_not_stop_is_seen_within_seconds() -> None:
     """It flew on at 4.5 to 5.6 m/s for the 10 s of the hover, about 46 m, and the hover counted as flown."""
     seen = flown("px4-hover-does-not-stop", (21.27, leg()), (25.71, hover()), until_s=31)
-    (at, failed), *_ = seen.of(Failed)
+    (at, failed), *_ = seen.of(CommandFailed)
     assert (failed.token, failed.reason) == (2, "did-not-stop")
     assert 28 < at < 30
 
@@ -169,7 +169,7 @@ def test_a_battery_that_sags_is_seen_by_its_cells_and_one_that_drains_by_its_dra
     known = [second for second, state in enumerate(seen.states) if state["battery.cell"] is not None]
     assert {second for second in known if truths(second).get(rule, TRUE) == FALSE} == {*range(22, known[-1] + 1)}
     assert {seen.states[second]["battery.cell"] for second in known} == {4_200, 3_400}
-    (late, _) = next(each for each in seen.of(Said) if "Failsafe" in each[1].text)
+    (late, _) = next(each for each in seen.of(StatusText) if "Failsafe" in each[1].text)
     assert 31 < late < 32
     assert abs((seen.states[40]["battery.drain"] or 0) - 1_760) * 10 <= 1_760
     assert seen.driver.consumption.summary[0].startswith("6.2 % a minute declared, ")

@@ -4,7 +4,7 @@ import pytest
 
 from recorded.flown import Recorded, command, shipped_policy
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import AirState, Failed, Ready, Said, Succeeded, TakenOver
+from rtshcua.onboard.ports import AirState, CommandFailed, Ready, StatusText, Succeeded, TakenOver
 
 HOME = (473_977_400, 85_456_000)
 NORTH_40 = (HOME[0] + 3_593, HOME[1])
@@ -52,7 +52,7 @@ def test_what_it_was_not_asked_for_is_not_known(watched: Recorded) -> None:
 
 
 def test_a_text_in_two_chunks_is_one(watched: Recorded) -> None:
-    texts = [event.text for _, event in watched.of(Said)]
+    texts = [event.text for _, event in watched.of(StatusText)]
     assert "RTL: start return at 519 m (30 m above destination)" in texts
     assert texts[:2] == ["Armed by external command", "Takeoff detected"]
     assert len(texts) == 7
@@ -83,7 +83,7 @@ def test_the_effects_of_our_commands_are_seen_in_the_recording(flown: Recorded) 
 
 
 def test_a_command_that_is_never_answered_has_an_unknown_outcome(flown: Recorded) -> None:
-    ((at, failed),) = flown.of(Failed)
+    ((at, failed),) = flown.of(CommandFailed)
     assert (failed.token, failed.reason) == (4, "unknown/no-answer")
     assert 63 < at < 66, "nothing came nearer for 8 s"
     sent = [(at, frame.message) for at, frame in flown.sent if frame.name == "COMMAND_INT" and 55 < at < 87]

@@ -9,7 +9,7 @@ from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.restart import arrives, flown_by, modes_of
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.left import InForce, Left
+from rtshcua.onboard.left import CommandInForce, Left
 from rtshcua.onboard.ports import Command
 
 #: in which modes it may be that obeyed this and was touched by nobody
@@ -31,9 +31,9 @@ OURS = {
 HERE, NORTH, FAR = ((latitude, 85_455_900, 494_000) for latitude in (473_977_400, 473_978_400, 473_979_400))
 
 
-def told(kind: MotionKind, *places: tuple[int, int, int], named: tuple[int, int, int] | None = None) -> InForce:
+def told(kind: MotionKind, *places: tuple[int, int, int], named: tuple[int, int, int] | None = None) -> CommandInForce:
     geo = tuple(part for latitude, longitude, _ in places for part in (latitude, longitude))
-    return InForce(Command(0, "skill", kind, (0,) * len(geo), geo, 6_000, 0), named)
+    return CommandInForce(Command(0, "skill", kind, (0,) * len(geo), geo, 6_000, 0), named)
 
 
 def seen(mode: int, target: tuple[int, int, int] | None = None) -> ObservedVehicle:
@@ -92,7 +92,9 @@ def near(place: tuple[int, int, int], north: int = 0, up: int = 0) -> tuple[int,
         (told(MotionKind.FLY, NORTH, named=NORTH), None, True),
     ],
 )
-def test_in_the_same_mode_the_target_tells(in_force: InForce, target: tuple[int, int, int] | None, ours: bool) -> None:
+def test_in_the_same_mode_the_target_tells(
+    in_force: CommandInForce, target: tuple[int, int, int] | None, ours: bool
+) -> None:
     assert flown_by(Left((in_force,)), PX4, seen(Px4Mode.HOLD, target)) == ("" if ours else "another target")
 
 

@@ -16,9 +16,9 @@ from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.model.faults import LinkLoss, PilotGoto
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
-from rtshcua.onboard.left import InForce, Left
+from rtshcua.onboard.left import CommandInForce, Left
 from rtshcua.onboard.ports import Command, Readings, Ready, TakenOver
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual.copying import copied
 from virtual.flyer import Flyer
@@ -42,12 +42,14 @@ def left_climbing(flavour: str) -> Flyer:
 def begun_again(one: Flyer, policy: Policy = POLICY) -> Flyer:
     before = one.vehicle
     assert before.driver.flavour is not None
-    one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=Kind(before.driver.flavour.name)), before.clock)
+    one.vehicle = VirtualVehicle(
+        policy, SimulationConfig(flavour=AutopilotKind(before.driver.flavour.name)), before.clock
+    )
     one.vehicle.simulation = before.simulation
     one.events.clear()
     driver = one.vehicle.driver
     driver.resumes = driver.hurries = True
-    driver.left = Left((InForce(Command(1, "takeoff", MotionKind.CLIMB, (), (), 20_000, 0)),))
+    driver.left = Left((CommandInForce(Command(1, "takeoff", MotionKind.CLIMB, (), (), 20_000, 0)),))
     return one
 
 

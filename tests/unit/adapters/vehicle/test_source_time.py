@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference.stamped_link import LinkKind, StampedVehicle
 from rtshcua.adapters.vehicle.source_time import APART_US, DRIFT_US, EACH_US, GAP_US, STEP_US, SourceTime
-from rtshcua.codec.frames import Received, kind_of
+from rtshcua.codec.frames import ReceivedFrame, kind_of
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
 
@@ -35,7 +35,7 @@ class Ear:
         """Without a `number` it is the next one."""
         if number is None:
             number = self.number = (self.number + 1) % 256 if component == 1 else 0
-        return self.source.of(Received(message, message.get_type(), 1, component, number, False, b""), now_us)
+        return self.source.of(ReceivedFrame(message, message.get_type(), 1, component, number, False, b""), now_us)
 
     def place(self, made_us: int, now_us: int, number: int | None = None) -> int | None:
         return self.hear(place((made_us - self.offset_us) // 1_000), now_us, number=number)
@@ -83,7 +83,7 @@ def test_nothing_is_known_before_the_first_answer() -> None:
     source = SourceTime()
     assert source.unready == "its clock is not known yet: no TIMESYNC answer"
     for number, message in enumerate([place(4_000), HEARTBEAT, gps(4_000_000), radio()]):
-        frame = Received(message, message.get_type(), 1, 68 if number == 3 else 1, number, False, b"")
+        frame = ReceivedFrame(message, message.get_type(), 1, 68 if number == 3 else 1, number, False, b"")
         assert source.of(frame, 10 * S) is None
     assert Ear().source.unready is None
 
@@ -402,7 +402,7 @@ def test_hostile_frames_neither_raise_nor_make_anything_younger_than_it_came(dat
         except (UnicodeDecodeError, ValueError):
             continue
         component = data.draw(st.sampled_from([1, 1, 1, 68, 158]))
-        frame = Received(message, kind.name, 1, component, data.draw(st.integers(0, 255)), False, b"")
+        frame = ReceivedFrame(message, kind.name, 1, component, data.draw(st.integers(0, 255)), False, b"")
         at_us = ear.source.of(frame, now_us)
         assert at_us is None or at_us <= now_us
         ear.source.clock.due(now_us)

@@ -17,11 +17,11 @@ from rtshcua.adapters.vehicle.effects import STILL
 from rtshcua.adapters.vehicle.flavour import ExpectedProgress
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.supervision import LAG_US, Brakes, BrakingWatch, StageProgress
-from rtshcua.model.faults import Kill, LinkDelay, Mode, Pillar
+from rtshcua.model.faults import FlightMode, Kill, LinkDelay, Pillar
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Crashed, Event, Failed, Ready, Succeeded, TakenOver
-from rtshcua.simulation.config import Kind, SimulationConfig
-from rtshcua.simulation.vehicle import Vehicle
+from rtshcua.onboard.ports import CommandFailed, Crashed, Event, Ready, Succeeded, TakenOver
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
+from rtshcua.simulation.vehicle import Multirotor
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual.copying import copied
 from virtual.flyer import Flyer
@@ -38,7 +38,7 @@ def stops(one: Any, seconds: float = 9) -> None:
     """It comes to stand, by what is really so."""
     begun = one.now_us
     one.begin(MotionKind.HOLD, hold_us=2 * S)
-    end = one.until((Succeeded, Failed, TakenOver), seconds)
+    end = one.until((Succeeded, CommandFailed, TakenOver), seconds)
     assert isinstance(end, Succeeded), end
     assert end.at_us - begun < seconds * S
     assert one.truth.speed_mm_s < STILL
@@ -70,7 +70,7 @@ def test_a_return_and_a_landing_are_stopped(aloft: Make, kind: MotionKind) -> No
     one.begin(kind)
     one.wait(4)
     stops(one)
-    assert one.truth.mode in (Mode.LOITER, Mode.BRAKE)
+    assert one.truth.mode in (FlightMode.LOITER, FlightMode.BRAKE)
 
 
 @pytest.mark.parametrize(("after_s", "flavour"), each_once([0.6, 1.2, 1.8], ["px4", "ardupilot"]))
@@ -111,15 +111,15 @@ def test_a_hold_that_does_not_stop_has_failed(aloft: Make, monkeypatch: pytest.M
     one = aloft()
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
     one.wait(8)
-    monkeypatch.setattr(Vehicle, "hold", lambda self, up=None: None)
+    monkeypatch.setattr(Multirotor, "hold", lambda self, up=None: None)
     begun = one.now_us
     one.begin(MotionKind.HOLD)
-    failed = one.until((Succeeded, Failed, TakenOver), 10)
-    assert (type(failed), failed.reason) == (Failed, "did-not-stop")
+    failed = one.until((Succeeded, CommandFailed, TakenOver), 10)
+    assert (type(failed), failed.reason) == (CommandFailed, "did-not-stop")
     assert failed.at_us - begun < 8 * S, "it declares no brakes: by the cautious guess"
 
 
-def _drift(vehicle: Vehicle, dt: float, *_: object) -> None:
+def _drift(vehicle: Multirotor, dt: float, *_: object) -> None:
     """A step in which it goes on as it goes, whatever it was told."""
     body = vehicle.body
     body.north += body.v_north * dt
@@ -137,9 +137,9 @@ def test_a_hold_that_is_blown_along_when_its_time_is_over_has_not_succeeded_yet(
     with monkeypatch.context() as blown:
         blown.setattr(type(vehicle), "_fly", _drift)
         vehicle.body.v_north = 3.0
-        ends = [event for event in one.wait(3) if isinstance(event, (Succeeded, Failed, TakenOver))]
+        ends = [event for event in one.wait(3) if isinstance(event, (Succeeded, CommandFailed, TakenOver))]
     assert ends == []
-    assert isinstance(one.until((Succeeded, Failed), 15), Succeeded), "it stands again, near where it stood"
+    assert isinstance(one.until((Succeeded, CommandFailed), 15), Succeeded), "it stands again, near where it stood"
 
 
 def test_a_hold_that_drifts_away_has_failed(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,7 +149,7 @@ def test_a_hold_that_drifts_away_has_failed(aloft: Make, monkeypatch: pytest.Mon
     vehicle = one.vehicle.simulation._autopilot.vehicle
     monkeypatch.setattr(type(vehicle), "_fly", _drift)
     vehicle.body.v_north = 3.0
-    assert one.until((Succeeded, Failed), 15).reason == "did-not-hold"
+    assert one.until((Succeeded, CommandFailed), 15).reason == "did-not-hold"
 
 
 # ---------------------------------------------------------------- the rule, by hand
@@ -243,7 +243,7 @@ def stopping_tightly(flavour: str) -> Flyer:
     policy = msgspec.structs.replace(
         POLICY, vehicle=msgspec.structs.replace(POLICY.vehicle, braking=TIGHT[flavour], reaction_us=100_000)
     )
-    one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=Kind(flavour), return_mm=22_000))
+    one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=AutopilotKind(flavour), return_mm=22_000))
     one.up(20_000)
     one.begin(MotionKind.FLY, (600_000, 0), altitude=20_000, speed=10_000)
     one.wait(8)
@@ -256,7 +256,7 @@ def stalled(flavour: str, after_ms: int, for_ms: int) -> list[Event]:
     one = copied(stopping_tightly(flavour))
     one.wait(after_ms / 1_000)
     one.vehicle.stand_still(for_ms * 1_000)
-    return [event for event in one.wait(8) if isinstance(event, (Failed, TakenOver, Crashed))]
+    return [event for event in one.wait(8) if isinstance(event, (CommandFailed, TakenOver, Crashed))]
 
 
 @pytest.mark.slow

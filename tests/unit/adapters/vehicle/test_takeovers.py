@@ -26,10 +26,10 @@ from rtshcua.codec.frames import Codec
 from rtshcua.model.faults import (
     EstimatorUnhealthy,
     Fault,
+    FlightMode,
     LinkDelay,
     LinkLoss,
     MessageSilence,
-    Mode,
     Obstacle,
     PilotGoto,
     PilotMode,
@@ -40,7 +40,7 @@ from rtshcua.model.faults import (
     WindStep,
 )
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.onboard.ports import Command, Failed, Hindered, Noted, Ready, Succeeded, TakenOver
+from rtshcua.onboard.ports import Command, CommandFailed, Hindered, Noted, Ready, Succeeded, TakenOver
 from rtshcua.wire.permit import LINK_VALID_US
 from virtual.copying import copied
 from virtual.flyer import Flyer, climbed
@@ -100,9 +100,9 @@ TAKEOVERS: dict[str, Callable[[int], Fault]] = {
     "pause": PilotPause,
     "go-to": lambda at_us: PilotGoto(at_us, -60_000, 40_000, 25_000),
     "go-to lower": lambda at_us: PilotGoto(at_us, 0, 300_000, 12_000),
-    "land": lambda at_us: PilotMode(at_us, Mode.LAND),
-    "return": lambda at_us: PilotMode(at_us, Mode.RETURN),
-    "position": lambda at_us: PilotMode(at_us, Mode.POSITION),
+    "land": lambda at_us: PilotMode(at_us, FlightMode.LAND),
+    "return": lambda at_us: PilotMode(at_us, FlightMode.RETURN),
+    "position": lambda at_us: PilotMode(at_us, FlightMode.POSITION),
 }
 
 
@@ -149,7 +149,7 @@ def test_a_takeover_in_a_leg_is_seen_and_not_fought(flavour: str, name: str) -> 
     sent = Sent(one)
     one.vehicle.simulation.inject(TAKEOVERS[name](0))
     # ArduCopter that is paused goes on reporting our target, so that only its motion tells
-    taken = one.until((TakenOver, Failed), 5.5 if (name, flavour) == ("pause", "ardupilot") else 3)
+    taken = one.until((TakenOver, CommandFailed), 5.5 if (name, flavour) == ("pause", "ardupilot") else 3)
     assert isinstance(taken, TakenOver), taken
     one.wait(10)
     assert sent.at_us == []
@@ -236,7 +236,7 @@ def test_a_leg_that_somebody_slows_down_says_so_once(flavour: str) -> None:
     one.vehicle.simulation.inject(PilotSpeed(0, 1_000))
     told = [event.text for event in one.wait(20) if isinstance(event, Hindered)]
     assert told == ["it flies at 1.0 m/s where 5.0 m/s were told: somebody else may have set its speed"]
-    assert not any(isinstance(event, (TakenOver, Failed)) for event in one.events)
+    assert not any(isinstance(event, (TakenOver, CommandFailed)) for event in one.events)
 
 
 @pytest.mark.parametrize("result", [0, 4])
@@ -288,7 +288,7 @@ def test_a_takeover_in_a_climb_is_seen_and_not_fought(flavour: str, name: str, h
     one.vehicle.simulation.inject(CLIMBING[name](0))
     if (name, flavour) == ("pause", "ardupilot"):
         one.vehicle._take([Codec(1, 1).pack(PAUSED)], one.events)
-        end = one.until((TakenOver, Failed, Succeeded), 30)
+        end = one.until((TakenOver, CommandFailed, Succeeded), 30)
         assert isinstance(end, Succeeded if height > 17_000 else TakenOver)
         return
     one.until(TakenOver, 0.4)
@@ -317,7 +317,7 @@ def test_a_climb_that_somebody_keeps_down_is_left_to_him(name: str, height: int,
         one.vehicle.simulation.inject(replace(fault, at_us=now_us + fault.at_us))
     if "pause" in name:
         one.vehicle._take([Codec(1, 1).pack(PAUSED)], one.events)
-    assert isinstance(one.until((TakenOver, Failed, Succeeded), within_s), TakenOver)
+    assert isinstance(one.until((TakenOver, CommandFailed, Succeeded), within_s), TakenOver)
     assert sent.at_us == []
 
 
@@ -327,8 +327,8 @@ def test_a_climb_that_nobody_keeps_down_is_not_left_to_nobody(ceiling_mm: int) -
     one = Flyer("ardupilot", ceiling_mm=ceiling_mm)
     one.until(Ready)
     one.begin(MotionKind.CLIMB, altitude=20_000)
-    end = one.until((TakenOver, Failed, Succeeded), 40)
-    assert isinstance(end, Failed), end
+    end = one.until((TakenOver, CommandFailed, Succeeded), 40)
+    assert isinstance(end, CommandFailed), end
     assert end.reason == "stopped-short"
 
 
@@ -386,7 +386,7 @@ def test_a_takeover_is_seen_while_it_holds(flavour: str, name: str) -> None:
     sent = Sent(one)
     one.vehicle.simulation.inject(TAKEOVERS[name](0))
     if (name, flavour) == ("pause", "ardupilot"):
-        assert not any(isinstance(event, (TakenOver, Failed)) for event in one.wait(10))
+        assert not any(isinstance(event, (TakenOver, CommandFailed)) for event in one.wait(10))
     elif (name, flavour) == ("pause", "px4"):
         one.wait(10)  # it stands where it stood: nothing is taken from us, and nothing of ours follows
     else:
@@ -452,7 +452,7 @@ def test_sticks_end_what_px4_does_by_itself(flavour: str) -> None:
     if flavour == "px4":
         assert one.until(TakenOver, 3).how == "Position"
     else:
-        assert not any(isinstance(event, (TakenOver, Failed)) for event in one.wait(10))
+        assert not any(isinstance(event, (TakenOver, CommandFailed)) for event in one.wait(10))
 
 
 @pytest.mark.slow
@@ -475,30 +475,32 @@ def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(flavour: str) 
     sent = Sent(one)
     one.begin(MotionKind.HOME)
     one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us, OLD[flavour]))
-    one.until((TakenOver, Failed), 4)
-    taken = [event for event in one.events if isinstance(event, (TakenOver, Failed))]
+    one.until((TakenOver, CommandFailed), 4)
+    taken = [event for event in one.events if isinstance(event, (TakenOver, CommandFailed))]
     assert isinstance(taken[0], TakenOver), taken
     before = len(sent.at_us)
     one.wait(10)
     assert len(sent.at_us) == before
 
 
-OLD = {"px4": Mode.LOITER, "ardupilot": Mode.GUIDED}
+OLD = {"px4": FlightMode.LOITER, "ardupilot": FlightMode.GUIDED}
 
 
 def test_nothing_is_begun_once_somebody_else_flies(aloft: Make) -> None:
     """Neither what waited for its record while the takeover showed, nor anything after it."""
     one = aloft()
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.until(TakenOver, 3)
     sent = Sent(one)
     assert one.fly(MotionKind.HOME).reason == "taken-over"
     assert sent.at_us == []
 
 
-@pytest.mark.parametrize(("mode", "others"), [(Mode.POSITION, True), (Mode.LAND, True), (Mode.LOITER, None)])
+@pytest.mark.parametrize(
+    ("mode", "others"), [(FlightMode.POSITION, True), (FlightMode.LAND, True), (FlightMode.LOITER, None)]
+)
 def test_a_program_that_begins_in_the_air_says_who_flies(
-    aloft: Make, flavour: str, mode: Mode, others: bool | None
+    aloft: Make, flavour: str, mode: FlightMode, others: bool | None
 ) -> None:
     """PX4 loiters for us too; ArduCopter's LOITER is a pilot's."""
     one = aloft()

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.adapters.vehicle.preflight import distance_from_home
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
-from rtshcua.codec.frames import Received
+from rtshcua.codec.frames import ReceivedFrame
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.policy import Policy
@@ -357,7 +357,7 @@ class Held:
 
     def _of(self, message: Any, now_us: int) -> int | None:
         self._number = (self._number + 1) % 256
-        return self._source.of(Received(message, message.get_type(), 1, 1, self._number, False, b""), now_us)
+        return self._source.of(ReceivedFrame(message, message.get_type(), 1, 1, self._number, False, b""), now_us)
 
 
 def test_a_measurement_that_is_repeated_makes_nothing_younger() -> None:

@@ -17,7 +17,7 @@ from rtshcua.adapters.vehicle.texts import (
     quoted,
 )
 from rtshcua.codec.frames import Codec
-from rtshcua.onboard.ports import Said
+from rtshcua.onboard.ports import StatusText
 
 S = 1_000_000
 
@@ -28,35 +28,35 @@ def text(content: str, number: int = 0, chunk: int = 0, severity: int = 6) -> An
 
 
 def test_a_short_text_is_there_at_once_and_loses_its_padding() -> None:
-    assert StatusTexts().take(text("Landing detected\t", 5), S) == [Said(S, 6, "Landing detected")]
+    assert StatusTexts().take(text("Landing detected\t", 5), S) == [StatusText(S, 6, "Landing detected")]
     assert StatusTexts().take(text("Arm: Accels inconsistent", severity=2), S) == [
-        Said(S, 2, "Arm: Accels inconsistent")
+        StatusText(S, 2, "Arm: Accels inconsistent")
     ]
 
 
 def test_chunks_are_put_together() -> None:
     texts, parts = StatusTexts(), ("a" * 50, "b" * 50, "c")
     said = [texts.take(text(part, 3, at), at) for at, part in enumerate(parts)]
-    assert said == [[], [], [Said(2, 6, "".join(parts))]]
+    assert said == [[], [], [StatusText(2, 6, "".join(parts))]]
 
 
 def test_a_full_text_without_a_number_has_no_more_chunks() -> None:
-    assert StatusTexts().take(text("a" * 50), 0) == [Said(0, 6, "a" * 50)]
+    assert StatusTexts().take(text("a" * 50), 0) == [StatusText(0, 6, "a" * 50)]
 
 
 def test_a_missing_chunk_does_not_join_what_does_not_belong_together() -> None:
     texts = StatusTexts()
     assert texts.take(text("a" * 50, 3, 0), 0) == []
-    assert texts.take(text("end", 4, 1), 1) == [Said(1, 6, "a" * 50), Said(1, 6, "end")]
+    assert texts.take(text("end", 4, 1), 1) == [StatusText(1, 6, "a" * 50), StatusText(1, 6, "end")]
     assert texts.take(text("b" * 50, 5, 0), 2) == []
-    assert texts.take(text("third", 5, 2), 3) == [Said(3, 6, "b" * 50), Said(3, 6, "third")]
+    assert texts.take(text("third", 5, 2), 3) == [StatusText(3, 6, "b" * 50), StatusText(3, 6, "third")]
 
 
 def test_a_text_whose_end_never_comes_is_taken_as_it_is() -> None:
     texts = StatusTexts()
     texts.take(text("a" * 50, 3, 0), 0)
     assert texts.due(CHUNK_US) == []
-    assert texts.due(CHUNK_US + 1) == [Said(CHUNK_US + 1, 6, "a" * 50)]
+    assert texts.due(CHUNK_US + 1) == [StatusText(CHUNK_US + 1, 6, "a" * 50)]
     assert texts.due(CHUNK_US + 2) == []
 
 

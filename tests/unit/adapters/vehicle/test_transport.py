@@ -10,16 +10,16 @@ from random import Random
 
 import pytest
 
-from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.vehicle.transport import SerialTransport, TcpListener, TcpTransport, UdpTransport, open_transport
 from rtshcua.onboard.ports import Event, LinkBack, LinkLost, Noted
-from rtshcua.simulation.config import Boot, Kind, SimulationConfig
+from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
 from virtual.line import Connection, LinedVehicle, Terminal
 from virtual.policy import POLICY
 
 S = 1_000_000
 HERE = "127.0.0.1"
-CONFIG = SimulationConfig(flavour=Kind.PX4, boot=Boot.FAST)
+CONFIG = SimulationConfig(flavour=AutopilotKind.PX4, boot=Boot.FAST)
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
 
 
 def lined(terminal: Terminal, baud: int = 57_600, config: SimulationConfig = CONFIG) -> LinedVehicle:
-    address = Address(Way.SERIAL, str(terminal.path), baud)
+    address = Address(LinkCarrier.SERIAL, str(terminal.path), baud)
     return LinedVehicle(POLICY, config, address, terminal, baud // 10)
 
 
@@ -51,10 +51,10 @@ def notes(events: list[Event]) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flavour", [Kind.PX4, Kind.ARDUPILOT])
+@pytest.mark.parametrize("flavour", [AutopilotKind.PX4, AutopilotKind.ARDUPILOT])
 @pytest.mark.parametrize("baud", [57_600, 921_600])
 def test_a_vehicle_on_a_serial_line_gets_ready_and_the_line_is_not_oversubscribed(
-    terminal: Terminal, baud: int, flavour: Kind
+    terminal: Terminal, baud: int, flavour: AutopilotKind
 ) -> None:
     vehicle = lined(terminal, baud, SimulationConfig(flavour=flavour, boot=Boot.FAST))
     live(vehicle, 30, lambda: vehicle.driver.flavour is not None)
@@ -90,7 +90,7 @@ def test_a_cable_that_is_pulled_is_told_and_found_again_when_it_is_put_back(term
 
 
 def test_a_busy_port_says_so(terminal: Terminal) -> None:
-    address = Address(Way.SERIAL, str(terminal.path), 57_600)
+    address = Address(LinkCarrier.SERIAL, str(terminal.path), 57_600)
     first = SerialTransport(address)
     with pytest.raises(OSError, match="another program has it open") as error:
         SerialTransport(address)
@@ -102,13 +102,13 @@ def test_a_busy_port_says_so(terminal: Terminal) -> None:
 def test_what_is_no_serial_device_says_so(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="not a serial device"):
-        SerialTransport(Address(Way.SERIAL, str(tmp_path / "file"), 57_600))
+        SerialTransport(Address(LinkCarrier.SERIAL, str(tmp_path / "file"), 57_600))
     with pytest.raises(OSError, match="No such file"):
-        SerialTransport(Address(Way.SERIAL, str(tmp_path / "nothing"), 57_600))
+        SerialTransport(Address(LinkCarrier.SERIAL, str(tmp_path / "nothing"), 57_600))
 
 
 def test_garbage_is_told_from_silence(terminal: Terminal) -> None:
-    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.SERIAL, str(terminal.path), 57_600), None, 5_760)
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.SERIAL, str(terminal.path), 57_600), None, 5_760)
     live(vehicle, 1)
     assert vehicle.connected.silence is None, "nothing came, and nothing is known to be wrong"
     terminal.write(Random(2).randbytes(600))
@@ -122,7 +122,7 @@ def test_garbage_is_told_from_silence(terminal: Terminal) -> None:
 def test_a_vehicle_that_speaks_the_old_protocol_is_told(terminal: Terminal) -> None:
     from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.SERIAL, str(terminal.path), 57_600), None, 5_760)
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.SERIAL, str(terminal.path), 57_600), None, 5_760)
     beat = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3).pack(mavlink.MAVLink(None, 1, 1), force_mavlink1=True)
     for _ in range(3):
         terminal.write(beat)
@@ -135,7 +135,7 @@ def test_a_vehicle_that_speaks_the_old_protocol_is_told(terminal: Terminal) -> N
 
 def test_a_port_that_takes_nothing_more_holds_nobody_up() -> None:
     far, near = pty.openpty()
-    transport = SerialTransport(Address(Way.SERIAL, os.ttyname(near), 57_600))
+    transport = SerialTransport(Address(LinkCarrier.SERIAL, os.ttyname(near), 57_600))
     for _ in range(2_000):
         transport.send(bytes(60), None)
     assert transport.tend(0) == []
@@ -158,7 +158,7 @@ def listening() -> socket.socket:
 def test_it_connects_and_connects_again() -> None:
     server = listening()
     port = server.getsockname()[1]
-    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.TCP, HERE, port), None, 100_000)
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.TCP, HERE, port), None, 100_000)
     live(vehicle, 0.1)
     vehicle.end = Connection(server.accept()[0])
     live(vehicle, 10, lambda: vehicle.driver.flavour is not None)
@@ -186,14 +186,14 @@ def test_nobody_there_is_the_reason_for_silence() -> None:
     server = listening()
     port = server.getsockname()[1]
     server.close()
-    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.TCP, HERE, port), None, 100_000)
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.TCP, HERE, port), None, 100_000)
     live(vehicle, 1)
     assert vehicle.connected.silence == "connection refused"
     vehicle.close()
 
 
 def test_it_waits_for_a_connection_and_a_second_one_is_no_vehicle_of_ours() -> None:
-    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.TCP_IN, HERE, 0), None, 100_000)
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.TCP_IN, HERE, 0), None, 100_000)
     assert isinstance(vehicle.transport, TcpListener)
     assert vehicle.connected.silence == "nobody has connected"
     stranger, far = (socket.create_connection((HERE, vehicle.transport.port)) for _ in range(2))
@@ -219,7 +219,7 @@ def test_it_waits_for_a_connection_and_a_second_one_is_no_vehicle_of_ours() -> N
 
 
 def test_more_connections_than_any_vehicle_needs_are_refused() -> None:
-    transport = TcpListener(Address(Way.TCP_IN, HERE, 0))
+    transport = TcpListener(Address(LinkCarrier.TCP_IN, HERE, 0))
     callers = []
     for _ in range(6):
         callers.append(socket.create_connection((HERE, transport.port), timeout=5))
@@ -233,10 +233,10 @@ def test_more_connections_than_any_vehicle_needs_are_refused() -> None:
 def test_a_port_that_is_taken_is_an_error_at_once() -> None:
     taken = listening()
     with pytest.raises(OSError, match="in use"):
-        TcpListener(Address(Way.TCP_IN, HERE, taken.getsockname()[1]))
+        TcpListener(Address(LinkCarrier.TCP_IN, HERE, taken.getsockname()[1]))
     taken.close()
     with pytest.raises(OSError):
-        TcpTransport(Address(Way.TCP, "no such host", 1))
+        TcpTransport(Address(LinkCarrier.TCP, "no such host", 1))
 
 
 # ---------------------------------------------------------------- UDP that speaks first
@@ -246,7 +246,7 @@ def test_udp_that_speaks_first_is_answered() -> None:
     far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     far.bind((HERE, 0))
     far.settimeout(5)
-    vehicle = LinedVehicle(POLICY, CONFIG, Address(Way.UDP_OUT, HERE, far.getsockname()[1]), None, 100_000)
+    vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.UDP_OUT, HERE, far.getsockname()[1]), None, 100_000)
     live(vehicle, 0.1)
     greeting, peer = far.recvfrom(300)
     assert greeting[5:7] == bytes([1, 191]), "of an onboard computer, never of a ground station"
@@ -261,8 +261,9 @@ def test_each_way_has_its_transport(terminal: Terminal) -> None:
     made = [
         open_transport(each)
         for each in (
-            Address(Way.UDP_IN, HERE, 0), Address(Way.UDP_OUT, HERE, 9), Address(Way.TCP, HERE, 9),
-            Address(Way.TCP_IN, HERE, 0), Address(Way.SERIAL, str(terminal.path), 57_600),
+            Address(LinkCarrier.UDP_IN, HERE, 0), Address(LinkCarrier.UDP_OUT, HERE, 9), Address(LinkCarrier.TCP,
+                HERE, 9),
+            Address(LinkCarrier.TCP_IN, HERE, 0), Address(LinkCarrier.SERIAL, str(terminal.path), 57_600),
         )
     ]  # fmt: skip
     kinds = [UdpTransport, UdpTransport, TcpTransport, TcpListener, SerialTransport]

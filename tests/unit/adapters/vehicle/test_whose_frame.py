@@ -11,11 +11,21 @@ from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.link import SILENT_US
 from rtshcua.codec.frames import Codec, is_addressed
 from rtshcua.mavlink.enums import VEHICLES
-from rtshcua.model.faults import Mode, PilotMode, SecondVoice, Voice
+from rtshcua.model.faults import FlightMode, PilotMode, SecondVoice, Voice
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
-from rtshcua.onboard.ports import Crashed, Failed, LinkLost, Noted, Ready, Sent, Succeeded, TakenOver, Unfit
-from rtshcua.simulation.config import Kind, SimulationConfig
+from rtshcua.onboard.ports import (
+    CommandFailed,
+    Crashed,
+    LinkLost,
+    Noted,
+    Ready,
+    Sent,
+    Succeeded,
+    TakenOver,
+    VehicleUnfit,
+)
+from rtshcua.simulation.config import AutopilotKind, SimulationConfig
 from rtshcua.virtual.vehicle import VirtualVehicle
 from virtual.copying import copied
 from virtual.flyer import Flyer, climbed
@@ -102,11 +112,11 @@ def test_a_heartbeat_of_no_autopilot_under_its_ids_is_no_mode_and_is_noted_once(
     one.wait(2)
     before = one.vehicle.driver.seen.mode
     for _ in range(5):
-        assert not any(isinstance(each, TakenOver | Failed | Crashed) for each in says(one, beat(*kind)))
+        assert not any(isinstance(each, TakenOver | CommandFailed | Crashed) for each in says(one, beat(*kind)))
         one.wait(0.1)
     assert one.vehicle.driver.seen.mode == before
     assert one.vehicle.driver.seen.armed
-    assert isinstance(one.until((Succeeded, Failed, TakenOver), 60), Succeeded)
+    assert isinstance(one.until((Succeeded, CommandFailed, TakenOver), 60), Succeeded)
     assert len([text for text in noted(one) if text.startswith("two speak as 1/1")]) == 1
 
 
@@ -169,9 +179,9 @@ def test_a_denial_to_somebody_else_refuses_no_command(aloft: Make, target: tuple
     one.begin(MotionKind.LAND)
     for command in (176, 192, 22, 400):
         events = says(one, mavlink.MAVLink_command_ack_message(command, 4, 0, 0, *target))
-        assert not any(isinstance(each, Failed) for each in events)
+        assert not any(isinstance(each, CommandFailed) for each in events)
     one.vehicle.lose = lambda frame: False
-    assert isinstance(one.until((Succeeded, Failed), 90), Succeeded)
+    assert isinstance(one.until((Succeeded, CommandFailed), 90), Succeeded)
 
 
 @pytest.mark.parametrize("target", [(2, OURS), (255, 190)])
@@ -214,7 +224,7 @@ FORGED: dict[str, Callable[[Flyer], Any]] = {
     "no fix": lambda one: mavlink.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, 0, 0, 0, 0, 0),
     "on its side": lambda one: mavlink.MAVLink_attitude_message(0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 }
-BAD = TakenOver | Failed | Crashed
+BAD = TakenOver | CommandFailed | Crashed
 
 
 @pytest.mark.slow
@@ -224,7 +234,7 @@ def test_one_forged_frame_ends_no_leg(aloft: Make, name: str, after_s: float) ->
     one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
     one.wait(after_s)
     says(one, FORGED[name](one))
-    end = one.until((Succeeded, Failed, TakenOver, Crashed), 60)
+    end = one.until((Succeeded, CommandFailed, TakenOver, Crashed), 60)
     assert isinstance(end, Succeeded), end
 
 
@@ -235,7 +245,7 @@ def test_answers_that_are_held_back_make_no_forged_frame_count_for_longer(aloft:
     one.wait(2)
     one.vehicle.driver.source.clock._trips.extend([3 * S] * 8)
     says(one, FORGED["another mode"](one))
-    end = one.until((Succeeded, Failed, TakenOver, Crashed), 60)
+    end = one.until((Succeeded, CommandFailed, TakenOver, Crashed), 60)
     assert isinstance(end, Succeeded), end
 
 
@@ -248,7 +258,7 @@ def test_one_forged_frame_ends_no_takeoff(flavour: str, name: str) -> None:
         one.wait(0.02)
     one.wait(0.5)
     says(one, FORGED[name](one))
-    assert isinstance(one.until((Succeeded, Failed, TakenOver, Crashed), 60), Succeeded)
+    assert isinstance(one.until((Succeeded, CommandFailed, TakenOver, Crashed), 60), Succeeded)
 
 
 @pytest.mark.parametrize(
@@ -261,7 +271,7 @@ def test_who_contradicts_the_vehicle_in_the_air_is_noted_and_ends_nothing(
     one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
     one.wait(2)
     one.vehicle.simulation.inject(SecondVoice(one.vehicle.simulation.now_us, says_, each_us, 20 * S))
-    end = one.until((Succeeded, Failed, TakenOver, Crashed), 60)
+    end = one.until((Succeeded, CommandFailed, TakenOver, Crashed), 60)
     assert isinstance(end, Succeeded), end
     if says_ is Voice.STRAYED:
         assert any(text.startswith("two speak as 1/1") for text in noted(one))
@@ -282,8 +292,8 @@ def test_a_takeover_is_still_seen_beside_a_voice_that_contradicts_the_vehicle(al
     one.wait(2)
     one.vehicle.simulation.inject(SecondVoice(one.vehicle.simulation.now_us, Voice.STRAYED, 250_000, 60 * S))
     one.wait(4)
-    one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us, Mode.RETURN))
-    assert isinstance(one.until((Succeeded, Failed, TakenOver), 6), TakenOver)
+    one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us, FlightMode.RETURN))
+    assert isinstance(one.until((Succeeded, CommandFailed, TakenOver), 6), TakenOver)
 
 
 # ---------------------------------------------------------------- what no waiting changes
@@ -292,17 +302,17 @@ def test_a_takeover_is_still_seen_beside_a_voice_that_contradicts_the_vehicle(al
 def test_a_parameter_that_no_waiting_changes_is_told_once_and_soon(flavour: str) -> None:
     one = Flyer(flavour, return_mm=22_000)
     policy = replace(POLICY, vehicle=replace(POLICY.vehicle, return_altitude=80_000))
-    one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=Kind(flavour), return_mm=22_000))
-    told = one.until(Unfit, 30)
+    one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=AutopilotKind(flavour), return_mm=22_000))
+    told = one.until(VehicleUnfit, 30)
     one.wait(30)
     assert "it returns at 22 m" in told.why
-    assert sum(isinstance(each, Unfit) for each in one.events) == 1
+    assert sum(isinstance(each, VehicleUnfit) for each in one.events) == 1
 
 
 def test_a_vehicle_that_only_needs_time_is_not_given_up(flavour: str) -> None:
     one = Flyer(flavour)
     one.until(Ready)
-    assert not any(isinstance(each, Unfit) for each in one.events)
+    assert not any(isinstance(each, VehicleUnfit) for each in one.events)
 
 
 @pytest.mark.parametrize("next_", [None, MotionKind.HOME, MotionKind.LAND, MotionKind.FLY])
@@ -314,17 +324,17 @@ def test_a_takeover_is_not_hidden_by_a_voice_that_goes_on_reporting_our_mode(
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(4)
     ours = own(one, mode=one.vehicle.driver.seen.mode)
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     for beats in range(1_000):
         says(one, ours)
         one.wait(0.02)
         if next_ is not None and beats == 100:
             where = (200_000, 90_000) if next_ is MotionKind.FLY else None
             one.begin(next_, *((where,) if where else ()), altitude=25_000, speed=5_000)
-        if any(isinstance(event, TakenOver | Failed) for event in one.events):
+        if any(isinstance(event, TakenOver | CommandFailed) for event in one.events):
             break
     assert any(isinstance(event, TakenOver) for event in one.events)
-    assert one.truth.mode is Mode.POSITION
+    assert one.truth.mode is FlightMode.POSITION
 
 
 @pytest.mark.parametrize("kind", [MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND])
@@ -334,7 +344,7 @@ def test_a_command_that_begins_where_one_report_says_that_a_mode_was_left_leaves
     """Nothing of ours flies, as after a restart: the mode that is left counts as the one before."""
     one = copied(climbed("px4", 20_000))
     one.vehicle.driver._manoeuvre = None
-    one.vehicle.simulation.inject(PilotMode(0, Mode.POSITION))
+    one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     for _ in range(400):
         one.wait(0.01)
         if one.vehicle.driver._left_mode is not None:
@@ -344,4 +354,4 @@ def test_a_command_that_begins_where_one_report_says_that_a_mode_was_left_leaves
     one.wait(3)
     assert any(isinstance(event, TakenOver) for event in one.events)
     assert not any(isinstance(event, Sent) and event.token == token for event in one.events)
-    assert one.truth.mode is Mode.POSITION
+    assert one.truth.mode is FlightMode.POSITION

@@ -61,7 +61,7 @@ def test_a_finding_has_its_rule_level_message_and_place() -> None:
     one = run(BROAD)
     (rule,), (result,) = one["tool"]["driver"]["rules"], one["results"]
     assert (rule["id"], rule["name"]) == ("E1303", "BroadAuthority")
-    assert rule["shortDescription"]["text"] == "A rule permits more than anyone is likely to mean."
+    assert rule["shortDescription"]["text"] == "A rule permits unusually much."
     assert rule["defaultConfiguration"] == {"level": "warning"}
     assert (result["ruleId"], result["ruleIndex"], result["level"]) == ("E1303", 0, "warning")
     assert result["message"]["text"] == "`any` permits {{everyone}}, see [here] (1)\nhelp: name a role"

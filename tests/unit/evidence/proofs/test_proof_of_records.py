@@ -8,8 +8,8 @@ from reference.sealed_log import LOG_KEY, PIN, VEHICLE, SealedLog, now, resumed,
 from reference.seeds import epoch_seeds
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.proofs.check import Proven, check_proof
-from rtshcua.evidence.proofs.cose_receipt import Received, check_receipt, make_receipt
-from rtshcua.evidence.proofs.file import Kind
+from rtshcua.evidence.proofs.cose_receipt import ReceiptClaim, check_receipt, make_receipt
+from rtshcua.evidence.proofs.file import ProofKind
 from rtshcua.evidence.proofs.make import (
     anchored,
     find,
@@ -18,7 +18,7 @@ from rtshcua.evidence.proofs.make import (
     receipt_of,
     with_cosignatures,
 )
-from rtshcua.evidence.records import Close, Decision, Effect, Genesis, Recover, Seal
+from rtshcua.evidence.records import Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.cosign import cosign
 from rtshcua.wire.keys import Duty, SigningKey
 from virtual import case
@@ -35,7 +35,7 @@ def proven(data: bytes, pin: bytes = PIN) -> Proven:
     return checked
 
 
-def slug(made: bytes | Flaw | Proven | Received | object) -> str:
+def slug(made: bytes | Flaw | Proven | ReceiptClaim | object) -> str:
     assert isinstance(made, Flaw), made
     return made.slug
 
@@ -90,7 +90,7 @@ def test_every_record_is_proven_under_the_first_signed_one_after_it(log: SealedL
         data = proof(prove_inclusion(lambda: log.lines, number))
         shown = proven(data)
         last = number == len(log.lines) - 1
-        assert shown.kind is (Kind.RECORD if last else Kind.INCLUSION)
+        assert shown.kind is (ProofKind.RECORD if last else ProofKind.INCLUSION)
         assert shown.checkpoint.size == next((at for at in log.signed if at > number), number)
         assert shown.believed.name.vehicle == VEHICLE
         assert shown.record is not None
@@ -129,7 +129,7 @@ def test_checkpoints_of_one_log_are_consistent(log: SealedLog) -> None:
     for old in log.signed[:-1]:
         for at in (*(at for at in log.signed if at > old), None):
             shown = proven(proof(prove_consistency(lambda: log.lines, old, at)))
-            assert shown.kind is Kind.CONSISTENCY
+            assert shown.kind is ProofKind.CONSISTENCY
             assert shown.older is not None
             assert (shown.older.size, shown.checkpoint.size) == (old, log.signed[-1] if at is None else at)
             assert shown.record is None
@@ -142,7 +142,7 @@ def test_what_is_not_sealed_yet_is_not_proven() -> None:
     log = sealed_log(closed=False)
     last = len(log.lines) - 1
     assert slug(prove_inclusion(lambda: log.lines, last)) == "proof/unsealed"
-    assert proven(proof(prove_inclusion(lambda: log.lines, log.signed[-1]))).kind is Kind.RECORD
+    assert proven(proof(prove_inclusion(lambda: log.lines, log.signed[-1]))).kind is ProofKind.RECORD
     torn = (*log.lines[:-1], log.lines[-1][:-5])
     assert slug(prove_inclusion(lambda: torn, last)) == "proof/number"
     assert proven(proof(prove_inclusion(lambda: torn, 2))).number == 2
@@ -190,11 +190,11 @@ def receipt(log: SealedLog, number: int, at: int | None = None) -> bytes | Flaw:
 def test_a_receipt_verifies_alone(log: SealedLog) -> None:
     for number in range(len(log.lines) - 1):
         received = check_receipt(proof(receipt(log, number)), PIN)
-        assert isinstance(received, Received), received
+        assert isinstance(received, ReceiptClaim), received
         assert received.number == received.record.seq == number
         assert received.name.vehicle == VEHICLE
         assert received.log_key.kid == LOG_KEY.kid
-        assert isinstance(received.record, Decision | Effect | Genesis | Seal | Recover)
+        assert isinstance(received.record, DecisionRecord | Effect | Genesis | Seal | Recover)
 
 
 def test_a_receipt_is_made_of_no_log_that_does_not_hold_and_by_no_other_key(log: SealedLog) -> None:

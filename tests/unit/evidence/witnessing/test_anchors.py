@@ -6,7 +6,7 @@ import pytest
 
 from reference.witnessed import ORIGIN, PUBLIC, WITNESSES, Judge, Log
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.witnessing.anchors import Anchored, Anchors, notes
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors, notes
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def log() -> Log:
     return log
 
 
-def outcome(log: Log, anchors: list[str], threshold: int = 1, keys: list[bytes] = PUBLIC) -> Anchored | Flaw:
+def outcome(log: Log, anchors: list[str], threshold: int = 1, keys: list[bytes] = PUBLIC) -> AnchoredExtent | Flaw:
     """The same, whichever comes first: the anchors, the checkpoints, or each after the other."""
     steps = [[("anchor", each) for each in anchors], [("checkpoint", each) for each in log.notes]]
     found = []
@@ -35,7 +35,7 @@ def outcome(log: Log, anchors: list[str], threshold: int = 1, keys: list[bytes] 
 
 def anchored(log: Log, anchors: list[str], threshold: int = 1) -> tuple[int, int]:
     found = outcome(log, anchors, threshold)
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     return found.records, found.tail
 
 
@@ -46,7 +46,7 @@ def slug(log: Log, anchors: list[str], threshold: int = 1) -> str:
 
 
 def test_without_anchors_all_is_tail(log: Log) -> None:
-    assert outcome(log, []) == Anchored(0, 9, 1, ())
+    assert outcome(log, []) == AnchoredExtent(0, 9, 1, ())
 
 
 def test_a_checkpoint_anchors_all_before_it_and_its_own_record(log: Log) -> None:
@@ -66,7 +66,7 @@ def test_the_threshold_counts_witnesses(log: Log) -> None:
     assert anchored(log, marks, 3) == (0, 9)
     assert anchored(log, [far.blindly(log.notes[1]), far.blindly(log.notes[3])], 2) == (0, 9)
     found = outcome(log, marks)
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     assert [(seen.public, seen.size) for seen in found.witnessed] == [(PUBLIC[0], 8), (PUBLIC[1], 4)]
 
 
@@ -125,11 +125,11 @@ def test_a_forged_cosignature_for_this_log(log: Log) -> None:
     text, _, lines = mark.rpartition("\n\n")
     forged = text.replace("\n4\n", "\n5\n") + "\n\n" + lines
     found = outcome(log, [forged])
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     assert (found.records, found.witnessed, found.rejected) == (0, (), 1)
     assert found.first.endswith("did not sign this checkpoint at this time")
     found = outcome(log, [forged, mark, forged])
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     assert (found.records, found.rejected) == (5, 2)
 
 
@@ -137,7 +137,7 @@ def test_a_note_with_one_wrong_signature_says_nothing_at_all(log: Log) -> None:
     note = log.notes[1]
     good, other = Judge().blindly(note), Judge(WITNESSES[1]).blindly(log.notes[2]).removeprefix(log.notes[2])
     found = outcome(log, [good + other])
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     assert (found.records, found.witnessed, found.rejected) == (0, (), 1)
 
 
@@ -146,7 +146,7 @@ def test_what_went_further_than_is_anchored(log: Log) -> None:
     marks = [far.blindly(log.notes[3]), near.blindly(log.notes[1])]
     for threshold, ahead in ((1, []), (2, [8]), (3, [8, 4])):
         found = outcome(log, marks, threshold)
-        assert isinstance(found, Anchored)
+        assert isinstance(found, AnchoredExtent)
         assert [seen.size for seen in found.ahead] == ahead
 
 
@@ -165,14 +165,14 @@ def test_what_went_further_than_is_anchored(log: Log) -> None:
     ids=range(8),
 )
 def test_what_says_nothing(log: Log, note: str) -> None:
-    assert outcome(log, [note]) == Anchored(0, 9, 1, ())
+    assert outcome(log, [note]) == AnchoredExtent(0, 9, 1, ())
 
 
 def test_who_is_not_trusted_says_nothing(log: Log) -> None:
     longer = Log()
     longer.effects(80)
     mark = Judge(WITNESSES[2]).blindly(longer.seal())
-    assert outcome(log, [mark], keys=PUBLIC[:2]) == Anchored(0, 9, 1, ())
+    assert outcome(log, [mark], keys=PUBLIC[:2]) == AnchoredExtent(0, 9, 1, ())
 
 
 def test_notes_of_a_file(log: Log) -> None:

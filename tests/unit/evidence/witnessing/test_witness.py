@@ -14,9 +14,9 @@ from rtshcua.evidence.witnessing.witness import (
     MALFORMED,
     MOST_PROOF,
     UNKNOWN,
-    Answer,
+    CosignRequest,
     Declined,
-    Request,
+    WitnessResponse,
     decode,
     decode_answer,
     judge,
@@ -26,13 +26,13 @@ from rtshcua.wire.keys import Duty
 from virtual.rows import rows
 
 
-def asked(log: Log, known: int | None, records: int | None = None) -> Request:
+def asked(log: Log, known: int | None, records: int | None = None) -> CosignRequest:
     request = log.submission.request(known, len(log.lines) if records is None else records)
     assert request is not None
     return request
 
 
-def refused(witness: Judge, request: Request) -> Declined:
+def refused(witness: Judge, request: CosignRequest) -> Declined:
     before = dict(witness.seen)
     found = witness.consider(request)
     assert isinstance(found, Declined), found
@@ -40,7 +40,7 @@ def refused(witness: Judge, request: Request) -> Declined:
     return found
 
 
-def cosigned(witness: Judge, request: Request) -> str:
+def cosigned(witness: Judge, request: CosignRequest) -> str:
     found = witness.consider(request)
     assert isinstance(found, str), found
     return found
@@ -134,20 +134,20 @@ def test_split_view_at_the_same_size(split_view: tuple[Log, Log, Judge]) -> None
     log, other, witness = split_view
     size = log.submission.last(99)
     assert size == other.submission.last(99) == 6
-    found = refused(witness, Request(6, (), other.notes[-1]))
+    found = refused(witness, CosignRequest(6, (), other.notes[-1]))
     assert (found.status, found.size, found.contradiction) == (CONFLICT, 6, True)  # an epoch's key signs once
-    found = refused(witness, Request(6, (), other.notes[-1], tuple(other.notes[:-1])))
+    found = refused(witness, CosignRequest(6, (), other.notes[-1], tuple(other.notes[:-1])))
     assert (found.status, found.contradiction) == (CONFLICT, False)
     other.effects(1)
     other.seal()
-    assert refused(witness, Request(6, (), other.notes[-1])).status == FORBIDDEN
+    assert refused(witness, CosignRequest(6, (), other.notes[-1])).status == FORBIDDEN
 
 
 def test_split_view_by_the_log_key(split_view: tuple[Log, Log, Judge]) -> None:
     _, _, witness = split_view
     fork = Checkpoint(ORIGIN, 6, bytes(32), bytes(32), bytes(32))
     note = sign(fork, LOG_KEY.public, lambda text: LOG_KEY.sign(text, duty=Duty.LOG))
-    found = refused(witness, Request(6, (), note))
+    found = refused(witness, CosignRequest(6, (), note))
     assert (found.status, found.size, found.contradiction) == (CONFLICT, 6, True)
 
 
@@ -195,7 +195,7 @@ def test_rollback_and_truncation(split_view: tuple[Log, Log, Judge]) -> None:
     log, _, witness = split_view
     found = refused(witness, asked(log, 0, 4))
     assert (found.status, found.size) == (CONFLICT, 6)
-    found = refused(witness, Request(6, (), log.notes[1]))
+    found = refused(witness, CosignRequest(6, (), log.notes[1]))
     assert found.status == MALFORMED
 
 
@@ -226,7 +226,7 @@ def test_a_chain_goes_forward() -> None:
         log.effects(1)
         log.recover()
     notes = log.notes
-    request = Request(0, (), notes[3], (notes[0], notes[2], notes[1]))
+    request = CosignRequest(0, (), notes[3], (notes[0], notes[2], notes[1]))
     assert refused(Judge(), request).status == INCONSISTENT
     assert refused(Judge(), request._replace(chain=(notes[0], notes[1], notes[0]))).status == CONFLICT
 
@@ -253,15 +253,15 @@ def test_a_chain_of_another_log_gives_no_key() -> None:
     seal = Log()
     seal.effects(1)
     note = seal.seal()
-    assert refused(Judge(), Request(0, (), note, (genesis,))).status == FORBIDDEN
+    assert refused(Judge(), CosignRequest(0, (), note, (genesis,))).status == FORBIDDEN
     # a signature in the name of the one below the text of the other
     swapped = f"{text}\n{Log().notes[0].rpartition(chr(10) * 2)[2]}"
-    assert refused(Judge(), Request(0, (), note, (swapped,))).status == FORBIDDEN
+    assert refused(Judge(), CosignRequest(0, (), note, (swapped,))).status == FORBIDDEN
     key = LOG_KEY.public
     crossed = text + "\n" + signature_line(
         ORIGIN, key_id(ORIGIN, key) + LOG_KEY.sign(text.encode(), duty=Duty.LOG)
     )  # fmt: skip
-    assert refused(Judge(), Request(0, (), note, (crossed,))).status == FORBIDDEN
+    assert refused(Judge(), CosignRequest(0, (), note, (crossed,))).status == FORBIDDEN
 
 
 def test_a_first_note_that_is_no_genesis() -> None:
@@ -269,24 +269,24 @@ def test_a_first_note_that_is_no_genesis() -> None:
     log = Log()
     log.effects(1)
     log.recover()
-    assert refused(Judge(), Request(0, (), log.notes[1])).status == FORBIDDEN
+    assert refused(Judge(), CosignRequest(0, (), log.notes[1])).status == FORBIDDEN
 
 
 def test_logs_of_others() -> None:
     stranger = Checkpoint("some/log", 0, bytes(32), bytes(32), None)
     note = sign(stranger, LOG_KEY.public, lambda text: LOG_KEY.sign(text, duty=Duty.LOG))
-    assert refused(Judge(), Request(0, (), note)).status == UNKNOWN
+    assert refused(Judge(), CosignRequest(0, (), note)).status == UNKNOWN
     theirs = Log().notes[0]
-    assert isinstance(found := judge(Request(0, (), theirs), None, lambda vehicle: ()), Declined)
+    assert isinstance(found := judge(CosignRequest(0, (), theirs), None, lambda vehicle: ()), Declined)
     assert found.status == UNKNOWN
-    assert judge(Request(0, (), theirs), None, lambda vehicle: (bytes(32),)) == Declined(
+    assert judge(CosignRequest(0, (), theirs), None, lambda vehicle: (bytes(32),)) == Declined(
         FORBIDDEN, "it is not signed by the key that the record before names, nor by the log's"
     )
 
 
 @pytest.mark.parametrize("note", ["", "x", "a\n\n— b c\n", Log().notes[0].rpartition("\n\n")[0] + "\n"])
 def test_what_is_no_checkpoint(note: str) -> None:
-    assert refused(Judge(), Request(0, (), note)).status == MALFORMED
+    assert refused(Judge(), CosignRequest(0, (), note)).status == MALFORMED
 
 
 @rows(
@@ -346,7 +346,7 @@ def test_what_is_no_request(data: bytes) -> None:
 def test_the_largest_proof_is_read() -> None:
     data = b"old 0\n" + (b"A" * 43 + b"=\n") * MOST_PROOF + b"\na\n\nb\n"
     request = decode(data)
-    assert isinstance(request, Request)
+    assert isinstance(request, CosignRequest)
     assert request.encode() == data
 
 
@@ -367,7 +367,7 @@ def test_whatever_comes(data: st.DataObject) -> None:
         place = data.draw(st.integers(0, len(octets) - 1))
         octets[place : place + data.draw(st.integers(0, 2))] = data.draw(st.binary(max_size=2))
     request = decode(bytes(octets))
-    if isinstance(request, Request) and isinstance(witness.consider(request), str):
+    if isinstance(request, CosignRequest) and isinstance(witness.consider(request), str):
         assert request.note.partition("\n\n")[0] == SAMPLE.notes[2].partition("\n\n")[0]
 
 
@@ -398,8 +398,14 @@ def test_answers() -> None:
     refusal = Declined(CONFLICT, "words", 12)
     assert refusal.answer().encode() == b"409\n12\n"
     assert refusal.answer().size == 12
-    assert Declined(FORBIDDEN, "words").answer() == Answer(FORBIDDEN, "words\n")
-    for answer in (refusal.answer(), Answer(200, "— a b\n")):
+    assert Declined(FORBIDDEN, "words").answer() == WitnessResponse(FORBIDDEN, "words\n")
+    for answer in (refusal.answer(), WitnessResponse(200, "— a b\n")):
         assert decode_answer(answer.encode()) == answer
-    assert [Answer(409, body).size for body in ("", "x\n", "9" * 17, "²", "0\n")] == [None, None, None, None, 0]
+    assert [WitnessResponse(409, body).size for body in ("", "x\n", "9" * 17, "²", "0\n")] == [
+        None,
+        None,
+        None,
+        None,
+        0,
+    ]
     assert [decode_answer(data) for data in (b"", b"200", b"20\n", b"abc\n")] == [None] * 4

@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from rtshcua.adapters.vehicle.address import Address, Way
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.vehicle.transport import SerialTransport
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app, doctor
@@ -56,7 +56,7 @@ def test_garbage_is_told_from_no_heartbeat(line: tuple[str, int], capsys: pytest
 
 def test_a_busy_port(line: tuple[str, int], capsys: pytest.CaptureFixture[str]) -> None:
     device, _ = line
-    other = SerialTransport(Address(Way.SERIAL, device, 57_600))
+    other = SerialTransport(Address(LinkCarrier.SERIAL, device, 57_600))
     code, said = says(f"serial:{device}:57600", capsys)
     other.close()
     assert code == ExitCode.LINK

@@ -10,13 +10,13 @@ import pytest
 from reference.flat_case import MISSION, POLICY
 from reference.world import START
 from rtshcua.adapters.boundary_process import BoundaryError
-from rtshcua.adapters.utc import TimeOfDay
+from rtshcua.adapters.utc import TimeSources
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import doctor
 from rtshcua.front.cli.app import main
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import TIME
-from rtshcua.wire.clock import Source
+from rtshcua.wire.clock import ClockSource
 
 SOCKET = Path("run/quad-07")
 TOLD = Struct(">BqqqQ")
@@ -27,21 +27,21 @@ TOLD = Struct(">BqqqQ")
 )
 def test_of_a_run_on_this_machine(monkeypatch: pytest.MonkeyPatch, apart: bool, keyed: bool, counts: bool) -> None:
     monkeypatch.setattr(doctor, "kernel_error_us", lambda: None)
-    assert doctor._time_of_day(None, 500_000, keyed=keyed, apart=apart) == TimeOfDay(None, counts, 500_000)
+    assert doctor._time_of_day(None, 500_000, keyed=keyed, apart=apart) == TimeSources(None, counts, 500_000)
 
 
 @pytest.mark.parametrize(
     ("source", "linked", "found"),
     [
-        (Source.KERNEL, False, TimeOfDay(7, vehicle=False, listens=True)),
-        (Source.OPERATOR, False, TimeOfDay(None, vehicle=False, stated_us=7, listens=True)),
-        (Source.UNKNOWN, False, TimeOfDay(None, vehicle=False, listens=True)),
-        (Source.UNKNOWN, True, TimeOfDay(None, vehicle=True, listens=True)),
-        (Source.SHARED, True, TimeOfDay(9, vehicle=True, listens=True)),
+        (ClockSource.KERNEL, False, TimeSources(7, vehicle=False, listens=True)),
+        (ClockSource.OPERATOR, False, TimeSources(None, vehicle=False, stated_us=7, listens=True)),
+        (ClockSource.UNKNOWN, False, TimeSources(None, vehicle=False, listens=True)),
+        (ClockSource.UNKNOWN, True, TimeSources(None, vehicle=True, listens=True)),
+        (ClockSource.SHARED, True, TimeSources(9, vehicle=True, listens=True)),
     ],
 )
 def test_of_a_boundary_that_listens(
-    monkeypatch: pytest.MonkeyPatch, source: Source, linked: bool, found: TimeOfDay
+    monkeypatch: pytest.MonkeyPatch, source: ClockSource, linked: bool, found: TimeSources
 ) -> None:
     """It is asked as a run asks that waits for no more, and let go."""
     asked: list[bytes] = []
@@ -66,7 +66,7 @@ def test_of_one_that_does_not_answer_is_said_elsewhere(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(doctor, "ListeningBoundary", nobody)
     monkeypatch.setattr(doctor, "kernel_error_us", lambda: 9)
-    assert doctor._time_of_day(SOCKET, None, keyed=False, apart=True) == TimeOfDay(9, listens=True)
+    assert doctor._time_of_day(SOCKET, None, keyed=False, apart=True) == TimeSources(9, listens=True)
 
 
 def test_a_boundary_that_listens_is_told_in_its_own_command_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -78,13 +78,13 @@ def test_a_boundary_that_listens_is_told_in_its_own_command_line(capsys: pytest.
 @pytest.mark.parametrize(
     ("time", "stops"),
     [
-        (TimeOfDay(20_000), True),
-        (TimeOfDay(None, stated_us=500_000), True),
-        (TimeOfDay(20_000, stated_us=1 << 50), True),
-        (TimeOfDay(None), False),
+        (TimeSources(20_000), True),
+        (TimeSources(None, stated_us=500_000), True),
+        (TimeSources(20_000, stated_us=1 << 50), True),
+        (TimeSources(None), False),
     ],
 )
-def test_a_mission_that_expired_stops_where_the_time_is_known(time: TimeOfDay, stops: bool) -> None:
+def test_a_mission_that_expired_stops_where_the_time_is_known(time: TimeSources, stops: bool) -> None:
     later = Now(START.monotonic_us, START.utc_us + (1 << 40), START.utc_error_us)
     found = doctor._expired(POLICY, MISSION, later, time)
     assert [each.slug for each in found] == ["mission/expired"] * stops

@@ -21,7 +21,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.subject import Subject, after, prepared, unpacked
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, Loaded, Mode, load
+from rtshcua.onboard.enforcement.load import SESSION_KEY_BYTES, EnforcementMode, Loaded, load
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.receipt import Receipt, decode
 from rtshcua.wire.trust import open_root
@@ -65,7 +65,7 @@ def in_force(bundle: Path) -> Loaded:
     store = KeyStore(data_folder())
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
     found = load(
-        bundle.read_bytes(), root=root, vehicle="quad-07", now=now(), mode=Mode.SOFTWARE,
+        bundle.read_bytes(), root=root, vehicle="quad-07", now=now(), mode=EnforcementMode.SOFTWARE,
         session_key=bytes(SESSION_KEY_BYTES), flight=bytes(16), peer_is_own_simulator=True,
     )  # fmt: skip
     assert isinstance(found, Loaded)

@@ -14,7 +14,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import connection, doctor, launch
 from rtshcua.front.cli.app import main
 from rtshcua.library import root as library
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 
 BUILT = Path("/usr/lib/rtshcua-boundary")
 
@@ -22,20 +22,25 @@ BUILT = Path("/usr/lib/rtshcua-boundary")
 @pytest.mark.parametrize(
     ("asked", "own", "named", "built", "found"),
     [
-        (None, True, False, True, (Mode.SOFTWARE, False)),
-        (None, True, False, False, (Mode.SOFTWARE, False)),
-        (None, False, False, True, (Mode.PROCESS, False)),
-        (None, False, False, False, (Mode.SOFTWARE, True)),
-        (None, False, True, False, (Mode.PROCESS, False)),  # and it is refused: its user was asked for
-        (None, True, True, True, (Mode.PROCESS, False)),
-        (Mode.SOFTWARE, False, False, True, (Mode.SOFTWARE, False)),
-        (Mode.SOFTWARE, False, False, False, (Mode.SOFTWARE, False)),
-        (Mode.PROCESS, True, False, False, (Mode.PROCESS, False)),
-        (Mode.NONE, True, False, True, (Mode.NONE, False)),
+        (None, True, False, True, (EnforcementMode.SOFTWARE, False)),
+        (None, True, False, False, (EnforcementMode.SOFTWARE, False)),
+        (None, False, False, True, (EnforcementMode.PROCESS, False)),
+        (None, False, False, False, (EnforcementMode.SOFTWARE, True)),
+        (None, False, True, False, (EnforcementMode.PROCESS, False)),  # and it is refused: its user was asked for
+        (None, True, True, True, (EnforcementMode.PROCESS, False)),
+        (EnforcementMode.SOFTWARE, False, False, True, (EnforcementMode.SOFTWARE, False)),
+        (EnforcementMode.SOFTWARE, False, False, False, (EnforcementMode.SOFTWARE, False)),
+        (EnforcementMode.PROCESS, True, False, False, (EnforcementMode.PROCESS, False)),
+        (EnforcementMode.NONE, True, False, True, (EnforcementMode.NONE, False)),
     ],
 )
 def test_the_mode_that_counts(
-    asked: Mode | None, own: bool, named: bool, built: bool, found: tuple[Mode, bool], monkeypatch: pytest.MonkeyPatch
+    asked: EnforcementMode | None,
+    own: bool,
+    named: bool,
+    built: bool,
+    found: tuple[EnforcementMode, bool],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(connection, "program", lambda: BUILT if built else None)
     assert connection.mode_of(asked, own=own, named=named) == found

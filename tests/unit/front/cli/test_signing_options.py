@@ -21,7 +21,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app, launch
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.radio import UnsignedRadio
-from rtshcua.mavlink.signing import SignedLink, State
+from rtshcua.mavlink.signing import SignedLink, SigningState
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
 from virtual import case
@@ -146,7 +146,7 @@ def test_frames_that_another_key_signed_are_told_of(tmp_path: Path, key_file: Pa
     clock = SystemClock()
     signing = Signing(key_file, POLICY, FrameSession(), tmp_path, clock, unsigned_radio=False)
     now = clock.now()
-    link, other = signing.verifier, SignedLink(bytes(range(1, 33)), State(0, {}), now.utc_us, now.monotonic_us)
+    link, other = signing.verifier, SignedLink(bytes(range(1, 33)), SigningState(0, {}), now.utc_us, now.monotonic_us)
     assert isinstance(link, SignedLink)
     assert signing.rejected is None, "nothing came"
     link.accept(HEARTBEAT, now.monotonic_us)
@@ -156,7 +156,7 @@ def test_frames_that_another_key_signed_are_told_of(tmp_path: Path, key_file: Pa
     _, text, help = unmet("a vehicle", 10, None, signing.rejected, "nothing else matters then")
     assert text.startswith("no heartbeat of a vehicle within 10 s: frames come")
     assert "--signing-key" in help
-    right = SignedLink(KEY, State(0, {}), now.utc_us, now.monotonic_us, link=1)
+    right = SignedLink(KEY, SigningState(0, {}), now.utc_us, now.monotonic_us, link=1)
     assert link.accept(right.sign(HEARTBEAT, now.monotonic_us), now.monotonic_us)
     assert signing.rejected is None
     signing.close()

@@ -11,7 +11,7 @@ import pytest
 from rtshcua.adapters.simulator import SimulatorError
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import sim as command
-from rtshcua.simulation.config import Kind
+from rtshcua.simulation.config import AutopilotKind
 from rtshcua.simulation.process import config_of, parser
 
 KEY = b"shared/traces test key, 32 bytes"
@@ -90,7 +90,7 @@ def test_what_flies_it_flies_it_on_this_machine_when_copied(
 
 
 def test_another_port_flavour_and_id(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command.sim(flavour=Kind.ARDUPILOT, port=14_560, system=7) == ExitCode.OK
+    assert command.sim(flavour=AutopilotKind.ARDUPILOT, port=14_560, system=7) == ExitCode.OK
     out = capsys.readouterr().out
     assert "a simulated ardupilot vehicle, system 7, sends to udp port 14560" in out
     assert "Comm Links, Add: type UDP, port 14560" in out

@@ -12,7 +12,7 @@ from reference.world import Run
 from rtshcua.app.fly.agents import Agents
 from rtshcua.app.fly.story import Happened, Happening
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.records import Decision
+from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.live.lines import as_json, plain
 from rtshcua.front.mcp.server import TOOLS
@@ -156,7 +156,7 @@ def test_a_record_holds_the_index(flown: Run) -> None:
     decided = [json.loads(line) for line in flown.lines if b'"type":"decision"' in line]
     assert decided[0]["step"] == 0
     assert "step_number" not in decided[0]
-    assert "step_number" not in Decision.__struct_fields__
+    assert "step_number" not in DecisionRecord.__struct_fields__
 
 
 def test_number_and_index_are_one_apart() -> None:

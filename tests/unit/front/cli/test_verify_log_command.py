@@ -16,7 +16,7 @@ from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
-from rtshcua.evidence.report import Report, Verdict
+from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.front.cli import app, verdict, verify_log
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.names import LOG
@@ -423,6 +423,6 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
     ],
 )
 def test_exit_codes_of_failures(slug: str, code: ExitCode) -> None:
-    report = Report(0, {}, Finding(slug, 0, ""), None, None, None, 0, b"", (), ())
-    assert report.verdict is Verdict.FAILED
+    report = LogReport(0, {}, Finding(slug, 0, ""), None, None, None, 0, b"", (), ())
+    assert report.verdict is LogVerdict.FAILED
     assert verify_log.exit_code(report) is code

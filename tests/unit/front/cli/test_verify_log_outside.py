@@ -12,8 +12,8 @@ from rtshcua.adapters.store.recovery import examine
 from rtshcua.app.fly.simulated_flight import SIMULATED, told
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.recovery import ending
-from rtshcua.evidence.report import Report
-from rtshcua.evidence.witnessing.anchors import Anchored, Witnessed
+from rtshcua.evidence.report import LogReport
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Witnessed
 from rtshcua.front.cli import app, verify_log
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty
@@ -86,8 +86,21 @@ def test_fast_says_nothing_of_telemetry_where_there_is_none(log: Path, capsys: p
 
 
 def test_a_log_that_must_be_anchored_and_too_few_cosigned() -> None:
-    report = Report(
-        10, {}, None, None, None, None, 0, b"", (), (), 10, 1, 0, Anchored(0, 10, 2, (Witnessed(bytes(32), "w", 9, 1),))
+    report = LogReport(
+        10,
+        {},
+        None,
+        None,
+        None,
+        None,
+        0,
+        b"",
+        (),
+        (),
+        10,
+        1,
+        0,
+        AnchoredExtent(0, 10, 2, (Witnessed(bytes(32), "w", 9, 1),)),
     )
     missing = verify_log._required(report).shortfall
     assert missing is not None

@@ -10,7 +10,7 @@ from reference.forgery import flight
 from reference.world import FakeVehicle, Run
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.onboard.ports import Failed, Interrupted
+from rtshcua.onboard.ports import CommandFailed, Interrupted
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 STANDARD = str(CHECKOUT / "missions" / "standard.rts")
@@ -216,7 +216,7 @@ def late_until(ends: int) -> list[bytes]:
     """The log of a run whose take-off came too late so often; then it flies, or its time is over."""
     run = Run().until_flies("takeoff")
     for _ in range(ends):
-        run.tick(Failed(0, run.vehicle.commands[-1].token, "late"))
+        run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "late"))
         if run.ending is not None:
             break
     run.until_over()

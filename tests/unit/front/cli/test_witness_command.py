@@ -15,7 +15,7 @@ from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.logs import read_anchors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder, origin_of
-from rtshcua.evidence.witnessing.anchors import Anchored, Anchors
+from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors
 from rtshcua.front.cli import app
 from rtshcua.front.cli import witness as command
 from rtshcua.model.flat.situation import Now
@@ -75,7 +75,7 @@ def said(capsys: pytest.CaptureFixture[str]) -> list[dict[str, object]]:
     return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 
 
-def anchored(flown: Flown, store: KeyStore) -> Anchored:
+def anchored(flown: Flown, store: KeyStore) -> AnchoredExtent:
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
     held = Anchors(ORIGIN, root.witnesses("quad-07", time.time_ns() // 1_000), root.witness_threshold)
     for note in read_anchors(flown.path):
@@ -84,7 +84,7 @@ def anchored(flown: Flown, store: KeyStore) -> Anchored:
         if checkpoint := json.loads(line).get("checkpoint"):
             assert held.checkpoint(checkpoint) is None
     found = held.finish(flown.count)
-    assert isinstance(found, Anchored)
+    assert isinstance(found, AnchoredExtent)
     return found
 
 

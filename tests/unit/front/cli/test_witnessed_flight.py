@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters.vehicle.address import Address
-from rtshcua.adapters.witness_link import Anchor, Trouble
+from rtshcua.adapters.witness_link import Anchor, WitnessTrouble
 from rtshcua.app.fly import witnesses
 from rtshcua.app.fly.refused import Refused
 from rtshcua.app.fly.witnesses import Witnessing, addresses
@@ -26,12 +26,12 @@ class Client:
         self.given = given
         Client.waited = []
 
-    def news(self) -> list[Anchor | Trouble]:
-        return [Anchor("a note"), Trouble("a word")]
+    def news(self) -> list[Anchor | WitnessTrouble]:
+        return [Anchor("a note"), WitnessTrouble("a word")]
 
-    def finish(self, *last: object) -> list[Trouble]:
+    def finish(self, *last: object) -> list[WitnessTrouble]:
         Client.waited.append(last)
-        return [Trouble("the end")]
+        return [WitnessTrouble("the end")]
 
 
 def test_addresses() -> None:

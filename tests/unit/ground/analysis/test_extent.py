@@ -26,7 +26,7 @@ TABLES = Tables(
 )
 SMALL = st.integers(-3, 9)
 TERMS = st.lists(
-    st.builds(tree.Term, st.booleans(), st.integers(0, 1), st.integers(-3, 3)),
+    st.builds(tree.LinearTerm, st.booleans(), st.integers(0, 1), st.integers(-3, 3)),
     max_size=2,
     unique_by=lambda term: term[:2],
 ).map(tuple)
@@ -34,15 +34,15 @@ ATOMS = st.one_of(
     st.builds(tree.AtMost, TERMS, SMALL),
     st.builds(tree.Equal, TERMS, SMALL),
     st.builds(tree.Member, st.booleans(), st.integers(0, 1), st.integers(0, 1)),
-    st.builds(tree.InPhase, st.integers(0, 1)),
+    st.builds(tree.PhaseIn, st.integers(0, 1)),
     st.builds(tree.PointInside, st.just(0), st.integers(0, 2)),
-    st.builds(tree.Inside, st.integers(0, 2)),
-    st.builds(tree.Known, st.integers(0, 1)),
+    st.builds(tree.InsideZone, st.integers(0, 2)),
+    st.builds(tree.SlotKnown, st.integers(0, 1)),
 )
 NODES = st.recursive(
     ATOMS,
     lambda inner: st.one_of(
-        st.builds(tree.Both, inner, inner), st.builds(tree.Either, inner, inner), st.builds(tree.Not, inner)
+        st.builds(tree.Both, inner, inner), st.builds(tree.Either, inner, inner), st.builds(tree.Negation, inner)
     ),
     max_leaves=6,
 )

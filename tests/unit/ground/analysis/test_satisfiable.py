@@ -55,7 +55,7 @@ SPACE = Space(ARGUMENTS, SLOTS, ((0, DAY - 1),), (0, 0), frozenset((-1, 0)), (7,
 
 NUMBERS = ((True, 0), (True, 1), (False, 0), (False, 1))
 TERMS = st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=3, unique=True).flatmap(
-    lambda cells: st.tuples(*(st.builds(tree.Term, *map(st.just, cell), st.integers(-3, 3)) for cell in cells))
+    lambda cells: st.tuples(*(st.builds(tree.LinearTerm, *map(st.just, cell), st.integers(-3, 3)) for cell in cells))
 )
 NUMERIC = st.one_of(
     st.builds(tree.AtMost, TERMS, st.integers(-7, 7)),
@@ -65,15 +65,15 @@ CHOICES = st.one_of(
     st.builds(tree.Member, st.just(False), st.just(4), st.integers(0, 2)),
     st.builds(tree.Member, st.just(True), st.just(2), st.integers(0, 2)),
     st.builds(tree.InWindow, st.integers(0, 23).map(HOUR.__mul__), st.integers(0, 24).map(HOUR.__mul__)),
-    st.builds(tree.Known, st.sampled_from((0, 1, 4))),
-    st.builds(tree.InPhase, st.just(2)),
-    st.builds(tree.Monitored, st.integers(0, 1)),
+    st.builds(tree.SlotKnown, st.sampled_from((0, 1, 4))),
+    st.builds(tree.PhaseIn, st.just(2)),
+    st.builds(tree.MonitorSays, st.integers(0, 1)),
 )
 PLACES = st.one_of(
-    st.builds(tree.Inside, st.integers(0, 3)),
+    st.builds(tree.InsideZone, st.integers(0, 3)),
     st.builds(tree.InsideArgument, st.just(2), st.integers(0, 1)),
     st.builds(tree.PointInside, st.just(3), st.integers(0, 3)),
-    st.just(tree.Both(tree.Known(2), tree.Known(3))),  # what `position is known` is lowered to
+    st.just(tree.Both(tree.SlotKnown(2), tree.SlotKnown(3))),  # what `position is known` is lowered to
 )
 
 
@@ -82,7 +82,7 @@ def conditions(atoms: st.SearchStrategy[tree.Node]) -> st.SearchStrategy[tree.No
 
     def grown(inner: st.SearchStrategy[tree.Node]) -> st.SearchStrategy[tree.Node]:
         return st.one_of(
-            st.builds(tree.Both, inner, inner), st.builds(tree.Either, inner, inner), st.builds(tree.Not, inner)
+            st.builds(tree.Both, inner, inner), st.builds(tree.Either, inner, inner), st.builds(tree.Negation, inner)
         )
 
     return st.recursive(atoms, grown, max_leaves=5)
@@ -144,7 +144,7 @@ def test_no_is_never_wrong_and_yes_is_confirmed(goals: list[tuple[tree.Node, int
             assert not all(build(node, TABLES)(at) & wanted for node, wanted in goals)
 
 
-@given(st.lists(st.tuples(conditions(st.builds(tree.Inside, st.integers(0, 3))), GOALS), min_size=1, max_size=3))
+@given(st.lists(st.tuples(conditions(st.builds(tree.InsideZone, st.integers(0, 3))), GOALS), min_size=1, max_size=3))
 def test_places_are_decided_as_by_trying_all(goals: list[tuple[tree.Node, int]]) -> None:
     """At midnight; where no place of whole millimetres shows it and no relation rules it out, it stays open."""
     space = SPACE._replace(utc=((0, 0),))
@@ -154,7 +154,7 @@ def test_places_are_decided_as_by_trying_all(goals: list[tuple[tree.Node, int]])
     assert isinstance(answer, (Yes, Undecided) if exists else (No, Undecided)), answer
 
 
-SUM = (tree.Term(False, 0, 1), tree.Term(True, 0, -1))
+SUM = (tree.LinearTerm(False, 0, 1), tree.LinearTerm(True, 0, -1))
 
 
 @pytest.mark.parametrize(("bound", "holds"), [(4, True), (3, True), (-1, False)])
@@ -169,7 +169,7 @@ def test_sums_of_the_same_form_are_compared_as_one(bound: int, holds: bool) -> N
 
 
 def test_an_implication_has_a_situation_against_it_or_a_proof() -> None:
-    low, high = (tree.AtMost((tree.Term(False, 0, 1),), bound) for bound in (0, 1))
+    low, high = (tree.AtMost((tree.LinearTerm(False, 0, 1),), bound) for bound in (0, 1))
     assert isinstance(implies(low, high, SPACE), No)
     against = implies(high, low, SPACE)
     assert isinstance(against, Yes)
@@ -177,7 +177,7 @@ def test_an_implication_has_a_situation_against_it_or_a_proof() -> None:
 
 
 def test_what_is_too_hard_is_left_open() -> None:
-    terms = tuple(tree.Term(True, cell, factor) for cell, factor in ((0, 6), (1, 10)))
+    terms = tuple(tree.LinearTerm(True, cell, factor) for cell, factor in ((0, 6), (1, 10)))
     space = SPACE._replace(arguments=(interval(-(1 << 40), 1 << 40), interval(-(1 << 40), 1 << 40), *ARGUMENTS[2:]))
-    odd = (tree.Equal((*terms, tree.Term(False, 0, 15)), 1), TRUE)
+    odd = (tree.Equal((*terms, tree.LinearTerm(False, 0, 15)), 1), TRUE)
     assert isinstance(satisfiable([odd], space, budget=1), Undecided)

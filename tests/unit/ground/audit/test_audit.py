@@ -10,11 +10,11 @@ from msgspec.structs import replace
 
 from reference.forgery import LOG_KEY, ROOT_KEY, edit, flight, prove, read, signed, sound
 from reference.kinds_of_flight import FAULTS, recorded
-from rtshcua.evidence.report import Verdict
+from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Audit, audit
 from rtshcua.model.faults import BatteryLevel, Fault
 from rtshcua.model.flat.mission import Mission, OnInadmissible
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Event, Interrupted
 from rtshcua.wire.keys import Duty
 from virtual import case
@@ -77,7 +77,7 @@ def test_one_is_not_many() -> None:
 
 def test_a_log_that_was_cut_still_proves_its_beginning() -> None:
     report = prove(flight()[:-1]).report
-    assert report.verdict is Verdict.INCOMPLETE
+    assert report.verdict is LogVerdict.INCOMPLETE
     assert [claim.slug for claim in report.proven] == ["trust", "bundle", "chain", "seals", "decisions", "dispatches"]
     assert "signed-close" in [claim.slug for claim in report.unproven]
 
@@ -93,7 +93,7 @@ def test_a_log_that_fails_proves_nothing() -> None:
 
 @pytest.mark.slow
 def test_mode_none_needs_no_permits_and_says_so() -> None:
-    report = sound_without_permits(recorded("wind", "ardupilot", Mode.NONE).lines)
+    report = sound_without_permits(recorded("wind", "ardupilot", EnforcementMode.NONE).lines)
     assert "enforcement" in [claim.slug for claim in report.report.unproven]
     assert "dispatches" not in [claim.slug for claim in report.report.proven]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rtshcua.evidence.records import Decision, Effect, RecordedContext, RecordedState
+from rtshcua.evidence.records import DecisionRecord, Effect, RecordedContext, RecordedState
 from rtshcua.ground.audit.cover import Cover
 from virtual.rows import rows
 
@@ -10,8 +10,8 @@ STEP, FALLBACK, CONTINGENCY = 0, 1, 2
 DEGRADE = -1
 
 
-def decision(kind: int, step: int, link: int, outcome: str = "allow", until_us: int = 100) -> Decision:
-    return Decision(
+def decision(kind: int, step: int, link: int, outcome: str = "allow", until_us: int = 100) -> DecisionRecord:
+    return DecisionRecord(
         "0" * 64, 0, "", None, None, RecordedContext((), 0, 0, 1, 0, 0, ""), 2, "", kind, link, "software", outcome, "",
         8, 1, RecordedState(ages=(), values=()), step, None, -1, "decision", 0, 0, until_us,
     )  # fmt: skip

@@ -12,7 +12,7 @@ from reference.kinds_of_flight import FAULTS, recorded
 from rtshcua.evidence.finding import Finding
 from rtshcua.ground.audit.audit import Auditor
 from rtshcua.ground.audit.frames import Frames
-from rtshcua.onboard.enforcement.load import Mode
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Event, Interrupted
 from rtshcua.wire.keys import Duty
 from virtual import case
@@ -54,7 +54,7 @@ UNENFORCED = {("low battery", "px4"), ("wind", "ardupilot")}
     ],
 )
 def test_frames_of_every_kind_of_flight_without_enforcement_follow_its_log(fault: str, flavour: str) -> None:
-    found, frames = joined(*recorded(fault, flavour, Mode.NONE))
+    found, frames = joined(*recorded(fault, flavour, EnforcementMode.NONE))
     assert found is None
     assert frames.count >= 2, "arm, take off: what is so already is not asked for"
 

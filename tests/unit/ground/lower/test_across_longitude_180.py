@@ -19,7 +19,7 @@ from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import HALF_TURN, TURN, project, unproject
-from rtshcua.simulation.place import Home
+from rtshcua.simulation.place import HomePosition
 
 DATE_LINE, ELSEWHERE = 180 * 10**7, 85 * 10**6
 KM = 1_000_000
@@ -135,7 +135,7 @@ def test_a_place_on_the_other_side_is_reached_and_simulated() -> None:
     assert near(ObservedVehicle(longitude=HALF_TURN - 10, **there))
     assert not near(ObservedVehicle(longitude=HALF_TURN - 10_000, **there))
     for side in (1, -1):
-        home = Home(-168_500_000, side * (HALF_TURN - 1000), 0)
+        home = HomePosition(-168_500_000, side * (HALF_TURN - 1000), 0)
         latitude, longitude = home.globe(30.0, side * 200.0)
         assert longitude * side < 0
         assert home.local(latitude, longitude) == pytest.approx((30.0, side * 200.0), abs=0.02)

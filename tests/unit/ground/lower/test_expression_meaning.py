@@ -15,10 +15,10 @@ import pytest
 from reference.naive_expression import Names, World, truth
 from reference.random_expressions import ENUMERATIONS, PHASES, STEP, ZONES, Maker
 from rtshcua.decision.evaluate import NO_PHASE, Environment, Tables, build
-from rtshcua.decision.prepare import Limit, PreparedMonitor
+from rtshcua.decision.prepare import PreparedMonitor, SlotLimit
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.decision.times import LocalTime
-from rtshcua.decision.tree import Scope as CodeScope
+from rtshcua.decision.tree import CodeScope as CodeScope
 from rtshcua.decision.tree import parse as parse_code
 from rtshcua.decision.tree import scope_of
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
@@ -150,7 +150,7 @@ def lowered(node: Condition) -> Lowered | None:
     )
     cells = {cell: CHOICE if name == "look" else QUANTITY for name, cell in cells_of(symbols.skills["probe"]).items()}
     condition = built(clause.code, code_scope._replace(cells=(cells,)))
-    limit = Limit(10**9, MAX_VALUE)
+    limit = SlotLimit(10**9, MAX_VALUE)
     limits = (limit,) * slots.count
     bounds = tuple((each,) * slots.count for each in (limit.stale_us, -limit.most, limit.most))
     policy = SimpleNamespace(policy=flat, monitors=prepared, limits=limits, bounds=bounds, seen=None)

@@ -16,7 +16,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.binding import bind
 
@@ -42,7 +42,9 @@ def flown(policy: Policy, mission: Mission, conditions: dict[str, int], *, drain
     prepared = prepare(policy)
     assert isinstance(prepared, PreparedPolicy), prepared
     steps = prepare_mission(mission, prepared)
-    approvals = tuple(Approval(n, rule.approver, 1, 0) for n, rule in enumerate(policy.rules) if rule.approver >= 0)
+    approvals = tuple(
+        ConfirmAnswer(n, rule.approver, 1, 0) for n, rule in enumerate(policy.rules) if rule.approver >= 0
+    )
     x, y, height = 0, 0, 0
     decisions: list[Decision] = []
     for step in steps:

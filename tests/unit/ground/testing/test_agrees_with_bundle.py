@@ -19,7 +19,7 @@ from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import POSITION
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.flat.zone import project
 from rtshcua.onboard.enforcement.load import Loaded
 
@@ -159,7 +159,7 @@ def on_board(asked: Asked) -> tuple[str, str, str | None]:
             values[signal.slot + offset], ages[signal.slot + offset] = cell, age
     assert not policy.monitors  # else they would have to be observed
     answers = tuple(
-        Approval(number, rule.approver, asked.granted, AT)
+        ConfirmAnswer(number, rule.approver, asked.granted, AT)
         for number, rule in enumerate(policy.rules)
         if rule.kind == RuleKind.CONFIRM and asked.granted is not None
     )

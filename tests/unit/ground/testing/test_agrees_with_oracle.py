@@ -12,7 +12,7 @@ from reference.oracle import Oracle
 from rtshcua.ground.testing.case import PolicyCase
 from rtshcua.ground.testing.case_result import run_case
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.situation import Approval, Context, Now, State
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.flat.zone import project
 from rtshcua.model.outcome import Outcome
 
@@ -163,10 +163,10 @@ def state(policy: Policy, row: Row) -> State:
     return State(tuple(values), tuple(ages))
 
 
-def _answers(policy: Policy, granted: int, at_us: int) -> tuple[Approval, ...]:
+def _answers(policy: Policy, granted: int, at_us: int) -> tuple[ConfirmAnswer, ...]:
     role = policy.roles.index("supervisor")
     (rule,) = [number for number, rule in enumerate(policy.rules) if rule.approver == role]
-    return (Approval(rule, role, granted, at_us),)
+    return (ConfirmAnswer(rule, role, granted, at_us),)
 
 
 @settings(max_examples=settings().max_examples // 2)

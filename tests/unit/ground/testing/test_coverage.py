@@ -11,7 +11,7 @@ from rtshcua.ground.why.trace import trace
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import POSITION, SignalSource
-from rtshcua.model.flat.situation import Approval, State
+from rtshcua.model.flat.situation import ConfirmAnswer, State
 
 FIELDS = {POSITION: ("x", "y")}
 REPORTED = tuple(
@@ -39,7 +39,7 @@ def item(role: str, text: str, skill: str = "", of: Universe = UNIVERSE) -> Cove
     return found
 
 
-def seen(step: int, state: State, approvals: tuple[Approval, ...] = ()) -> dict[tuple[str, str, str], set[Goal]]:
+def seen(step: int, state: State, approvals: tuple[ConfirmAnswer, ...] = ()) -> dict[tuple[str, str, str], set[Goal]]:
     """What deciding on a step reaches, by item."""
     invocation = STEPS[step]
     context = flat.context(invocation.invocation, approvals=approvals)

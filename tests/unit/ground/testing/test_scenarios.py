@@ -9,7 +9,7 @@ from rtshcua.ground.pipeline.program import check_program, compile_program
 from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight, ScenarioSuite
 from rtshcua.mavlink import dialect
-from rtshcua.model.faults import KINDS, GpsJump, LinkSilence, Mode, PilotMode, Way, WindStep, parameters
+from rtshcua.model.faults import KINDS, Direction, FlightMode, GpsJump, LinkSilence, PilotMode, WindStep, parameters
 from rtshcua.model.flat.code import Op
 from rtshcua.model.scenario import (
     ENDINGS,
@@ -105,12 +105,12 @@ def test_a_grown_zone_that_the_policy_has_is_read_on_whichever_side() -> None:
 
 
 FAULTS = [
-    ("link_silence(for = 5 s, way = up, held = yes)", LinkSilence(0, 5 * S, Way.UP, held=True)),
-    ("link_silence()", LinkSilence(0, None, Way.BOTH, held=False)),
+    ("link_silence(for = 5 s, way = up, held = yes)", LinkSilence(0, 5 * S, Direction.UP, held=True)),
+    ("link_silence()", LinkSilence(0, None, Direction.BOTH, held=False)),
     ("wind(speed = 2 * 6 m/s, from = 270 deg)", WindStep(0, 12_000, 270, 0)),
     ("gps_jump(east = -3 m, north = 20 cm)", GpsJump(0, 200, -3000)),
-    ("pilot_mode(mode = manual)", PilotMode(0, Mode.MANUAL)),
-    ("pilot()", PilotMode(0, Mode.POSITION)),
+    ("pilot_mode(mode = manual)", PilotMode(0, FlightMode.MANUAL)),
+    ("pilot()", PilotMode(0, FlightMode.POSITION)),
 ]
 
 

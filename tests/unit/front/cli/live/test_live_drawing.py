@@ -9,7 +9,7 @@ from rtshcua.front.cli.live.board import Board
 from rtshcua.front.cli.live.chart import chart
 from rtshcua.front.cli.live.lines import as_json, plain, sentence
 from rtshcua.front.cli.live.screen import picture
-from rtshcua.onboard.runtime.view import Reading, Stage, View
+from rtshcua.onboard.runtime.view import RunStage, RuntimeView, SignalReading
 
 PLAN = Plan(
     mission="inspect", intent="Look at it.", policy="bridge@7", vehicle="quad-07", mode="software", speed=10.0,
@@ -22,13 +22,13 @@ PLAN = Plan(
     position="position", path=((40_000, 20_000),),
 )  # fmt: skip
 SIGNALS = (
-    Reading("battery", (8_050,), 300_000, False), Reading("gps.fix", (3,), 5_000_000, True),
-    Reading("position", (10_000, -4_000), 100_000, False), Reading("height", (None,), 0, False),
+    SignalReading("battery", (8_050,), 300_000, False), SignalReading("gps.fix", (3,), 5_000_000, True),
+    SignalReading("position", (10_000, -4_000), 100_000, False), SignalReading("height", (None,), 0, False),
 )  # fmt: skip
 
 
-def view(left_us: int | None, stage: Stage = Stage.RUNNING) -> View:
-    return View(1, stage, "inspection", 1, 2, "inspect_area", left_us, True, True, True, SIGNALS, (), None)
+def view(left_us: int | None, stage: RunStage = RunStage.RUNNING) -> RuntimeView:
+    return RuntimeView(1, stage, "inspection", 1, 2, "inspect_area", left_us, True, True, True, SIGNALS, (), None)
 
 
 DENIED = Happening("decision", 9_000_000, 1, "inspect_area(area = bridge_a)", "fallback", "safety/degraded",
@@ -109,7 +109,7 @@ def test_the_screen_shows_steps_state_and_countdown() -> None:
 
 
 def test_the_screen_counts_down_to_a_dispatch() -> None:
-    assert "to be dispatched within 1.5 s" in drawn(PLAN, Snapshot(view(1_500_000, Stage.DECIDING)))
+    assert "to be dispatched within 1.5 s" in drawn(PLAN, Snapshot(view(1_500_000, RunStage.DECIDING)))
 
 
 def test_a_refused_step_is_marked_and_a_fallback_is_not_a_step() -> None:

@@ -39,7 +39,7 @@ from rtshcua.front.cli.live.chart import FENCE, HOMEWARD, KEEP_OUT, ZONE, chart
 from rtshcua.front.cli.live.lines import as_json, plain, typed
 from rtshcua.front.cli.live.screen import picture
 from rtshcua.onboard.ports import Presented
-from rtshcua.onboard.runtime.view import Reading, Stage, View
+from rtshcua.onboard.runtime.view import RunStage, RuntimeView, SignalReading
 
 SOCKET = "/tmp/a socket"
 COMMAND = ("rtshcua", "approve", "low.bundle", "--step", "3", "--role", "supervisor", "--to", SOCKET)
@@ -60,8 +60,9 @@ PLAN = Plan(
     ),
 )  # fmt: skip
 SIGNALS = (
-    Reading("position", (30_000, -40), 100_000, False), Reading("height", (-30,), 0, False),
-    Reading("climb", (-49,), 0, False), *(Reading(f"other.signal.{number}", (None,), 0, False) for number in range(6)),
+    SignalReading("position", (30_000, -40), 100_000, False), SignalReading("height", (-30,), 0, False),
+    SignalReading("climb", (-49,), 0, False), *(SignalReading(f"other.signal.{number}", (None,), 0,
+        False) for number in range(6)),
 )  # fmt: skip
 SUMMARY = Summary(
     "inspect", "bridge@7", "quad-07", "px4", "software", "aborted", 6, 2, 1, {"allow": 1, "deny": 0, "fallback": 1},
@@ -69,8 +70,8 @@ SUMMARY = Summary(
 )  # fmt: skip
 
 
-def view(at_us: int = 5 * S, stage: Stage = Stage.DECIDING, step: int = 2) -> View:
-    return View(at_us, stage, "departure", step, 18, "hover", 2 * S, True, True, True, SIGNALS, (), None)
+def view(at_us: int = 5 * S, stage: RunStage = RunStage.DECIDING, step: int = 2) -> RuntimeView:
+    return RuntimeView(at_us, stage, "departure", step, 18, "hover", 2 * S, True, True, True, SIGNALS, (), None)
 
 
 def board(*messages: Message) -> Board:
@@ -193,8 +194,8 @@ def test_the_screen_counts_the_seconds_down_and_says_what_to_type() -> None:
 @pytest.mark.parametrize(
     "over",
     [
-        Happened(Happening("dispatched", 6 * S, 2, "inspect_area()")), Snapshot(view(stage=Stage.RUNNING)),
-        Snapshot(view(stage=Stage.FALLING)), Snapshot(view(step=3)),
+        Happened(Happening("dispatched", 6 * S, 2, "inspect_area()")), Snapshot(view(stage=RunStage.RUNNING)),
+        Snapshot(view(stage=RunStage.FALLING)), Snapshot(view(step=3)),
         Happened(Happening("decision", 6 * S, 2, "inspect_area()", "deny", "approval/timed-out")),
     ],
 )  # fmt: skip
@@ -209,7 +210,7 @@ def test_a_recall_is_a_banner_that_stays() -> None:
     run.tick(Presented(run.clock.now().monotonic_us, recall(run.loaded), 1))
     told = [each for each in map(teller.tell, run.lines[before:]) if each is not None]
     assert [each.event for each in told][:1] == ["recall"]
-    found = board(PLAN, *map(Happened, told), Snapshot(view(stage=Stage.FALLING)))
+    found = board(PLAN, *map(Happened, told), Snapshot(view(stage=RunStage.FALLING)))
     assert "RECALLED" in "\n".join(shown(found))
     assert any("** RECALLED" in line for each in told for line in plain(Happened(each)))
 
@@ -264,11 +265,11 @@ def stories() -> Iterator[tuple[Message, ...]]:
         for number in range(30)
     )
     last = Happened(Happening("gap", 99 * S, detail="the very newest"))
-    yield (PLAN, Snapshot(view(stage=Stage.RUNNING)), *many, last)
+    yield (PLAN, Snapshot(view(stage=RunStage.RUNNING)), *many, last)
     yield (PLAN, Happened(WAITS), Snapshot(view()), *many, last)
     yield (PLAN, last)
-    yield (PLAN, Snapshot(view(stage=Stage.WAITING, step=0)), Note("x" * 500), last)
-    yield (PLAN, Snapshot(view(stage=Stage.ENDED, step=18)), *many, SUMMARY, last)
+    yield (PLAN, Snapshot(view(stage=RunStage.WAITING, step=0)), Note("x" * 500), last)
+    yield (PLAN, Snapshot(view(stage=RunStage.ENDED, step=18)), *many, SUMMARY, last)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (80, 10), (40, 24), (120, 50), (200, 20), (30, 6)])
@@ -292,7 +293,7 @@ def test_at_40_columns_the_command_is_whole() -> None:
 
 
 def test_at_80_columns_the_current_step_the_signals_and_the_map_are_there() -> None:
-    found = board(PLAN, Snapshot(view(stage=Stage.RUNNING, step=12)))
+    found = board(PLAN, Snapshot(view(stage=RunStage.RUNNING, step=12)))
     text = "\n".join(shown(found))
     assert " 13 goto(" in text, "far down the list"
     assert "position" in text
@@ -303,7 +304,7 @@ def test_at_80_columns_the_current_step_the_signals_and_the_map_are_there() -> N
 
 
 def test_no_value_is_minus_nothing() -> None:
-    text = "\n".join(shown(board(PLAN, Snapshot(view(stage=Stage.RUNNING)))))
+    text = "\n".join(shown(board(PLAN, Snapshot(view(stage=RunStage.RUNNING)))))
     assert "-0.0" not in text
     assert "30.0 m E, 0.0 m N" in text
     assert [tenths(each) for each in (-49, -50, 0, 49, 1_250, -12_340)] == ["0.0", "-0.1", "0.0", "0.0", "1.3", "-12.3"]

@@ -29,8 +29,10 @@ _REMEDIES = {
 }
 #: of what is refused for another reason than that it is not to be trusted, by slug
 _CODES = dict.fromkeys(("usage", "output", "no-approver", "several-approvers"), ExitCode.USAGE)
-_CODES |= dict.fromkeys(("malformed", "configuration", "no-source", "outside", "since", "wrong-kind"), ExitCode.INPUT)
-_CODES |= {"not-flown": ExitCode.TESTS}
+_CODES |= dict.fromkeys(
+    ("changed", "configuration", "input", "malformed", "no-source", "outside", "since", "wrong-kind"), ExitCode.INPUT
+)
+_CODES |= {"not-flown": ExitCode.TESTS, "not-generated": ExitCode.DIAGNOSTICS}
 
 
 def untrusted(error: Untrusted) -> Refusal:

@@ -1,12 +1,11 @@
-"""How commands read sources and compile them: the file system, the shipped library and the dialect, put together.
-
-Several sources at once: which programs they make.
-"""
+"""Sources read, checked and compiled with the shipped library and dialect, and which programs several sources make."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 from rtshcua import library
 from rtshcua.adapters.store.readable import Readable
@@ -24,6 +23,8 @@ from rtshcua.ground.pipeline.program import Checked, Compiled, compile_program, 
 from rtshcua.mavlink import dialect
 from rtshcua.wire.names import BUNDLE
 
+NO_TEXTS: Final[Mapping[str, bytes]] = MappingProxyType({})
+
 
 class Reading(NamedTuple):
     """A program, and how findings on it are shown to whoever wrote it."""
@@ -32,31 +33,45 @@ class Reading(NamedTuple):
     pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]]
 
 
-def read_sources(paths: Sequence[Path], pins: Pins = PROPOSED) -> Reading:
-    """Sources and all that they import. The first may be a mission specification (.json), as an agent proposes it;
-    what it claims beyond `pins` is a finding.
-    """
-    first, shipped = paths[0], str(library.root())
-    readable = Readable(shipped, paths)
-    rest = [str(path) for path in paths[1:]]
-    if first.suffix.lower() == ".json":
-        from rtshcua.ground.agent.specification import load_specification  # brings pydantic
+class SourceReader:
+    """Reads sources and all that they import, from the disk and the shipped library.
 
-        program, specification = load_specification(
-            str(first), rest, readable.read, shipped, readable.listing, readable.pack, pins
-        )
-        return Reading(program, specification.pointed)
-    return Reading(load([str(first), *rest], readable.read, shipped, readable.listing, packs=readable.pack), tuple)
+    `asked` are the files that were named. With `once` each file is read once: what changes later does not count.
+    """
+
+    def __init__(self, asked: Sequence[Path], *, once: bool = False) -> None:
+        self._library = str(library.root())
+        self._readable = Readable(self._library, asked)
+        self._read = cache(self._readable.read) if once else self._readable.read
+
+    def program(self, names: Sequence[str], texts: Mapping[str, bytes] = NO_TEXTS, pins: Pins = PROPOSED) -> Reading:
+        """The program of files, of which the first may be a mission specification (.json), as an agent proposes it:
+        what it claims beyond `pins` is a finding. `texts` stand in the place of files, by their shown names.
+        """
+
+        def read(name: str) -> bytes:
+            text = texts.get(name)
+            return self._read(name) if text is None else text
+
+        readable = self._readable
+        if Path(names[0]).suffix.lower() == SPECIFICATION:
+            from rtshcua.ground.agent.specification import load_specification  # brings pydantic
+
+            program, specification = load_specification(
+                names[0], names[1:], read, self._library, readable.listing, readable.pack, pins
+            )
+            return Reading(program, specification.pointed)
+        return Reading(load(names, read, self._library, readable.listing, packs=readable.pack), tuple)
+
+
+def read_sources(paths: Sequence[Path], pins: Pins = PROPOSED) -> Reading:
+    """Sources and all that they import; see `SourceReader.program`."""
+    return SourceReader(paths).program([str(path) for path in paths], pins=pins)
 
 
 def read_text(name: str, text: str) -> Reading:
     """A source that is not written yet, as if it were in the file `name`, and all that it imports."""
-    readable = Readable(str(library.root()), [name])
-
-    def read(path: str) -> bytes:
-        return text.encode("utf-8") if path == shown(name) else readable.read(path)
-
-    return Reading(load([name], read, str(library.root()), readable.listing, packs=readable.pack), tuple)
+    return SourceReader([Path(name)]).program([name], {shown(name): text.encode("utf-8")})
 
 
 def compile_sources(
@@ -80,15 +95,19 @@ def compile_sources(
     if pins is not None and given is not None and given is not pins and pins.policies is None:
         named = frozenset(shown(str(path)) for path in paths[1:])
         given = given._replace(policies=policies_of(reading.program, named))
+    compiled = compile_reading(reading, mission=mission, issued_at_us=issued_at_us, values=values, pins=given)
+    return compiled, compiled.sources
+
+
+def compile_reading(
+    reading: Reading, *, mission: str | None, issued_at_us: int, values: Sequence[str] = (), pins: Pins | None = None
+) -> Compiled:
+    """Compile a mission of the first file of a program that was read; see `compile_sources`."""
+    settings = parse_settings(values)
     compiled = compile_program(
-        reading.program,
-        dialect.load(),
-        mission=mission,
-        issued_at_us=issued_at_us,
-        settings=parse_settings(values),
-        pins=given,
+        reading.program, dialect.load(), mission=mission, issued_at_us=issued_at_us, settings=settings, pins=pins
     )
-    return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics)), compiled.sources
+    return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics))
 
 
 def examine(reading: Reading, issued_at_us: int = 0) -> Checked:

@@ -19,7 +19,7 @@ ALLOWED = {
     "campaign/page.py": "reads the template that ships",
     "front/cli/agent_bundle.py": "reads the example that ships",
     "front/cli/init.py": "reads the example that ships",
-    "front/cli/linting/mark.py": "reads this program's own modules",
+    "app/lint/cache.py": "reads this program's own modules",
     "front/cli/pages.py": "reads the pages that ship",
     "front/cli/unlock.py": "a passphrase may well come from a pipe",
     "ground/checker/time_zones.py": "reads the data of the package `tzdata`",
@@ -118,7 +118,7 @@ def test_folders_are_made_with_a_mode_of_their_own() -> None:
                     given = len(node.args) > (0 if path else 1) or any(each.arg == "mode" for each in node.keywords)
                     if not given:
                         without.append(f"{file.relative_to(PACKAGE)}:{node.lineno}")
-    assert [each for each in without if not each.startswith("front/cli/linting/touched.py")] == []
+    assert [each for each in without if not each.startswith("app/lint/findings.py")] == []
 
 
 def test_no_mode_lets_others_write() -> None:

@@ -29,7 +29,6 @@ ALLOWED = {
     "front/cli/live/screen.py": "in colour; each text passes `visible`",
     "front/cli/progress.py": "passes `visible`",
     "front/cli/stdout.py": "the door",
-    "front/cli/testing/flying.py": "passes `visible`",
     "front/cli/unlock.py": "asks for a passphrase, by the duty of its key",
     "front/cli/verify_log.py": "a bar",
     "simulation/process.py": "a process of its own: its ready line is JSON in ASCII, its options are ours",

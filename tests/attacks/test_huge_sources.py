@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 
 from reference.many_rules import policy
+from rtshcua.app.layout import of_file
 from rtshcua.diagnostics.codes import IMPORT_PATH, TOO_LARGE, UNKNOWN_IGNORE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import MOST_TEXT, render_one
 from rtshcua.diagnostics.span import Source
-from rtshcua.front.cli.formatting.each import of_file
 from rtshcua.ground.checker.geojson import read_area
 from rtshcua.ground.checker.refused import Refused
 from rtshcua.ground.elaborate import elaborate

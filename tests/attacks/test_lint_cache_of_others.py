@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from reference.lint_project import HABITS, MISSION, POLICY, UNUSED, Lint, put
+from rtshcua.app.lint.cache import decoded
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.linting.examined import decoded
 
 
 @pytest.fixture

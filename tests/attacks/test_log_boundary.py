@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from reference.attested_flight import attested, second
 from reference.forgery import LOG_KEY, edit, expect, prove, read, signed, sound
+from rtshcua.app.logs import finding_code
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.report import LogVerdict
-from rtshcua.front.cli.outcome import exit_code_of
 from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.statement import Statement, open_statement, sign
@@ -323,4 +323,4 @@ def test_nobody_is_lost_before_it_spoke() -> None:
 
 
 def test_it_has_an_exit_code_of_its_own() -> None:
-    assert exit_code_of("boundary/missing") is ExitCode.BOUNDARY == 15
+    assert finding_code("boundary/missing") is ExitCode.BOUNDARY == 15

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from rtshcua.app.programs import read_sources
+from rtshcua.app.testing.run import ISSUED_AT_US
 from rtshcua.campaign.flights import Field
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.front.cli import app
 from rtshcua.front.cli.table import COMMANDS
-from rtshcua.front.cli.testing.running import ISSUED_AT_US
 from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.mavlink import dialect

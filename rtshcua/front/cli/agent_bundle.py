@@ -56,7 +56,7 @@ def agent_bundle(
     Ends with 0 where it was made, 3 where a file cannot be read or is damaged, the policy is another one, or files of
     the same names are there, 74 where it cannot be written.
     """
-    from rtshcua.front.mcp.missions import Missions, NoPolicy
+    from rtshcua.app.propose import Missions, NoPolicy
 
     try:
         envelope, _ = envelopes(read_bundle(bundle))
@@ -66,7 +66,7 @@ def agent_bundle(
     for path in (*with_, *(each for each in (mission_key, passphrase_file) if each is not None)):
         read_regular(path, 1)
     try:
-        policy = Missions(with_, str(root())).policy
+        policy = Missions(with_).policy
     except NoPolicy as error:
         return fail(ExitCode.INPUT, str(error), "`rtshcua check` says what is wrong with them", slug="no-policy")
     if policy_digest(policy_payload(policy)) != signed:

@@ -9,6 +9,8 @@ import typer
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.exit_codes import untrusted
+from rtshcua.app.flight_documents import MOST_S, bundle_in_flight, flight_id, prepare_missions
+from rtshcua.app.signing_keys import person_key
 from rtshcua.app.wording import shorten
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.excerpt import visible
@@ -23,10 +25,10 @@ from rtshcua.front.cli.document_options import (
     Person,
     SignedRoot,
 )
-from rtshcua.front.cli.documents import MOST_S, WHERE, WHOSE, deliver, expect_sense, flight_id, subject
+from rtshcua.front.cli.documents import WHERE, WHOSE, deliver
 from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.unlock import person_key, terminal, unlock_person
+from rtshcua.front.cli.unlock import terminal, unlock_person
 from rtshcua.ground.analysis.confirming import may_match
 from rtshcua.ground.lower.signed_paths import PlannedPath, path_planned_otherwise
 from rtshcua.model.step_number import index_of, number_of
@@ -79,9 +81,9 @@ def approve(
         return fail(ExitCode.USAGE, "the answer has to go somewhere", WHERE)
     now_us = time.time_ns() // 1000
     try:
-        flying = subject(bundle, replacement or [], root, now_us, stops=refused)
+        flying = bundle_in_flight(bundle, replacement or [], root, now_us, stops=refused)
         # a no is told in our words too, which nonsense has not
-        (ready,) = expect_sense(flying.policy, [flying.mission])
+        (ready,) = prepare_missions(flying.policy, [flying.mission])
         steps = flying.mission.invocations
         if step > len(steps):
             return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 1 to {len(steps)}")

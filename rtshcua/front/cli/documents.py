@@ -1,108 +1,21 @@
 """Documents that are signed for a flight: what they are about, and where they go. Without typer: a recall hurries."""
 
 import json
-import re
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from rtshcua.adapters.agent_socket import flight_at, hand_in
-from rtshcua.adapters.store.folders import data_folder
-from rtshcua.adapters.store.keystore import KeyStore, read_root
-from rtshcua.adapters.store.reading import read_regular
-from rtshcua.adapters.store.roots import opened
+from rtshcua.adapters.agent_socket import hand_in
 from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
-from rtshcua.app.documents import read_bundle
-from rtshcua.app.fly.trust import LAPSED, REVOKED
-from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import error_object, fail
 from rtshcua.front.cli.stdout import out, out_json
-from rtshcua.model.flat.mission import Mission
-from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.situation import Now
-from rtshcua.wire import cose
-from rtshcua.wire.bundle import Bundle, BundleError, open_bundle
-from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
-from rtshcua.wire.replacement import fit_replacement, open_replacement
-from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
-from rtshcua.wire.untrusted import Untrusted
 
-#: the longest that a document may be good for, in s
-MOST_S = MAX_LIFE_US // 1_000_000
 NO_HELP: Mapping[str, str] = MappingProxyType({})
-_FLIGHT = re.compile(r"[0-9a-f]{32}")
 #: help for what a document may be handed to
 WHOSE = "give `--flight` (32 hexadecimal digits, or a socket of the flight)"
 WHERE = "give `--to` (a socket of the flight) or `--output`"
-
-
-def subject(bundle: Path, replacements: list[Path], root: Path | None, now_us: int, *, stops: bool = False) -> Bundle:
-    """The bundle that flies, verified, with the replacements that were put into force since.
-
-    Whoever signs must know what it is about. What only `stops` a flight is signed also where a key of the bundle was
-    revoked, or has expired, since it began: it flies on under the root of before. Raises `Untrusted` and OSError.
-    """
-    trusted = _root(root, now_us)
-    data = read_bundle(bundle)
-    try:
-        found = open_bundle(data, root=trusted, vehicle=None, now_us=now_us)
-    except Untrusted as error:
-        if not stops or error.slug not in (REVOKED, *LAPSED):
-            raise
-        found = _of_before(data, trusted if root is not None else None, error)
-    vehicle, now = found.policy.vehicle.identity, Now(0, now_us, 0)
-    missions = [found.mission]
-    for path in replacements:
-        document = read_regular(path, MAX_DOCUMENT)
-        newer = open_replacement(document, root=trusted, vehicle=vehicle, flight=None, bundle=found, now=now)
-        found = fit_replacement(newer, found, released=0)
-        missions.append(newer.mission)
-    if not stops:
-        expect_sense(found.policy, missions)
-    return found
-
-
-def expect_sense(policy: Policy, missions: Sequence[Mission]) -> list[tuple[PreparedInvocation, ...]]:
-    """The steps of missions as they are decided on. What a vehicle would not take is not signed for it: whoever signed
-    a mission may say there what does not fly.
-
-    Raises `BundleError`.
-    """
-    ready, found = prepare(policy), []
-    for mission in missions:
-        steps = ready if isinstance(ready, Refusal) else prepare_mission(mission, ready)
-        if isinstance(steps, Refusal):
-            raise BundleError("malformed", f"this would be refused on board: {steps.text}")
-        found.append(steps)
-    return found
-
-
-def _of_before(data: bytes, named: TrustRoot | None, refused: Untrusted) -> Bundle:
-    """The bundle as it was trusted when it began to fly, by the root that was named, or else by those of the key store.
-
-    Raises `Untrusted`: `refused` where none of them ever trusted it.
-    """
-    roots = [named] if named is not None else [opened(each) for each in reversed(KeyStore(data_folder()).chain())]
-    for root in roots:
-        with suppress(Untrusted):
-            return open_bundle(data, root=root, vehicle=None, now_us=0)
-    raise refused
-
-
-def flight_id(flight: str | None, to: Path | None) -> bytes | None:
-    """The id of the flight that is meant: given as 32 hexadecimal digits, or told by the flight itself at its agent
-    socket. None where neither was given. Raises OSError for a socket that tells none.
-
-    A flight that tells another's id gains nothing: what is signed for that one names its mission too.
-    """
-    if flight is not None and _FLIGHT.fullmatch(flight):
-        return bytes.fromhex(flight)
-    place = to if flight is None else Path(flight)
-    return None if place is None else flight_at(place)
 
 
 def deliver(
@@ -137,9 +50,3 @@ def _say(code: ExitCode, slug: str, text: str, *, as_json: bool, help: str | Non
     else:
         return fail(code, text, help, slug=slug)
     return code
-
-
-def _root(path: Path | None, now_us: int) -> TrustRoot:
-    """The key store's root, or the one that was named, which is trusted for being named."""
-    signed = KeyStore(data_folder()).root() if path is None else read_root(path)
-    return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)

@@ -3,30 +3,17 @@
 import json
 from pathlib import Path
 
-from rtshcua.adapters.store.verification import VerificationInputs, verify_carefully
 from rtshcua.app.documents import no_log
-from rtshcua.app.pin import Pin
+from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of, logs_meant, report_code
+from rtshcua.app.verify_log import VerifyRequest, audited
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.records import AnyRecord
-from rtshcua.front.cli.beside import anchors_beside, bundle_beside
 from rtshcua.front.cli.faults import fail
-from rtshcua.front.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_meant
 from rtshcua.front.cli.showing.page import for_terminal
 from rtshcua.front.cli.showing.record import Told, show_record
 from rtshcua.front.cli.stdout import out_json, out_rendered
-from rtshcua.ground.audit.revoked import RevokedKeys
 
 
-def explained(
-    logs: list[Path],
-    number: int,
-    pinned: Pin,
-    roots: tuple[bytes, ...],
-    anchors: tuple[Path, ...],
-    *,
-    derive: bool,
-    as_json: bool,
-) -> ExitCode:
+def explained(logs: list[Path], number: int, request: VerifyRequest, *, as_json: bool) -> ExitCode:
     """Prints record `number` of one log; the exit code is that of the log's audit."""
     logs = logs_meant(logs)
     if len(logs) != 1:
@@ -35,14 +22,7 @@ def explained(
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(log_of(logs[0]), logs[0], NO_LOG_HELP))
     told = Told(number)
-    asked = VerificationInputs(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
-    revoked = RevokedKeys(roots)
-
-    def each(record: AnyRecord) -> None:
-        told.take(record)
-        revoked.take(record)
-
-    report = revoked.judged(verify_carefully(path, asked, derive=derive, each=each)).report
+    report = audited(path, request, each=told.take).report
     if told.record is None:
         if report.failure is None:
             return fail(ExitCode.INPUT, f"`{path}` has no record {number}: it ends after {report.records}")
@@ -50,8 +30,8 @@ def explained(
         text = (
             f"`{path}` fails before record {number}, at record {report.failure.record}: {slug}, {report.failure.text}"
         )
-        return fail(exit_code(report), text, slug=slug)
-    code = exit_code(report)
+        return fail(report_code(report), text, slug=slug)
+    code = report_code(report)
     page = for_terminal()
     shown = show_record(page, told, report)
     if as_json:

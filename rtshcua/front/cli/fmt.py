@@ -11,13 +11,13 @@ from rtshcua.adapters.store.project import Projects
 from rtshcua.app.documents import kind_of
 from rtshcua.app.exit_codes import exit_code_of, words_of
 from rtshcua.app.files import SPECIFICATION, source_files
+from rtshcua.app.layout import Laid, of_file, of_text
 from rtshcua.diagnostics.codes import UNSAFE_FORMAT
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.diffs import difference
 from rtshcua.front.cli.faults import say, tell
 from rtshcua.front.cli.findings import Findings
-from rtshcua.front.cli.formatting.each import Laid, of_file, of_text
-from rtshcua.front.cli.formatting.shown import difference
 from rtshcua.front.cli.stdout import out, out_rendered
 from rtshcua.ground.format.format_text import not_formatted
 from rtshcua.ground.language.size import MAX_SIZE
@@ -116,27 +116,40 @@ def _told(findings: Findings, laid: list[Laid], *, check: bool, diff: bool, quie
     changed = [each for each in laid if each.changed and each.error is None]
     found = [finding for each in laid for finding in each.diagnostics]
     if as_json and check:
-        told = [not_formatted(each.source, each.after.decode()) for each in changed if each.after is not None]
+        told = (not_formatted(each.source, each.after.decode()) for each in changed if each.after is not None)
         found += [each for each in told if each is not None]
-    refused = any(each.after is None for each in laid)
     findings.report(found, {each.name: each.source for each in laid if each.diagnostics or each.changed})
-    if not as_json and not quiet:
-        for each in changed:
-            out(f"{'not formatted' if check else 'formatted'}: {each.name}")
-        rest = sum(each.before == each.after for each in laid)
-        if changed or rest or not laid:
-            out(_count(len(changed), rest, check=check))
-    code = ExitCode.DIAGNOSTICS if refused or ((check or diff) and changed) else ExitCode.OK
+    if not as_json:
+        if not quiet:
+            _counted(laid, changed, check=check)
+        for each in laid:
+            if each.error is not None:
+                tell(exit_code_of(each.error), f"cannot write `{each.name}`: {words_of(each.error)}")
+    return findings.finish(
+        _code(laid, forbidden=changed if check or diff else []), files=[_object(each) for each in laid]
+    )
+
+
+def _counted(laid: list[Laid], changed: list[Laid], *, check: bool) -> None:
+    """The files that changed, and how many there are of each kind."""
+    for each in changed:
+        out(f"{'not formatted' if check else 'formatted'}: {each.name}")
+    rest = sum(each.before == each.after for each in laid)
+    if changed or rest or not laid:
+        out(_count(len(changed), rest, check=check))
+
+
+def _code(laid: list[Laid], forbidden: list[Laid]) -> ExitCode:
+    """How it ends, the worst first; `forbidden` are files that should have been formatted."""
+    if any(finding.code is UNSAFE_FORMAT for each in laid for finding in each.diagnostics):
+        return ExitCode.FAULT
+    errors = [each.error for each in laid if each.error is not None]
+    if errors:
+        return exit_code_of(errors[-1])
     if any(each.unreadable for each in laid):
-        code = ExitCode.INPUT
-    for each in laid:
-        if each.error is not None:
-            code = exit_code_of(each.error)
-            if not as_json:
-                tell(code, f"cannot write `{each.name}`: {words_of(each.error)}")
-    if any(each.code is UNSAFE_FORMAT for each in found):
-        code = ExitCode.FAULT
-    return findings.finish(code, files=[_object(each) for each in laid])
+        return ExitCode.INPUT
+    refused = any(each.after is None for each in laid)
+    return ExitCode.DIAGNOSTICS if refused or forbidden else ExitCode.OK
 
 
 def _object(laid: Laid) -> dict[str, object]:

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
+from rtshcua.app.lint.scope import LintOptions
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.linting.options import Options
-from rtshcua.front.cli.linting.run import run
+from rtshcua.front.cli.lint_report import run
 
 app = typer.Typer(add_completion=False)
 
@@ -54,7 +54,7 @@ def lint(
     cannot say what has changed, 74 where a fix or a report cannot be written.
     """
     return run(
-        Options(
+        LintOptions(
             tuple(paths or [Path()]),
             format=format,
             output=output,

@@ -6,8 +6,8 @@ A slug is a kind, a stroke, and what it is. Some end in the slug of what `wire` 
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
+from rtshcua.app.logs import finding_code
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.outcome import exit_code_of
 from rtshcua.front.cli.verdict import HELPS, meaning_of
 
 
@@ -201,7 +201,7 @@ def find(word: str) -> LogSlug | None:
     found = _FOUND.get(slug) or _signed(slug)
     if found is None:
         return None
-    code = ExitCode.INCOMPLETE if slug in _SHORT else exit_code_of(slug)
+    code = ExitCode.INCOMPLETE if slug in _SHORT else finding_code(slug)
     return LogSlug(slug, found, meaning_of(slug, failed=slug not in _SHORT), code, HELPS.get(slug, ""))
 
 

@@ -14,10 +14,11 @@ from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.app.documents import read_bundle
 from rtshcua.app.exit_codes import words_of
+from rtshcua.app.signing_keys import check_trusted
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import distrust, fail, say
 from rtshcua.front.cli.interrupts import breakable
-from rtshcua.front.cli.unlock import check_trusted, unlock
+from rtshcua.front.cli.unlock import unlock
 from rtshcua.front.mcp.access import HOST, PATH, BadToken, token_of
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, envelopes, policy_digest
@@ -81,15 +82,14 @@ def mcp(
         read_regular(path, 1)
 
     with _loading():  # before the host is greeted: it may call a tool at once, and that has 100 ms
-        from rtshcua import library
+        from rtshcua.app.propose import Missions
         from rtshcua.front.mcp.flight import Following
-        from rtshcua.front.mcp.missions import Missions
         from rtshcua.front.mcp.tools import Signer, Tools
 
     def make() -> Tools:
         signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))
         with _loading():
-            offered = Tools(Missions(with_, str(library.root())), signer, to, Following(to))
+            offered = Tools(Missions(with_), signer, to, Following(to))
             gc.freeze()
         return offered
 

@@ -16,6 +16,7 @@ from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.documents import Claimed
 from rtshcua.app.exit_codes import untrusted
+from rtshcua.app.flight_documents import MOST_S, bundle_in_flight
 from rtshcua.app.fly.narrator import REPLACED, Answering, asks
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -24,7 +25,6 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close, DecisionRecord, Effect
 from rtshcua.front.cli.document_options import ApprovalKey, AsJson, FlyingBundle, PassphraseFile, Person, SignedRoot
-from rtshcua.front.cli.documents import MOST_S, subject
 from rtshcua.front.cli.faults import refuse
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
 from rtshcua.front.cli.live.lines import asked
@@ -72,7 +72,7 @@ def operator(
     recall was not answered, or the connection was lost and stayed so.
     """
     try:
-        flying = subject(bundle, [], root, time.time_ns() // 1000, stops=True)
+        flying = bundle_in_flight(bundle, [], root, time.time_ns() // 1000, stops=True)
         key = unlock_person(KeyStore(data_folder()), person, None, path=approval_key, passphrase_file=passphrase_file)
     except Untrusted as error:
         return refuse(untrusted(error))

@@ -1,7 +1,7 @@
 """How far a long command is, for a person who waits."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 from rtshcua.app.wording import shorten
@@ -27,3 +27,15 @@ def watched(items: Sequence[T]) -> Iterator[T]:
         if shows:
             sys.stderr.write(_CLEAR)
             sys.stderr.flush()
+
+
+def counting(*, quiet: bool) -> Callable[[str], None]:
+    """What shows on a terminal how far something is, each text in the place of the one before; nothing if `quiet`."""
+    shows = not quiet and sys.stderr is not None and sys.stderr.isatty()
+
+    def say(text: str) -> None:
+        if shows:
+            sys.stderr.write(_CLEAR + visible(text))
+            sys.stderr.flush()
+
+    return say

@@ -32,6 +32,7 @@ from rtshcua.app.fly.interrupts import Interrupts
 from rtshcua.app.fly.replay_check import AIR_S
 from rtshcua.app.fly.session import EXIT_CODES
 from rtshcua.app.programs import compile_sources, read_text
+from rtshcua.app.signing_keys import check_trusted
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.connection import Connect, LinkKey, NoFence, System, UnsignedRadio, UtcError, duration_us
 from rtshcua.front.cli.faults import fail, misaddressed, say
@@ -40,7 +41,7 @@ from rtshcua.front.cli.launch import IDENTITY_HELP, Launch, Refused, launch
 from rtshcua.front.cli.refused import say_refused
 from rtshcua.front.cli.showing.qualification import described, told
 from rtshcua.front.cli.stdout import out, out_json
-from rtshcua.front.cli.unlock import check_trusted, unlock, unlock_for
+from rtshcua.front.cli.unlock import unlock, unlock_for
 from rtshcua.ground.pipeline.program import Compiled, compile_program
 from rtshcua.ground.pipeline.sign import sign
 from rtshcua.mavlink import dialect

@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from rtshcua.app.lint.scope import LintOptions
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.linting.options import Options
 
 Kind = Literal["flag", "text", "path", "paths"]
 
@@ -94,9 +94,9 @@ def lint(words: Sequence[str]) -> ExitCode | None:
     found = read(words, LINT)
     if found is None or not found[0]:
         return None
-    from rtshcua.front.cli.linting.run import run
+    from rtshcua.front.cli.lint_report import run
 
-    return run(Options(found[0], **found[1]))
+    return run(LintOptions(found[0], **found[1]))
 
 
 def check(words: Sequence[str]) -> ExitCode | None:

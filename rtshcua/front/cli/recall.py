@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rtshcua.app.flight_documents import MOST_S
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import recalling
 from rtshcua.front.cli.document_options import (
@@ -16,7 +17,6 @@ from rtshcua.front.cli.document_options import (
     Person,
     SignedRoot,
 )
-from rtshcua.front.cli.documents import MOST_S
 
 app = typer.Typer(add_completion=False)
 

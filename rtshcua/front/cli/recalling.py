@@ -7,8 +7,9 @@ from typing import Final, NamedTuple
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.app.exit_codes import untrusted
+from rtshcua.app.flight_documents import bundle_in_flight, flight_id
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.documents import WHERE, WHOSE, deliver, flight_id, subject
+from rtshcua.front.cli.documents import WHERE, WHOSE, deliver
 from rtshcua.front.cli.faults import fail, refuse
 from rtshcua.wire import names
 from rtshcua.wire.bundle import Bundle
@@ -64,7 +65,7 @@ def recall(
     from rtshcua.front.cli.unlock import unlock_person
 
     try:
-        flying = subject(bundle, [], root, now_us, stops=True)
+        flying = bundle_in_flight(bundle, [], root, now_us, stops=True)
         named = b"" if policy else flight_id(flight, to)
         if named is None:
             return fail(ExitCode.USAGE, "the recall of a mission is for one flight", f"{WHOSE}, or `--policy`")

@@ -8,29 +8,21 @@ import typer
 
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.adapters.store.last_log import known_end
-from rtshcua.adapters.store.recovery import InUse, LogEnder, Recovered, examine, recover
+from rtshcua.adapters.store.recovery import InUse, LogEnder, Recovered
 from rtshcua.app.documents import no_log
 from rtshcua.app.fly.previous_log import signer_of
+from rtshcua.app.logs import is_log, logs_meant
+from rtshcua.app.recover import recover_log, recovery_code
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.recovery import RECOVERABLE, FoundLog, LogState
 from rtshcua.front.cli.faults import fail, of_each, tell
-from rtshcua.front.cli.outcome import is_log, logs_meant
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.unlock import unlock
 from rtshcua.wire.keys import Duty
 
 app = typer.Typer(add_completion=False)
 
-_CODES = {
-    LogState.CLOSED: ExitCode.OK,
-    LogState.WHOLE: ExitCode.INCOMPLETE,
-    LogState.TORN: ExitCode.INCOMPLETE,
-    LogState.UNBEGUN: ExitCode.EVIDENCE,
-    LogState.TAMPERED: ExitCode.EVIDENCE,
-    LogState.FOREIGN: ExitCode.UNTRUSTED,
-}
 _KEPT = "nothing was changed: every byte of it is where it was"
 _HELPS = {
     LogState.TAMPERED: f"{_KEPT}; `rtshcua verify-log` says more",
@@ -68,17 +60,10 @@ def _recover(path: Path, signer: LogEnder | None, state: Path, *, as_json: bool)
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(path, path, _KEPT))
     try:
-        cut = _cut(path, state)
-        if cut is not None:
-            done = cut
-        elif signer is None:
-            found = examine(path, None)
-            done = Recovered(found, False, None, found.head.prev)
-        else:
-            done = recover(path, signer)
+        done = recover_log(path, signer, state)
     except InUse as busy:
         return fail(ExitCode.INPUT, str(busy), "a flight ends its log itself", slug="in-use")
-    code = ExitCode.OK if done.done else _code(done.found)
+    code = ExitCode.OK if done.done else recovery_code(done.found)
     if as_json:
         out_json(json.dumps(_object(path, done, code), ensure_ascii=False), flush=True)
     elif done.done or done.found.state in (*RECOVERABLE, LogState.CLOSED):
@@ -86,30 +71,6 @@ def _recover(path: Path, signer: LogEnder | None, state: Path, *, as_json: bool)
     if done.found.state in _HELPS:
         return tell(code, f"`{path}`: {_why(done.found)}", _HELPS[done.found.state])
     return code
-
-
-def _cut(path: Path, state: Path) -> Recovered | None:
-    """What is told of a log of which this machine knows that it was closed, and not as it ends now."""
-    end = known_end(state, path)
-    if end is None:
-        return None
-    found = examine(path, None)
-    if found.head.prev == end:
-        return None
-    text = "it was closed once, and what stands at its end now is not that: its end was cut off or written anew"
-    reason = Finding("close/missing", found.records, text, found.head.prev, end, found.kept)
-    return Recovered(found._replace(state=LogState.TAMPERED, reason=reason), False, None, found.head.prev)
-
-
-def _code(found: FoundLog) -> ExitCode:
-    slug = "" if found.reason is None else found.reason.slug
-    if slug == "genesis/format":
-        return ExitCode.UNTRUSTED
-    if slug.startswith("anchor/"):
-        return ExitCode.ANCHOR
-    if found.state is LogState.UNBEGUN and slug.startswith("record/"):
-        return ExitCode.INPUT  # a whole line, and none of ours
-    return _CODES[found.state]
 
 
 def _why(found: FoundLog) -> str:
@@ -121,7 +82,7 @@ def _why(found: FoundLog) -> str:
         case LogState.FOREIGN:
             return "its flight was made with another log key"
         case _:
-            none = "it is not a log of this program" if _code(found) is ExitCode.INPUT else ""
+            none = "it is not a log of this program" if recovery_code(found) is ExitCode.INPUT else ""
             return f"{none or 'there is no first record to go on from'}: {where or 'it is empty'}"
 
 

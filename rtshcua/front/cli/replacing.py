@@ -6,12 +6,13 @@ from typing import NamedTuple
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import replace
 from rtshcua.app.exit_codes import code_of
+from rtshcua.app.flight_documents import bundle_in_flight, flight_id
+from rtshcua.app.signing_keys import check_trusted, strangers
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.documents import flight_id, subject
 from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out
-from rtshcua.front.cli.unlock import check_trusted, strangers, unlock_for
+from rtshcua.front.cli.unlock import unlock_for
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.step_number import number_of, step_words
@@ -54,7 +55,7 @@ def replace_with(
 ) -> ExitCode:
     """Sign a compiled mission as the replacement of another, if it leaves alone what stays. The policy stays too."""
     try:
-        over = subject(order.replaces[0], order.replaces[1:], order.root, order.issued_at_us)
+        over = bundle_in_flight(order.replaces[0], order.replaces[1:], order.root, order.issued_at_us)
         flown = len(over.mission.invocations)
         if order.first > flown:
             text = f"`--from {number_of(order.first)}`: the mission that flies has {flown} steps"

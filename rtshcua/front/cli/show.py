@@ -11,9 +11,9 @@ from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG
 from rtshcua.app.documents import kind_of
+from rtshcua.app.logs import CUT_AT_FIRST
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import distrust, fail
-from rtshcua.front.cli.outcome import CUT_AT_FIRST
 from rtshcua.front.cli.showing.bundle import show_bundle
 from rtshcua.front.cli.showing.document import kind_of_document, show_document
 from rtshcua.front.cli.showing.keys import KEY_FILE, show_key, show_root

@@ -1,5 +1,6 @@
 """`rtshcua test`: run the tests of sources, say what they cover, and write tests for every limit of a policy."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -8,19 +9,18 @@ import typer
 from rtshcua.adapters.store.project import Projects
 from rtshcua.adapters.store.writing import write_out
 from rtshcua.app.exit_codes import exit_code
-from rtshcua.app.files import SPECIFICATION, overwriting_a_source, source_files
-from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.app.files import overwriting_a_source
+from rtshcua.app.testing.generate import GenerateRequest, NotGenerated, generate
+from rtshcua.app.testing.run import least_share, run_all, select_files
+from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.report.junit import junit
-from rtshcua.diagnostics.suggest import nearest
+from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.findings import Findings
-from rtshcua.front.cli.stdout import out, out_rendered
-from rtshcua.front.cli.testing.generating import Wanted, generate
-from rtshcua.front.cli.testing.running import Results, run_all
-from rtshcua.front.cli.testing.told import Told
-from rtshcua.front.cli.width import fitted
-from rtshcua.ground.testing.clause_coverage import enough, share
+from rtshcua.front.cli.progress import counting, watched
+from rtshcua.front.cli.stdout import out_source
+from rtshcua.front.cli.test_report import TestReport
 from rtshcua.ground.testing.reporting import (
     case_suites,
     coverage_json,
@@ -76,122 +76,71 @@ def run_tests(
     wrong, 3 where a file cannot be read.
     """
     findings = Findings(json=as_json)
-    only = [policy, skill, nominal, output, force or None]
-    if not generating and any(only):
+    if not generating and any([policy, skill, nominal, output, force]):
         help = "`--policy`, `--skill`, `--nominal`, `--output` and `--force` go with `--generate`"
         return findings.refuse(ExitCode.USAGE, "usage", "there is nothing to write without `--generate`", help)
-    projects = Projects(config, isolated=isolated)
-    lost = next((path for path in paths or () if not path.exists() and path.suffix == ""), None)
-    if lost is not None:
-        return findings.refuse(ExitCode.INPUT, "input", f"no such file or directory: `{lost}`", _meant(lost))
-    files = _files(paths or [Path()], projects, keep=generating)
+    projects, here = Projects(config, isolated=isolated), paths or [Path()]
+    files = select_files(here, projects, keep=generating)
     if isinstance(files, Refusal):
         return findings.end(files)
     if generating:
-        return generate(files, Wanted(policy, tuple(skill or ()), nominal, output, force), findings, quiet=as_json)
+        request = GenerateRequest(policy, tuple(skill or ()), nominal, output, force)
+        return _generate(files, request, findings, quiet=as_json)
     refused = None if junit_file is None else overwriting_a_source(junit_file, files, _REPORT)
     if refused is not None:
         return findings.end(refused)
-    whole = not chosen and all(path.is_dir() for path in paths or [Path()])  # of a part, nobody asked for a share
-    least = fail_under if fail_under is not None or not whole else _least(paths or [Path()], projects)
-    results = run_all(files, chosen, with_coverage=coverage or least is not None, quiet=as_json)
-    return _finish(results, chosen, findings, least, junit_file, verbose=verbose, quiet=as_json)
-
-
-def _meant(lost: Path) -> str:
-    """A source below this folder that is called almost so, or how cases are chosen by their names."""
-    if str(lost) == "-":
-        return "a source must be a file, because imports are found beside it"
-    by_name = f"`-k {lost}` chooses tests by name"
-    below = source_files([Path()])
-    near = None if isinstance(below, Refusal) else nearest(lost.name, {each.stem for each in below})
-    if near is None or isinstance(below, Refusal):
-        return by_name
-    return f"did you mean `{next(each for each in below if each.stem == near)}`? {by_name}"
-
-
-def _files(paths: list[Path], projects: Projects, *, keep: bool) -> tuple[Path, ...] | Refusal:
-    """The sources that are meant, but for those that a configuration leaves out; `keep` says to keep these too."""
-    files = source_files(paths)
-    if isinstance(files, Refusal):
-        return files
-    left: list[Path] = []
-    for path in files:
-        if path.suffix.lower() == SPECIFICATION:
-            return Refusal("usage", f"`{path}` is a mission specification, and has no tests")
-        project = projects.of(path)
-        if isinstance(project, Refusal):
-            where, _, what = project.text.partition(": ")
-            return project._replace(text=f"`{where}`: {what}")
-        if keep or path in paths or not project.excludes(path, project.settings.test.exclude):
-            left.append(path)
-    return tuple(left)
-
-
-def _least(paths: list[Path], projects: Projects) -> int | None:
-    """The greatest of the thresholds that the configurations of what was asked for set."""
-    found = [projects.of(path) for path in paths]
-    set_ = [one.settings.test.fail_under for one in found if not isinstance(one, Refusal)]
-    return max((each for each in set_ if each is not None), default=None)
-
-
-def _finish(
-    results: Results,
-    chosen: str,
-    findings: Findings,
-    least: int | None,
-    junit_file: Path | None,
-    *,
-    verbose: bool,
-    quiet: bool,
-) -> ExitCode:
-    """Say what was found, write the report, and end."""
-    ran, flown, covered = results.ran, results.flown, results.covered
-    refused = None if junit_file is None else overwriting_a_source(junit_file, results.sources, _REPORT)
+    whole = not chosen and all(path.is_dir() for path in here)  # of a part, nobody asked for a share
+    least = fail_under if fail_under is not None or not whole else least_share(here, projects)
+    with_coverage = coverage or least is not None
+    done = run_all(files, chosen, with_coverage=with_coverage, progress=watched, say=counting(quiet=as_json))
+    refused = None if junit_file is None else overwriting_a_source(junit_file, done.sources, _REPORT)
     if refused is not None:
         return findings.end(refused)
-    told = Told(results.sources)
-    if not quiet:
-        for line in (*told.tests(ran, verbose=verbose), *told.scenarios(flown, verbose=verbose)):
-            for each in fitted(line):
-                out_rendered(each)
-    failed = tuple(each.finding for each in ran if each.finding is not None)
-    failed += tuple(finding for each in flown for finding in each.findings)
-    findings.report((*results.diagnostics, *failed), results.sources)
+    show = TestReport(done, chosen, verbose=verbose, quiet=as_json)
+    show.results()
+    findings.report((*done.diagnostics, *done.failures), done.sources)
     if junit_file is not None:
-        write_out(
-            junit_file,
-            junit((*case_suites(ran, results.sources, covered), *scenario_suites(flown, results.sources))).encode(),
-        )
-    code = exit_code(results.diagnostics) if has_errors(results.diagnostics) else ExitCode.OK
-    short = covered is not None and least is not None and not enough([one.coverage for one in covered], least)
-    if code is ExitCode.OK and (failed or not (ran or flown) or short):
-        code = ExitCode.TESTS
-    if not quiet:
-        for line in told.coverage(covered or (), verbose=verbose):
-            for each in fitted(line):
-                out_rendered(each)
-        out_rendered(told.summary(ran, flown, results.left_out) if ran or flown else _none(results, chosen))
-        if short:
-            reached = sum(one.coverage.covered for one in covered or ())
-            found = share(reached, sum(one.coverage.total for one in covered or ()))
-            out(f"{found} is covered, less than {least} % (`--fail-under`, or `fail-under` of the configuration)")
-    shares = None if covered is None else coverage_json(covered, results.sources)
+        every = (*case_suites(done.ran, done.sources, done.covered), *scenario_suites(done.flown, done.sources))
+        write_out(junit_file, junit(every).encode())
+    show.summary(least)
+    shares = None if done.covered is None else coverage_json(done.covered, done.sources)
     return findings.finish(
-        code,
-        tests=tests_json(ran, results.sources),
-        scenarios=scenarios_json(flown, results.sources),
-        summary=summary_json(ran) | {"left_out": results.left_out},
-        coverage=None if shares is None else shares | {"least": least, "enough": not short},
+        done.code(least),
+        tests=tests_json(done.ran, done.sources),
+        scenarios=scenarios_json(done.flown, done.sources),
+        summary=summary_json(done.ran) | {"left_out": done.left_out},
+        coverage=None if shares is None else shares | {"least": least, "enough": not done.falls_short(least)},
     )
 
 
-def _none(results: Results, chosen: str) -> str:
-    if has_errors(results.diagnostics):
-        return "no test could be run: the sources have errors"
-    if results.left_out:
-        by_word = {word: name for name in sorted(results.names) for word in (*name.split(), name)}
-        near = nearest(chosen, by_word)
-        help = "" if near is None else f"; the nearest is `{by_word[near]}`"
-        return f"no test was run: none of {results.left_out} has `{chosen}` in its name{help}"
-    return "no test was found; docs/testing.md says how to write one"
+def _generate(files: Sequence[Path], request: GenerateRequest, findings: Findings, *, quiet: bool) -> ExitCode:
+    """Write the tests of one policy; quiet: as a field of the JSON object."""
+    done = generate(files, request)
+    if isinstance(done, Refusal):
+        return findings.end(done)
+    if isinstance(done, NotGenerated):
+        findings.report(done.diagnostics, done.sources)
+        if done.refusal is not None:
+            return findings.end(done.refusal)
+        return findings.finish(exit_code(done.diagnostics))
+    made = done.made
+    if not quiet:
+        if request.output is None:
+            out_source(done.text)
+        where = "" if request.output is None else f", in {request.output}"
+        counted = f"{many(made.cases, 'case')} on {many(len(made.limits), 'limit')} of {done.policy}"
+        say(f"{counted}{where}: read them before you keep them")  # the text may be on the standard output
+        for label in made.without:
+            say(f"nothing was found that makes `{label}` allowed; it has one case, as it is")
+        for each in made.unreached:
+            say(f"not reached: {each.words}")
+    return findings.finish(
+        ExitCode.OK,
+        policy=done.policy,
+        cases=made.cases,
+        limits=len(made.limits),
+        without=list(made.without),
+        unreached=[each._asdict() for each in made.unreached],
+        text=done.text,
+        path=None if request.output is None else str(request.output),
+    )

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from rtshcua.app.logs import lasted_us
 from rtshcua.app.pin import Pin
 from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
@@ -11,7 +12,6 @@ from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.gaps import seconds
 from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
 from rtshcua.front.cli.claims import listed, write
-from rtshcua.front.cli.flown import lasted_us
 from rtshcua.ground.audit.audit import Audit
 
 #: what a kind of failure means to whoever must act on it, by the first part of its slug

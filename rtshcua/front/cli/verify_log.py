@@ -5,25 +5,21 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
 from rtshcua.adapters.store.keystore import read_root
-from rtshcua.adapters.store.verification import Progress, VerificationInputs, verify_carefully, verify_quickly
+from rtshcua.adapters.store.verification import Progress
+from rtshcua.app import verify_log as service
 from rtshcua.app.documents import no_log
-from rtshcua.app.fly.simulated_flight import with_simulated
+from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of, logs_and_others, report_code
 from rtshcua.app.pin import Pin, pin
+from rtshcua.app.verify_log import VerifyRequest
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.finding import Finding
-from rtshcua.evidence.records import AnyRecord
-from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
-from rtshcua.front.cli.beside import anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
 from rtshcua.front.cli.faults import distrust, fail, of_each, say
-from rtshcua.front.cli.outcome import NO_LOG_HELP, exit_code, is_log, log_of, logs_and_others
 from rtshcua.front.cli.stdout import out_json
-from rtshcua.front.cli.unconfirmed import UnconfirmedFallbacks
 from rtshcua.front.cli.verdict import as_object, as_text
 from rtshcua.ground.audit.revoked import RevokedKeys
 from rtshcua.wire.untrusted import Untrusted
@@ -31,19 +27,6 @@ from rtshcua.wire.untrusted import Untrusted
 app = typer.Typer(add_completion=False)
 
 _LONG = 32 << 20  # bytes of a log that is worth a progress bar
-
-
-class Wanted(NamedTuple):
-    """How a log is verified: how deep, by how many, whether it must be anchored to its end, and by which trust roots
-    keys may have been revoked since.
-    """
-
-    audit: bool = False
-    derive: bool = True
-    fast: bool = False
-    jobs: int = 0
-    anchored: bool = False
-    roots: tuple[bytes, ...] = ()
 
 
 @app.command()
@@ -104,61 +87,31 @@ def verify_log(
     except Untrusted as error:
         help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
         return distrust(error, help, where="no root to trust: ")
+    named = tuple(anchors or ())
+    deep = audit or explain is not None
+    request = VerifyRequest(pinned.key, roots, named, deep, not no_derive, fast, jobs, require_anchor)
     if explain is not None:
         from rtshcua.front.cli.explaining import explained
 
-        return explained(logs, explain, pinned, roots, tuple(anchors or ()), derive=not no_derive, as_json=as_json)
-    wanted = Wanted(audit, not no_derive, fast, jobs, require_anchor, roots)
-    named = tuple(anchors or ())
+        return explained(logs, explain, request, as_json=as_json)
     meant, others = logs_and_others(logs)
     for other in others:
         say(visible(f"note: `{other}` was not looked at: it is no log of this program"))
-    return of_each(meant, lambda path, first: _verify(path, pinned, wanted, named, as_json=as_json, first=first))
+    return of_each(meant, lambda path, first: _verify(path, pinned, request, as_json=as_json, first=first))
 
 
-def _verify(
-    given: Path, pinned: Pin, wanted: Wanted, anchors: tuple[Path, ...], *, as_json: bool, first: bool
-) -> ExitCode:
+def _verify(given: Path, pinned: Pin, request: VerifyRequest, *, as_json: bool, first: bool) -> ExitCode:
     path = log_of(given)
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(path, given, NO_LOG_HELP))
-    asked = VerificationInputs(pinned.key, bundle_beside(path), anchors_beside(path, anchors))
-    raw = raw_frames(path)
-    unconfirmed, revoked = UnconfirmedFallbacks(), RevokedKeys(wanted.roots)
-
-    def each(record: AnyRecord) -> None:
-        unconfirmed.take(record)
-        revoked.take(record)
-
     with _progress(path.stat().st_size) as told:
-        if wanted.audit:
-            frames = raw.frames if raw is not None and wanted.derive else None
-            audit = verify_carefully(path, asked, derive=wanted.derive, frames=frames, each=each, progress=told)
-        else:
-            audit = verify_quickly(path, asked, fast=wanted.fast, jobs=wanted.jobs, progress=told)
-    audit = revoked.judged(audit)
-    report = audit.report
-    if raw is not None:
-        report = raw.unread(report) if wanted.fast else raw.judged(report, followed=wanted.audit and wanted.derive)
-    report = with_summary(_required(report) if wanted.anchored else report, path)
-    report = unconfirmed.told(with_unread(with_simulated(report, path), path))
-    audit = audit._replace(report=report)
-    code = exit_code(audit.report)
+        found = service.verify_log(path, request, told)
+    code = report_code(found.report)
     if as_json:
-        out_json(json.dumps(as_object(audit, path, pinned, code), ensure_ascii=False))
+        out_json(json.dumps(as_object(found, path, pinned, code), ensure_ascii=False))
     else:
-        as_text(audit, path, pinned, first=first)
+        as_text(found, path, pinned, first=first)
     return code
-
-
-def _required(report: LogReport) -> LogReport:
-    """The report of a log that must be anchored to its end."""
-    if report.verdict is not LogVerdict.VERIFIED or report.anchored == report.records:
-        return report
-    text = "witnesses did not see the log to its end, as was asked for"
-    few = "" if report.outside is None else cosigned(report.outside)
-    found, expected = f"{report.anchored} records{few and f', the rest {few}'}", f"{report.records} records"
-    return report._replace(shortfall=Finding("anchor/missing", report.anchored, text, found, expected))
 
 
 @contextmanager

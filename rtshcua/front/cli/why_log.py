@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
+from rtshcua.app.logs import CUT_AT_FIRST
 from rtshcua.app.wording import utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
@@ -17,7 +18,6 @@ from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.front.cli.faults import fail
-from rtshcua.front.cli.outcome import CUT_AT_FIRST
 from rtshcua.front.cli.showing.link import show_link
 from rtshcua.front.cli.showing.log import Names
 from rtshcua.front.cli.showing.page import Page

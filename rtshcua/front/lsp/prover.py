@@ -21,14 +21,13 @@ from typing import BinaryIO
 
 from rtshcua.adapters.store.project import Project, Projects
 from rtshcua.adapters.store.readable import Readable
+from rtshcua.app.lint.examine import find
+from rtshcua.app.lint.scope import ignored_in
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.front.lsp.disk import desk
 from rtshcua.ground.editor.desk import Desk, View
 from rtshcua.ground.lint.filter import filter_findings
-from rtshcua.ground.lint.lint import lint
-from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.project.settings import IgnoredCode
-from rtshcua.mavlink import dialect
 
 LENGTH = 8  # bytes, in front of each message
 PATIENCE = 10.0
@@ -75,23 +74,16 @@ def examined(known: Desk, job: Job) -> tuple[Diagnostic, ...]:
         known.put(name, text)
     known.forget()
     view = known.view(asked)
-    checked = examine_program(view.program, dialect.load())
-    found = checked.diagnostics
-    failed = has_errors(found)
-    if not failed:
-        found += lint(view.program, {asked}, checked.grounds)
-    untold = {asked} if failed else ()
+    result = find(view.program, {asked: None})
+    untold = {asked} if has_errors(result.found) else ()
+    found = (*result.found, *result.habits)
     return filter_findings(found, view.program.sources, {asked}, _configured(view), untold).found
 
 
 def _configured(view: View) -> dict[str, tuple[IgnoredCode, ...]]:
     """What the project's configuration ignores in the first file."""
     project = Projects().of(Path(view.name))
-    if not isinstance(project, Project):
-        return {}
-    ignored = project.settings.lint.ignored
-    mine = (one for one in ignored if one.pattern is None or project.means(one.pattern, Path(view.name)))
-    return {view.name: tuple(mine)}
+    return {view.name: ignored_in(project, Path(view.name))} if isinstance(project, Project) else {}
 
 
 def _take(incoming: BinaryIO) -> Job | None:

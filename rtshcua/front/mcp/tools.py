@@ -16,12 +16,12 @@ from typing import Any, Final, NamedTuple
 import msgspec
 
 from rtshcua.adapters.agent_socket import hand_in
+from rtshcua.app.propose import Missions, ProposalAnswer
 from rtshcua.decision.nearest import Nearest
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.mcp.flight import Following
-from rtshcua.front.mcp.missions import Answer, Missions
 from rtshcua.ground.why.reads import reads
 from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
@@ -219,7 +219,7 @@ class Tools:
             return ticket.told() | {"state": "flying", "text": _FLIES}
         return ticket.told()
 
-    def _signed(self, answer: Answer, first: int | None) -> tuple[bytes, tuple[Policy, Mission]]:
+    def _signed(self, answer: ProposalAnswer, first: int | None) -> tuple[bytes, tuple[Policy, Mission]]:
         policy, mission, signer = answer.policy, answer.mission, self._signer
         assert policy is not None
         assert mission is not None
@@ -354,7 +354,7 @@ _DECIDED: Final = ("seq", "outcome", "reason", "clause", "target")
 _HOW: Final = "a person of the rule's role signs: `rtshcua approve BUNDLE --step N --to SOCKET`; no agent can"
 
 
-def _checked(answer: Answer) -> dict[str, Any]:
+def _checked(answer: ProposalAnswer) -> dict[str, Any]:
     """What the compiler said: of many rejections the first, and how many more there are."""
     return {"accepted": answer.accepted, "rejections": answer.rejections, "more_rejections": answer.more}
 

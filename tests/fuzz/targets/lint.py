@@ -6,11 +6,11 @@ from random import Random
 from fuzz import corpus, world
 from fuzz.mutation import sentences
 from reference import ignoring
+from rtshcua.app.lint.findings import LintFindings
+from rtshcua.app.lint.fix import fix
 from rtshcua.diagnostics.codes import can_be_ignored
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.span import Source
-from rtshcua.front.cli.linting.fixing import fix
-from rtshcua.front.cli.linting.gathered import Gathered
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.lint.filter import filter_findings
@@ -86,7 +86,7 @@ class Held:
     def put(self, _name: str, data: bytes) -> None:
         self.data = data
 
-    def examined(self) -> Gathered:
+    def examined(self) -> LintFindings:
         """Everything that is found in the text."""
         program = load([world.PROBE], world.reading({world.PROBE: self.data}), world.LIBRARY, world.listing)
         checked = examine_program(program, dialect.load())
@@ -100,7 +100,7 @@ class Held:
             expected = ignoring.ignored(source, found)
             assert {each.diagnostic for each in sifted.ignored} == expected, (sifted.ignored, expected)
         world.hold(sifted.found, program.sources)
-        return Gathered(sifted.found, sifted.ignored, program.sources, sifted.used, frozenset(untold))
+        return LintFindings(sifted.found, sifted.ignored, program.sources, sifted.used, frozenset(untold))
 
 
 def one(data: bytes) -> None:
@@ -124,7 +124,7 @@ def one(data: bytes) -> None:
     assert not has_errors(done.told.found) or has_errors(told.found)
 
 
-def _ignoring(told: Gathered) -> Iterable[bytes]:
+def _ignoring(told: LintFindings) -> Iterable[bytes]:
     """The text with one of its findings ignored, in one of the three ways."""
     source = told.sources[world.PROBE]
     found = [each for each in told.found if each.span is not None and each.span.file == world.PROBE]

@@ -6,10 +6,10 @@ import sys
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
+from rtshcua.app.logs import finding_code
 from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.outcome import exit_code_of
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.width import columns
 
@@ -69,7 +69,7 @@ def code_of(status: str, finding: str | None) -> ExitCode:
     """The exit code for a log, as `rtshcua verify-log` has it."""
     if status != "failed":
         return ExitCode.OK if status == "verified" else ExitCode.INCOMPLETE
-    return exit_code_of(finding or "")
+    return finding_code(finding or "")
 
 
 def counted(counts: Mapping[str, int]) -> str:

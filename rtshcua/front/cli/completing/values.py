@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Final
 
+from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics.codes import REGISTRY
-from rtshcua.front.cli.linting.options import FORMATS
 from rtshcua.front.cli.table import COMMANDS
 from rtshcua.ground.agent.tool_forms import FORMS
 from rtshcua.ground.project.settings import LEVELS

@@ -10,12 +10,12 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua import library
+from rtshcua.app.testing import flying
 from rtshcua.campaign.flights import Field, Flight
 from rtshcua.campaign.results import Failed, Result
 from rtshcua.campaign.trying import Trial, Try
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.testing import flying
 from rtshcua.ground.testing.reporting import FlightFailure, FlightResult
 from rtshcua.model.faults import GpsLoss
 from virtual import case

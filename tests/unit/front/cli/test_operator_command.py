@@ -18,11 +18,11 @@ import pytest
 from rtshcua.adapters.agent_socket import FlightFollower
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.flight_documents import bundle_in_flight
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.records import Close, Effect, encode
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.documents import subject
 from rtshcua.front.cli.interrupts import StopRequest
 from rtshcua.front.cli.operator import OperatorConsole, Patience
 from rtshcua.front.cli.stdout import MOST_LINES, NewestLines
@@ -52,7 +52,7 @@ def flying(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bundle, S
         assert main(["keys", "init"]) == ExitCode.OK
         assert main(["compile", str(MISSION), "-o", "m.bundle"]) == ExitCode.OK
         yield (
-            subject(Path("m.bundle"), [], None, 10**15, stops=True),
+            bundle_in_flight(Path("m.bundle"), [], None, 10**15, stops=True),
             unlock_person(KeyStore(data_folder()), None, None, path=None, passphrase_file=None),
         )
 

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.main import get_command
 
+from rtshcua.app.lint.scope import LintOptions
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import check, lint, quick, recall
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.linting.options import Options
 from rtshcua.front.cli.table import COMMANDS
 
 COMMAND = {"lint": (lint, quick.LINT), "check": (check, quick.CHECK), "recall": (recall, quick.RECALL)}
@@ -48,13 +48,13 @@ def test_what_is_read_quickly_typer_reads_so(words: list[str]) -> None:
     found = quick.read(words, quick.LINT)
     if found is None or not found[0]:
         return
-    given: list[Options] = []
+    given: list[LintOptions] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(lint, "run", lambda options: given.append(options) or ExitCode.OK)
         command = get_command(lint.app)
         with command.make_context("rtshcua lint", list(words), help_option_names=["-h", "--help"]) as context:
             command.invoke(context)
-    assert given == [Options(found[0], **found[1])]
+    assert given == [LintOptions(found[0], **found[1])]
     assert all(isinstance(path, Path) for path in found[0])
 
 

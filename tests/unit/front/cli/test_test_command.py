@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import pytest
 
 from reference.tested import POLICY, TESTS
+from rtshcua.app.testing import run as running
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.testing import running
 
 
 @pytest.fixture

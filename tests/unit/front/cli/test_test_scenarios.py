@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from rtshcua.app.testing import flying
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.testing import flying
 from rtshcua.ground.testing.reporting import FlightFailure, FlightResult
 
 SOURCE = """import "lib:missions/short.rts"

@@ -14,6 +14,7 @@ from reference.marked import mark, note_of
 from rtshcua.adapters.store import logs
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.logs import report_code
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import LogReport, LogVerdict
@@ -425,4 +426,4 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
 def test_exit_codes_of_failures(slug: str, code: ExitCode) -> None:
     report = LogReport(0, {}, Finding(slug, 0, ""), None, None, None, 0, b"", (), ())
     assert report.verdict is LogVerdict.FAILED
-    assert verify_log.exit_code(report) is code
+    assert report_code(report) is code

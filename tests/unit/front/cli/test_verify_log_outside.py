@@ -9,12 +9,13 @@ import pytest
 from reference.forgery import LOG_KEY, edit, flight, signed
 from reference.marked import mark, note_of
 from rtshcua.adapters.store.recovery import examine
+from rtshcua.app import verify_log
 from rtshcua.app.fly.simulated_flight import SIMULATED, told
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.recovery import ending
 from rtshcua.evidence.report import LogReport
 from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Witnessed
-from rtshcua.front.cli import app, verify_log
+from rtshcua.front.cli import app
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty
 from virtual import case

@@ -11,11 +11,10 @@ from typing import Any
 
 import pytest
 
-from rtshcua import library
+from rtshcua.app.propose import Missions, ProposalAnswer
 from rtshcua.front.mcp import tools as desks
 from rtshcua.front.mcp.flight import Following
 from rtshcua.front.mcp.flight_lines import understood
-from rtshcua.front.mcp.missions import Answer, Missions
 from rtshcua.front.mcp.tools import Misused, Signer, Tools
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.wire import cose, names
@@ -49,7 +48,7 @@ RECORDED = {
 
 @pytest.fixture(scope="module")
 def missions() -> Missions:
-    return Missions([CHECKOUT / "policies/bridge_inspection.rts"], str(library.root()))
+    return Missions([CHECKOUT / "policies/bridge_inspection.rts"])
 
 
 @pytest.fixture
@@ -87,7 +86,7 @@ def test_each_of_two_checks_at_a_time_is_of_its_own_mission(
     missions: Missions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The second was read in the place of the first, which was then signed for it."""
-    others: list[Answer | None] = []
+    others: list[ProposalAnswer | None] = []
 
     def load_late(*about: Any) -> Any:
         if not others:
@@ -95,7 +94,7 @@ def test_each_of_two_checks_at_a_time_is_of_its_own_mission(
             others[0] = missions.check(PROPOSAL, 1_000_000)
         return load_specification(*about)
 
-    monkeypatch.setattr("rtshcua.front.mcp.missions.load_specification", load_late)
+    monkeypatch.setattr("rtshcua.ground.agent.specification.load_specification", load_late)
     assert not missions.check(HIGH, 1_000_000).accepted
     assert others[0] is not None
     assert others[0].accepted

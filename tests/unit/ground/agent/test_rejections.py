@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua import library
-from rtshcua.front.mcp.missions import Missions
+from rtshcua.app.propose import Missions
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))
@@ -32,7 +31,7 @@ OTHERS: tuple[Any, ...] = (None, 7, True, [], {}, ["25 m"], {"value": "25 m"})
 
 @pytest.fixture(scope="module")
 def missions() -> Missions:
-    return Missions([CHECKOUT / "policies/bridge_inspection.rts"], str(library.root()))
+    return Missions([CHECKOUT / "policies/bridge_inspection.rts"])
 
 
 def places(value: Any, at: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:

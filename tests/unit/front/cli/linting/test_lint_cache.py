@@ -11,8 +11,8 @@ import pytest
 
 from reference.lint_project import HABITS, MISSION, POLICY, UNUSED, Lint, put
 from rtshcua.adapters.store.folders import cache_folder
+from rtshcua.app.lint import examine
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.linting import fresh
 
 
 def folder() -> Path:
@@ -24,13 +24,13 @@ def folder() -> Path:
 def examined(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The programs that were examined anew, by their first file."""
     names: list[str] = []
-    plain = fresh._result
+    plain = examine.find
 
     def watched(program, *rest):  # type: ignore[no-untyped-def]
         names.append(program.units[0].file)
         return plain(program, *rest)
 
-    monkeypatch.setattr(fresh, "_result", watched)
+    monkeypatch.setattr(examine, "find", watched)
     return names
 
 
@@ -103,7 +103,7 @@ def test_another_set_of_files_and_another_program_version(
     assert lint("one.rts") == (ExitCode.DIAGNOSTICS, [("E1302", "one.rts")])
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)  # now also what is said of the policy
     count = len(examined)
-    monkeypatch.setattr("rtshcua.front.cli.linting.session.mark", lambda: "another")
+    monkeypatch.setattr("rtshcua.app.lint.session.mark", lambda: "another")
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
     assert len(examined) == count + 2
 

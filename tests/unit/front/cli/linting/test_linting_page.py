@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
+from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics import codes
-from rtshcua.front.cli.linting.options import FORMATS
 from rtshcua.ground.project.settings import ProjectSettings, parse_settings
 
 

@@ -1,4 +1,4 @@
-"""Which files a run is about, and the configuration of each."""
+"""What a run of lint is asked for, which files it is about, and the configuration of each."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -12,12 +12,43 @@ from rtshcua.adapters.store.lint_cache import LintCache
 from rtshcua.adapters.store.project import Project, Projects
 from rtshcua.app.files import SOURCE, source_files
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.linting.options import Options
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.project.settings import IgnoredCode, misconfigured
 
+FORMATS = ("human", "json", "sarif", "github", "junit")
 
-class Scope(NamedTuple):
+
+class LintOptions(NamedTuple):
+    """The command line, after it was read; each is explained in `rtshcua/front/cli/lint.py`."""
+
+    paths: tuple[Path, ...]
+    format: str = "human"
+    output: Path | None = None
+    fail_on: str | None = None
+    with_: tuple[Path, ...] = ()
+    changed: bool = False
+    base: str | None = None
+    config: Path | None = None
+    isolated: bool = False
+    fix: bool = False
+    unsafe_fixes: bool = False
+    diff: bool = False
+    no_cache: bool = False
+    statistics: bool = False
+    json: bool = False
+
+    @property
+    def form(self) -> str:
+        """The form of the report."""
+        return "json" if self.json else self.format
+
+    @property
+    def fixes(self) -> bool:
+        """Whether fixes are made, or shown."""
+        return self.fix or self.unsafe_fixes or self.diff
+
+
+class LintScope(NamedTuple):
     """The files, and of each its project, further sources and cache; `left_out` is how many are excluded."""
 
     files: tuple[Path, ...]
@@ -29,10 +60,10 @@ class Scope(NamedTuple):
 
     def configured(self) -> dict[str, tuple[IgnoredCode, ...]]:
         """What the configuration of each file ignores in it, by the file's name."""
-        return {shown(str(path)): _ignored(self.projects[path], path) for path in self.files}
+        return {shown(str(path)): ignored_in(self.projects[path], path) for path in self.files}
 
 
-def scope(options: Options) -> Scope | Refusal:
+def scope(options: LintOptions) -> LintScope | Refusal:
     """The files that are asked for, but for those that their configuration excludes; what is wrong with either ends the
     run.
     """
@@ -55,7 +86,7 @@ def scope(options: Options) -> Scope | Refusal:
             found[path] = project
     kept = tuple(found)
     caches = {} if options.no_cache else _caches(tuple(found.items()), fresh=options.fixes)
-    return Scope(
+    return LintScope(
         kept,
         found,
         {path: options.with_ or _further(project) for path, project in found.items()},
@@ -70,7 +101,8 @@ def _looks_at_layout(project: Project, path: Path) -> bool:
     return settings.lint.format and path.suffix == SOURCE and not project.excludes(path, settings.format.exclude)
 
 
-def _ignored(project: Project, path: Path) -> tuple[IgnoredCode, ...]:
+def ignored_in(project: Project, path: Path) -> tuple[IgnoredCode, ...]:
+    """What the configuration of a project ignores in a file."""
     return tuple(
         each for each in project.settings.lint.ignored if each.pattern is None or project.means(each.pattern, path)
     )

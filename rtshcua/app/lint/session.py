@@ -12,13 +12,12 @@ from rtshcua import library
 from rtshcua.adapters.store.lint_cache import LintCache
 from rtshcua.adapters.store.readable import Readable
 from rtshcua.app.files import SPECIFICATION, root_programs
+from rtshcua.app.lint.cache import LintedProgram, decoded, encoded, mark
 from rtshcua.diagnostics.span import Source
-from rtshcua.front.cli.linting.examined import Examined, decoded, encoded
-from rtshcua.front.cli.linting.mark import mark
 from rtshcua.ground.language.paths import shown
 
 
-class Session:
+class LintSession:
     """Files as they were first read, or as they are to be (`put`), and what was found in their programs."""
 
     def __init__(self, asked: Iterable[Path] = ()) -> None:
@@ -92,32 +91,32 @@ class Session:
         further: Mapping[Path, Sequence[Path]],
         caches: Mapping[Path, LintCache | None],
         widths: Mapping[Path, int],
-    ) -> list[Examined]:
+    ) -> list[LintedProgram]:
         """What is found in the programs that files make, in order; `cli.programs` says which these are. Each file has
         further sources, a cache to be remembered in, and, if its layout is to be looked at, the width of its lines.
         """
         names = [shown(str(path)) for path in files]
         asked = {name: widths.get(path) for name, path in zip(names, files, strict=True)}
         if files[0].suffix.lower() == SPECIFICATION:
-            from rtshcua.front.cli.linting.fresh import examine_specification
+            from rtshcua.app.lint.examine import examine_specification
 
             return [examine_specification(self, files, further[files[0]], asked)]
         entries = [_entry(name, further[path]) for name, path in zip(names, files, strict=True)]
         known = [self._known(caches[path], entry, asked) for path, entry in zip(files, entries, strict=True)]
         missing = [number for number, each in enumerate(known) if each is None]
-        loaded: dict[int, Examined] = {}
+        loaded: dict[int, LintedProgram] = {}
         if missing:
-            from rtshcua.front.cli.linting.fresh import Fresh
+            from rtshcua.app.lint.examine import Examiner
 
-            fresh = Fresh(self, asked)
+            fresh = Examiner(self, asked)
             loaded = {number: fresh.loaded(files[number], further[files[number]]) for number in missing}
         every = [known[number] or loaded[number] for number in range(len(files))]
         chosen = root_programs(names, [each.members for each in every])
         waiting = [number for number in chosen if every[number].result is None]
         if waiting:
-            from rtshcua.front.cli.linting.fresh import Fresh
+            from rtshcua.app.lint.examine import Examiner
 
-            fresh = fresh if missing else Fresh(self, asked)
+            fresh = fresh if missing else Examiner(self, asked)
             results = fresh.examined([(files[number], further[files[number]]) for number in waiting])
             loaded |= dict(zip(waiting, results, strict=True))
         for number, each in loaded.items():
@@ -127,7 +126,7 @@ class Session:
                 cache.put(entries[number], encoded(each, self._marked(entries[number])))
         return [every[number] for number in chosen]
 
-    def _known(self, cache: LintCache | None, entry: str, asked: Mapping[str, int | None]) -> Examined | None:
+    def _known(self, cache: LintCache | None, entry: str, asked: Mapping[str, int | None]) -> LintedProgram | None:
         data = None if cache is None else cache.get(entry)
         if data is None:
             return None

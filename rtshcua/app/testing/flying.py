@@ -1,29 +1,29 @@
 """Flies the scenarios of files: every seed of each, on every kind of autopilot, in virtual time."""
 
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from typing import Final
 
 from rtshcua.campaign.flights import Field
 from rtshcua.campaign.trying import Trial, tries
 from rtshcua.campaign.workers import Here, Processes, Workers, cores
-from rtshcua.diagnostics.excerpt import visible
 from rtshcua.ground.testing.reporting import FlightResult, ScenarioResult, findings
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.virtual import development
 
 #: fewer are flown in this process
 _FEW: Final = 4
-_CLEAR: Final = "\r\033[K"
 
 
 class Flying:
-    """Flies scenarios, on as many processes as there are cores once it is worth it."""
+    """Flies scenarios, on as many processes as there are cores once it is worth it.
 
-    def __init__(self, *, with_coverage: bool, quiet: bool) -> None:
+    `say` gets how far it is in a line, which takes the place of the one before; an empty one when a scenario is flown.
+    """
+
+    def __init__(self, *, with_coverage: bool, say: Callable[[str], None]) -> None:
         self._with_coverage = with_coverage
-        self._shows = not quiet and sys.stderr is not None and sys.stderr.isatty()
+        self._say = say
         self._workers: Workers | None = None
 
     def fly(self, scenarios: Sequence[ScenarioFlight]) -> Iterator[ScenarioResult]:
@@ -54,8 +54,3 @@ class Flying:
         self._say("")
         flights = tuple(sorted(flown, key=lambda each: each.number))
         return ScenarioResult(scenario, flights, tuple(findings(scenario, flights)))
-
-    def _say(self, text: str) -> None:
-        if self._shows:
-            sys.stderr.write(_CLEAR + visible(text))
-            sys.stderr.flush()

@@ -2,12 +2,17 @@
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
+from rtshcua.app.testing.run import TestResults
 from rtshcua.app.wording import many, shorten
+from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.diagnostics.span import Source, Span
+from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import nearest
+from rtshcua.front.cli.stdout import out, out_rendered
+from rtshcua.front.cli.width import fitted
 from rtshcua.ground.testing.case_result import CaseResult
 from rtshcua.ground.testing.clause_coverage import PolicyCoverage, share
 from rtshcua.ground.testing.coverage_goals import Goal
@@ -17,25 +22,61 @@ _GREEN, _RED, _BOLD, _END = "\033[32m", "\033[1;31m", "\033[1m", "\033[0m"
 _WIDTH = 100
 
 
-class Told:
-    """Writes lines, coloured where the standard output is a terminal."""
+class TestReport:
+    """Prints what was found, coloured where the standard output is a terminal; nothing if `quiet`."""
 
-    def __init__(self, sources: dict[str, Source]) -> None:
-        self._sources = sources
+    __test__ = False  # no class of pytest's
+
+    def __init__(self, done: TestResults, chosen: str, *, verbose: bool, quiet: bool) -> None:
+        self._done = done
+        self._chosen = chosen
+        self._verbose = verbose
+        self._quiet = quiet
         terminal = sys.stdout is not None and sys.stdout.isatty()
         self._colours = terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
-    def tests(self, ran: Sequence[CaseResult], *, verbose: bool) -> Iterator[str]:
+    def results(self) -> None:
+        """A line for each test and scenario, below its file."""
+        self._print((*self._tests(self._done.ran), *self._scenarios(self._done.flown)))
+
+    def summary(self, least: int | None) -> None:
+        """What is covered, how many there were and how they ended, and whether less is covered than is asked."""
+        if self._quiet:
+            return
+        done, covered = self._done, self._done.covered or ()
+        self._print(self._coverage(covered))
+        out_rendered(self._counts() if done.ran or done.flown else self._none())
+        if done.falls_short(least):
+            found = share(sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered))
+            out(f"{found} is covered, less than {least} % (`--fail-under`, or `fail-under` of the configuration)")
+
+    def _print(self, lines: Iterable[str]) -> None:
+        for line in () if self._quiet else lines:
+            for each in fitted(line):
+                out_rendered(each)
+
+    def _none(self) -> str:
+        done = self._done
+        if has_errors(done.diagnostics):
+            return "no test could be run: the sources have errors"
+        if done.left_out:
+            by_word = {word: name for name in sorted(done.names) for word in (*name.split(), name)}
+            near = nearest(self._chosen, by_word)
+            help = "" if near is None else f"; the nearest is `{by_word[near]}`"
+            return f"no test was run: none of {done.left_out} has `{self._chosen}` in its name{help}"
+        return "no test was found; docs/testing.md says how to write one"
+
+    def _tests(self, ran: Sequence[CaseResult]) -> Iterator[str]:
         """A line a test, below its file; with `verbose` also one for each row."""
         for file, of_file in groupby(ran, lambda each: each.case.span.file):
             yield self._painted(visible(file), _BOLD)
             for _, group in groupby(of_file, lambda each: each.case.test.span):
                 cases = list(group)
                 yield self._line(cases)
-                if verbose and cases[0].case.row is not None:
+                if self._verbose and cases[0].case.row is not None:
                     yield from (f"      {self._word(each.met)}  {visible(_row(each))}" for each in cases)
 
-    def scenarios(self, flown: Sequence[ScenarioResult], *, verbose: bool) -> Iterator[str]:
+    def _scenarios(self, flown: Sequence[ScenarioResult]) -> Iterator[str]:
         """A line a scenario, below its file; with `verbose` also how its flights ended, and what was excused."""
         for file, of_file in groupby(flown, lambda each: each.scenario.declaration.span.file):
             yield self._painted(visible(file), _BOLD)
@@ -43,21 +84,22 @@ class Told:
                 flights = many(len(each.flights), "flight")
                 counted = f"{each.failed} of {flights}" if each.failed else flights
                 yield f"  {self._word(not each.failed)}  {visible(each.scenario.scenario.name)} ({counted})"
-                if verbose:
+                if self._verbose:
                     yield "      " + ", ".join(f"{count} {ending}" for ending, count in each.endings.items())
                     excused = sorted({text for flight in each.flights for text in flight.excused})
                     yield from (f"      excused: {visible(text)}" for text in excused)
 
-    def coverage(self, covered: Sequence[PolicyCoverage], *, verbose: bool) -> Iterator[str]:
+    def _coverage(self, covered: Sequence[PolicyCoverage]) -> Iterator[str]:
         """What is missing, clause by clause; with `verbose` also what is not."""
         for one in covered:
-            yield from self._policy(one, verbose=verbose)
+            yield from self._policy(one)
         if len(covered) > 1:
             reached, total = sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered)
             yield f"\ncoverage of all: {share(reached, total)}, {reached} of {total}"
 
-    def summary(self, ran: Sequence[CaseResult], flown: Sequence[ScenarioResult], left_out: int) -> str:
+    def _counts(self) -> str:
         """How many there were, and how they ended."""
+        ran, flown, left_out = self._done.ran, self._done.flown, self._done.left_out
         found = summary_json(ran)
         counts = [many(found["tests"], "test")] if ran or not flown else []
         if found["cases"] != found["tests"]:
@@ -82,14 +124,14 @@ class Told:
     def _word(self, met: bool) -> str:
         return self._painted("ok  ", _GREEN) if met else self._painted("FAIL", _RED)
 
-    def _policy(self, one: PolicyCoverage, *, verbose: bool) -> Iterator[str]:
+    def _policy(self, one: PolicyCoverage) -> Iterator[str]:
         found = one.coverage
         part = share(found.covered, found.total)
         head = f"coverage of {policy_name(found.policy)} on {found.policy.vehicle.name}: {part}"
         counted = f"{found.covered} of {found.total} by {many(found.decisions, 'case')}"
         yield f"\n{self._painted(visible(head), _BOLD)}, {counted}"
         for line, span in zip(found.lines, one.spans, strict=True):
-            if line.missing or verbose:
+            if line.missing or self._verbose:
                 yield f"  {visible(self._place(span))}  {visible(shorten(clause_words(line.item), _WIDTH))}"
                 missing = ["never decided" if goal is Goal.DECIDED else f"never {goal.value}" for goal in line.missing]
                 yield f"      {', '.join(missing)}" if missing else "      covered"
@@ -97,9 +139,9 @@ class Told:
             yield f"  {many(len(found.undecided), 'clause')} never decided: no test would notice if they said otherwise"
 
     def _place(self, span: Span | None) -> str:
-        if span is None or span.file not in self._sources:
+        if span is None or span.file not in self._done.sources:
             return "-"
-        return f"{span.file}:{self._sources[span.file].position(span.start).line}"
+        return f"{span.file}:{self._done.sources[span.file].position(span.start).line}"
 
     def _painted(self, text: str, colour: str) -> str:
         return f"{colour}{text}{_END}" if self._colours else text

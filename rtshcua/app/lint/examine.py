@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Protocol
 
 from rtshcua import library
+from rtshcua.app.lint.cache import LintedProgram, ProgramFindings
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
-from rtshcua.front.cli.linting.examined import Examined, Result
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.lint.lint import lint
 from rtshcua.ground.pipeline.program import examine_program
@@ -33,7 +33,7 @@ class SourceFiles(Protocol):
         ...
 
 
-class Fresh:
+class Examiner:
     """The programs of one run."""
 
     def __init__(self, session: SourceFiles, asked: Mapping[str, int | None]) -> None:
@@ -41,17 +41,17 @@ class Fresh:
         self._asked = asked
         self._programs: dict[Path, tuple[Program, _Reads]] = {}
 
-    def loaded(self, path: Path, further: Sequence[Path]) -> Examined:
+    def loaded(self, path: Path, further: Sequence[Path]) -> LintedProgram:
         """The program of a file, not examined."""
         program, reads = self._load(path, further)
         return reads.examined(program, self._asked, None)
 
-    def examined(self, wanted: Sequence[tuple[Path, Sequence[Path]]]) -> list[Examined]:
+    def examined(self, wanted: Sequence[tuple[Path, Sequence[Path]]]) -> list[LintedProgram]:
         """The programs of files, examined."""
         done = []
         for path, further in wanted:
             program, reads = self._load(path, further)
-            done.append(reads.examined(program, self._asked, _result(program, self._asked)))
+            done.append(reads.examined(program, self._asked, find(program, self._asked)))
         return done
 
     def _load(self, path: Path, further: Sequence[Path]) -> "tuple[Program, _Reads]":
@@ -80,15 +80,17 @@ class _Reads:
         self._packs[pack] = self._session.folder(pack)
         return self._packs[pack]
 
-    def examined(self, program: Program, asked: Mapping[str, int | None], result: Result | None) -> Examined:
+    def examined(
+        self, program: Program, asked: Mapping[str, int | None], result: ProgramFindings | None
+    ) -> LintedProgram:
         members = tuple(unit.file for unit in program.units)
         mine = {name: asked[name] for name in members if name in asked}
-        return Examined(members, self._names, self._packs, mine, result)
+        return LintedProgram(members, self._names, self._packs, mine, result)
 
 
 def examine_specification(
     session: SourceFiles, files: Sequence[Path], further: Sequence[Path], asked: Mapping[str, int | None]
-) -> Examined:
+) -> LintedProgram:
     """A mission specification with the sources of its policy, as one program."""
     from rtshcua.ground.agent.specification import load_specification
 
@@ -97,19 +99,22 @@ def examine_specification(
     program, read = load_specification(
         str(files[0]), rest, reads.read, str(library.root()), session.listing, reads.folder
     )
-    return reads.examined(program, asked, _result(program, asked, read.pointed))
+    return reads.examined(program, asked, find(program, asked, read.pointed))
 
 
-def _result(
+def find(
     program: Program,
     asked: Mapping[str, int | None],
     pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]] = tuple,
-) -> Result:
+) -> ProgramFindings:
+    """Everything that is wrong with a program; without errors also the habits of the files that were `asked` for, each
+    with the width of its lines where its layout is looked at.
+    """
     checked = examine_program(program, dialect.load())
     found = pointed(checked.diagnostics)
     if has_errors(found):
-        return Result(found, ())
-    return Result(found, (*lint(program, asked, checked.grounds), *_layouts(program, asked)))
+        return ProgramFindings(found, ())
+    return ProgramFindings(found, (*lint(program, asked, checked.grounds), *_layouts(program, asked)))
 
 
 def _layouts(program: Program, asked: Mapping[str, int | None]) -> Iterator[Diagnostic]:

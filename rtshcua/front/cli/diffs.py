@@ -5,8 +5,8 @@ import sys
 from collections.abc import Iterator
 from difflib import unified_diff
 
+from rtshcua.app.layout import Laid
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.front.cli.formatting.each import Laid
 
 _COLOURS = {"---": "\033[1m", "+++": "\033[1m", "@@": "\033[36m", "-": "\033[31m", "+": "\033[32m"}
 _END = "\033[0m"

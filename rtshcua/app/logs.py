@@ -1,12 +1,14 @@
-"""Which file is meant by a log, and how its verification ends for the shell."""
+"""Which files are logs, how the verification of one ends for the shell, and how long a flight lasted."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
-from rtshcua.adapters.store.logs import START
+from rtshcua.adapters.store.logs import START, lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, lines_below, logs_of
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.reading import read
 from rtshcua.evidence.report import LogReport, LogVerdict
 
 _MARK = b'"format":"rtshcua/log"'
@@ -67,15 +69,38 @@ def is_log(path: Path) -> bool:
     return not line or line.startswith(START) or _MARK in line
 
 
-def exit_code(report: LogReport) -> ExitCode:
+def report_code(report: LogReport) -> ExitCode:
     """The exit code for a report."""
     if report.failure is None:
         return ExitCode.OK if report.verdict is LogVerdict.VERIFIED else ExitCode.INCOMPLETE
-    return exit_code_of(report.failure.slug)
+    return finding_code(report.failure.slug)
 
 
-def exit_code_of(slug: str) -> ExitCode:
+def finding_code(slug: str) -> ExitCode:
     """The exit code for what makes a log fail."""
     if slug == "genesis/format":
         return ExitCode.UNTRUSTED
     return _EXITS.get(slug.partition("/")[0], ExitCode.EVIDENCE)
+
+
+_RECOVER = b',"type":"recover"'
+
+
+def lasted_us(report: LogReport, log: Path) -> int:
+    """From the first record of a verified log to the last one that the flight wrote, in us."""
+    assert report.genesis is not None
+    last_us = report.last_us
+    if report.failure is None and report.counts.get("recover"):
+        last_us = _before_recovery_us(log, last_us)
+    return last_us - report.genesis.at_us
+
+
+def _before_recovery_us(log: Path, otherwise_us: int) -> int:
+    before = b""
+    with open_regular(log) as file:
+        for line in lines(file):
+            if _RECOVER in line:
+                break
+            before = line
+    record = read(before)
+    return otherwise_us if isinstance(record, Flaw) else record.at_us

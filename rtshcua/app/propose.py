@@ -6,16 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from rtshcua.adapters.store.readable import Readable
+import rtshcua.ground.agent.specification  # noqa: F401  loaded before a proposal comes, which may not wait for it
+from rtshcua.app.programs import SourceReader, compile_reading, examine
 from rtshcua.diagnostics.diagnostic import has_errors
-from rtshcua.diagnostics.span import Source
 from rtshcua.ground.agent.narrowed_schema import narrowed, permitted_skills
 from rtshcua.ground.agent.rejections import frame_of, rejections
-from rtshcua.ground.agent.specification import load_specification
-from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.pins import Pins
-from rtshcua.ground.pipeline.program import compile_program, examine_program
-from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 
@@ -28,7 +24,7 @@ class NoPolicy(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ProposalAnswer:
     """What the compiler says of a proposal: a mission and its policy, or why not."""
 
     policy: Policy | None
@@ -50,13 +46,11 @@ class Missions:
     Raises `NoPolicy`.
     """
 
-    def __init__(self, sources: Sequence[Path], shipped: str) -> None:
-        self._shipped = shipped
-        self._readable = Readable(shipped, sources)
+    def __init__(self, sources: Sequence[Path]) -> None:
+        self._reader = SourceReader(sources, once=True)
         self._names = [str(path) for path in sources]
-        self._texts: dict[str, bytes] = {}
-        program = load(self._names, self._read, shipped, self._readable.listing, packs=self._readable.pack)
-        checked = examine_program(program, dialect.load())
+        reading = self._reader.program(self._names)
+        program, checked = reading.program, examine(reading)
         if has_errors(checked.diagnostics):
             raise NoPolicy(f"the policy's sources have errors: {checked.diagnostics[0].message}")
         own = [each.name.text for unit in program.units[: len(sources)] for each in unit.policies]
@@ -75,26 +69,14 @@ class Missions:
         """The policy, lowered for its vehicle."""
         return self.lowered.policy
 
-    def check(self, specification: Any, issued_at_us: int) -> Answer:
+    def check(self, specification: Any, issued_at_us: int) -> ProposalAnswer:
         """What the compiler says of a specification; the same as `rtshcua compile --policy` does."""
         proposal = json.dumps(specification, ensure_ascii=False).encode("utf-8", "surrogatepass")
-
-        def readable(name: str) -> bytes:  # of this proposal alone: several are checked at a time
-            return proposal if name == PROPOSAL else self._read(name)
-
-        program, read = load_specification(
-            PROPOSAL, self._names, readable, self._shipped, self._readable.listing, self._readable.pack, self._pins
-        )
-        compiled = compile_program(program, dialect.load(), mission=None, issued_at_us=issued_at_us, pins=self._pins)
+        reading = self._reader.program([PROPOSAL, *self._names], {PROPOSAL: proposal}, self._pins)
+        compiled = compile_reading(reading, mission=None, issued_at_us=issued_at_us, pins=self._pins)
         if compiled.mission is None or compiled.policy is None:
-            found = read.pointed(compiled.diagnostics)
-            source: Source = read.source
-            told, more = rejections(specification, found, source, self._frame)
-            return Answer(None, None, told, None, more)
+            source = reading.program.sources[PROPOSAL]
+            told, more = rejections(specification, compiled.diagnostics, source, self._frame)
+            return ProposalAnswer(None, None, told, None, more)
         bounds = None if compiled.bounds is None else compiled.bounds._asdict()
-        return Answer(compiled.policy, compiled.mission, [], bounds)
-
-    def _read(self, name: str) -> bytes:
-        if name not in self._texts:
-            self._texts[name] = self._readable.read(name)
-        return self._texts[name]
+        return ProposalAnswer(compiled.policy, compiled.mission, [], bounds)

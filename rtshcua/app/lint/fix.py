@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from rtshcua.app.lint.findings import LintFindings
+from rtshcua.app.lint.session import LintSession
 from rtshcua.diagnostics.codes import Severity
-from rtshcua.front.cli.linting.gathered import Gathered
-from rtshcua.front.cli.linting.session import Session
 from rtshcua.ground.lint.fixes import fixed
 
 #: rounds after which it is given up: fixes that undo each other would go on for ever
@@ -14,20 +14,25 @@ _MOST = 50
 _BOM = b"\xef\xbb\xbf"
 
 
-class Fixed(NamedTuple):
+class FixedFiles(NamedTuple):
     """The new bytes of files by name, those before, the findings then, and the files whose fixes would have brought an
     error.
     """
 
     files: dict[str, bytes]
     before: dict[str, bytes]
-    told: Gathered
+    told: LintFindings
     refused: tuple[str, ...]
 
 
 def fix(
-    session: Session, told: Gathered, examine: Callable[[], Gathered], files: Sequence[str], *, suggested: bool
-) -> Fixed:
+    session: LintSession,
+    told: LintFindings,
+    examine: Callable[[], LintFindings],
+    files: Sequence[str],
+    *,
+    suggested: bool,
+) -> FixedFiles:
     """Fix the `files` that were asked for, in memory: `session` then holds the new texts."""
     before = {name: session.read(name) for name in files if name in told.sources}
     writable = [name for name in before if _is_text(before[name])]
@@ -38,12 +43,16 @@ def fix(
             break
         told = _round(session, told, examine, texts, refused)
     now = {name: session.read(name) for name in writable}
-    return Fixed({name: data for name, data in now.items() if data != before[name]}, before, told, tuple(refused))
+    return FixedFiles({name: data for name, data in now.items() if data != before[name]}, before, told, tuple(refused))
 
 
 def _round(
-    session: Session, told: Gathered, examine: Callable[[], Gathered], texts: dict[str, str], refused: dict[str, None]
-) -> Gathered:
+    session: LintSession,
+    told: LintFindings,
+    examine: Callable[[], LintFindings],
+    texts: dict[str, str],
+    refused: dict[str, None],
+) -> LintFindings:
     """Put new texts in place, all at once, or else one after the other; those that bring an error are refused."""
     after = _tried(session, told, examine, texts)
     if after is not None:
@@ -57,7 +66,9 @@ def _round(
     return told
 
 
-def _tried(session: Session, told: Gathered, examine: Callable[[], Gathered], texts: dict[str, str]) -> Gathered | None:
+def _tried(
+    session: LintSession, told: LintFindings, examine: Callable[[], LintFindings], texts: dict[str, str]
+) -> LintFindings | None:
     """The findings with these texts; None where there are new errors among them, and all is as before."""
     kept = {name: session.read(name) for name in texts}
     for name, text in texts.items():
@@ -71,7 +82,7 @@ def _tried(session: Session, told: Gathered, examine: Callable[[], Gathered], te
     return None
 
 
-def _errors(told: Gathered) -> Counter[tuple[str, str]]:
+def _errors(told: LintFindings) -> Counter[tuple[str, str]]:
     return Counter((each.code.id, each.message) for each in told.found if each.severity is Severity.ERROR)
 
 

@@ -1,0 +1,91 @@
+"""The service `compile`: a mission checked, with what it may claim, and signed into a bundle."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore
+from rtshcua.app.programs import compile_sources, meant, no_source
+from rtshcua.app.signing_keys import check_trusted, strangers
+from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.span import Source
+from rtshcua.ground.pipeline.pins import Pins, undeclared
+from rtshcua.ground.pipeline.program import Compiled
+from rtshcua.ground.pipeline.sign import sign
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.wire.keys import SigningKey
+
+
+class CompileRequest(NamedTuple):
+    """A source and what further sources bring, which mission of it, with which parameters, what it may claim, and where
+    the bundle is to go.
+    """
+
+    source: Path
+    further: Sequence[Path]
+    target: Path
+    pins: Pins
+    issued_at_us: int
+    mission: str | None = None
+    values: Sequence[str] = ()
+
+
+class Compilation(NamedTuple):
+    """What came of compiling, its findings as whoever wrote the sources should read them, and the sources."""
+
+    compiled: Compiled
+    diagnostics: tuple[Diagnostic, ...]
+    sources: Mapping[str, Source]
+
+
+class SignedBundle(NamedTuple):
+    """A bundle, who signed its policy and its mission, and which of these keys the key store's root does not name."""
+
+    data: bytes
+    signers: tuple[SigningKey, SigningKey]
+    warnings: list[str]
+
+
+def claimed_pins(proposer: str | None, role: str | None, policy: str | None) -> Pins | Refusal:
+    """What a mission may claim: its source, its role, and its policy as `NAME` or `NAME@VERSION`."""
+    name, at, version = (policy or "").partition("@")
+    numbered = version.isascii() and version.isdigit()
+    if proposer not in (None, *PROPOSERS):
+        return Refusal("usage", f"`--source {proposer}` is none", f"accepted: {' or '.join(PROPOSERS)}")
+    if (policy is not None and not name) or (at and not numbered):
+        return Refusal("usage", f"`--policy {policy}` is none", "accepted: a name, or as in `rules@7`")
+    return Pins(proposer, role, frozenset({name}) if name else None, int(version) if numbered else None)
+
+
+def compile_mission(request: CompileRequest) -> Compilation | Refusal:
+    """Compile a mission; what cannot be begun with, or claims what nothing declares, is refused."""
+    given = [request.source, *request.further]
+    refused = no_source(request.source) or _no_target(request.target, given)
+    if refused is not None:
+        return refused
+    compiled, sources = compile_sources(
+        given, mission=request.mission, issued_at_us=request.issued_at_us, values=request.values, pins=request.pins
+    )
+    unknown = undeclared(request.pins, compiled.declared, compiled.diagnostics)
+    return unknown or Compilation(compiled, meant(compiled.diagnostics, sources, given), sources)
+
+
+def sign_bundle(
+    policy: Policy, mission: Mission, signers: tuple[SigningKey, SigningKey], store: KeyStore, issued_at_us: int
+) -> SignedBundle:
+    """Sign a bundle with a policy key and a mission key. Raises `Untrusted` for a key that may not sign it."""
+    data = sign(policy, mission, policy_key=signers[0], mission_key=signers[1])
+    check_trusted(store, signers[1], policy, mission)
+    return SignedBundle(data, signers, strangers(store, signers, policy.vehicle.identity, issued_at_us))
+
+
+def _no_target(target: Path, given: Sequence[Path]) -> Refusal | None:
+    """Why no bundle can be written to a file."""
+    if not target.parent.is_dir():
+        return Refusal("no-folder", f"there is no folder `{target.parent}` to write to")
+    if not target.exists() or (target.is_file() and not any(each.exists() and target.samefile(each) for each in given)):
+        return None
+    what = "one of the sources" if target.is_file() else "no regular file"
+    return Refusal("output", f"`{target}` is {what}, and is not replaced by a bundle")

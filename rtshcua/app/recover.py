@@ -1,0 +1,56 @@
+"""The service `recover`: the log of a flight that broke off gets an end, if it was no tampering that cut it."""
+
+from pathlib import Path
+
+from rtshcua.adapters.store.last_log import known_end
+from rtshcua.adapters.store.recovery import LogEnder, Recovered, examine, recover
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.evidence.finding import Finding
+from rtshcua.evidence.recovery import FoundLog, LogState
+
+_CODES = {
+    LogState.CLOSED: ExitCode.OK,
+    LogState.WHOLE: ExitCode.INCOMPLETE,
+    LogState.TORN: ExitCode.INCOMPLETE,
+    LogState.UNBEGUN: ExitCode.EVIDENCE,
+    LogState.TAMPERED: ExitCode.EVIDENCE,
+    LogState.FOREIGN: ExitCode.UNTRUSTED,
+}
+
+
+def recover_log(path: Path, signer: LogEnder | None, state: Path) -> Recovered:
+    """End a log; without a signer only look at it. `state` is where it is kept which logs were closed. Raises `InUse`,
+    OSError.
+    """
+    cut = _cut(path, state)
+    if cut is not None:
+        return cut
+    if signer is not None:
+        return recover(path, signer)
+    found = examine(path, None)
+    return Recovered(found, False, None, found.head.prev)
+
+
+def _cut(path: Path, state: Path) -> Recovered | None:
+    """What is told of a log of which this machine knows that it was closed, and not as it ends now."""
+    end = known_end(state, path)
+    if end is None:
+        return None
+    found = examine(path, None)
+    if found.head.prev == end:
+        return None
+    text = "it was closed once, and what stands at its end now is not that: its end was cut off or written anew"
+    reason = Finding("close/missing", found.records, text, found.head.prev, end, found.kept)
+    return Recovered(found._replace(state=LogState.TAMPERED, reason=reason), False, None, found.head.prev)
+
+
+def recovery_code(found: FoundLog) -> ExitCode:
+    """The exit code for a log that was not ended."""
+    slug = "" if found.reason is None else found.reason.slug
+    if slug == "genesis/format":
+        return ExitCode.UNTRUSTED
+    if slug.startswith("anchor/"):
+        return ExitCode.ANCHOR
+    if found.state is LogState.UNBEGUN and slug.startswith("record/"):
+        return ExitCode.INPUT  # a whole line, and none of ours
+    return _CODES[found.state]

@@ -1,0 +1,105 @@
+"""The service `verify-log`: one log with what lies beside it, held against a pinned root key."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from rtshcua.adapters.store.verification import Progress, VerificationInputs, verify_carefully, verify_quickly
+from rtshcua.app.fly.simulated_flight import with_simulated
+from rtshcua.app.sidecar_files import RawFrames, anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
+from rtshcua.evidence.finding import Claim, Finding
+from rtshcua.evidence.records import AnyRecord, Effect
+from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
+from rtshcua.ground.audit.audit import Audit
+from rtshcua.ground.audit.revoked import RevokedKeys
+from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
+from rtshcua.wire.request import STEP
+
+_MOST = 5
+
+
+class VerifyRequest(NamedTuple):
+    """How a log is verified: by which pinned key, by which trust roots keys may have been revoked since, with which
+    further notes of witnesses, how deep, by how many processes, and whether it must be anchored to its end.
+    """
+
+    key: bytes
+    roots: tuple[bytes, ...] = ()
+    anchors: tuple[Path, ...] = ()
+    audit: bool = False
+    derive: bool = True
+    fast: bool = False
+    jobs: int = 0
+    anchored: bool = False
+
+
+def verify_log(path: Path, request: VerifyRequest, progress: Progress) -> Audit:
+    """Verify a log, and what lies beside it. Raises OSError."""
+    raw = raw_frames(path)
+    unconfirmed = UnconfirmedFallbacks()
+    audit = audited(path, request, progress, unconfirmed.take, raw)
+    report = audit.report
+    if raw is not None:
+        followed = request.audit and request.derive
+        report = raw.unread(report) if request.fast else raw.judged(report, followed=followed)
+    report = with_summary(_required(report) if request.anchored else report, path)
+    report = unconfirmed.told(with_unread(with_simulated(report, path), path))
+    return audit._replace(report=report)
+
+
+def audited(
+    path: Path,
+    request: VerifyRequest,
+    progress: Progress = lambda _: None,
+    each: Callable[[AnyRecord], None] = lambda _: None,
+    raw: RawFrames | None = None,
+) -> Audit:
+    """Verify a log alone; an audit hands each sound record to `each`. Raises OSError."""
+    asked = VerificationInputs(request.key, bundle_beside(path), anchors_beside(path, request.anchors))
+    revoked = RevokedKeys(request.roots)
+
+    def take(record: AnyRecord) -> None:
+        each(record)
+        revoked.take(record)
+
+    if not request.audit:
+        return revoked.judged(verify_quickly(path, asked, fast=request.fast, jobs=request.jobs, progress=progress))
+    frames = raw.frames if raw is not None and request.derive else None
+    found = verify_carefully(path, asked, derive=request.derive, frames=frames, each=take, progress=progress)
+    return revoked.judged(found)
+
+
+def _required(report: LogReport) -> LogReport:
+    """The report of a log that must be anchored to its end."""
+    if report.verdict is not LogVerdict.VERIFIED or report.anchored == report.records:
+        return report
+    text = "witnesses did not see the log to its end, as was asked for"
+    few = "" if report.outside is None else cosigned(report.outside)
+    found, expected = f"{report.anchored} records{few and f', the rest {few}'}", f"{report.records} records"
+    return report._replace(shortfall=Finding("anchor/missing", report.anchored, text, found, expected))
+
+
+class UnconfirmedFallbacks:
+    """Takes the records of a log that is audited, and adds to the report which fallbacks were not confirmed."""
+
+    def __init__(self) -> None:
+        self._records: list[int] = []
+
+    def take(self, record: AnyRecord) -> None:
+        """One sound record."""
+        if isinstance(record, Effect) and record.kind > STEP and record.detail == UNCONFIRMED:
+            self._records.append(record.seq)
+
+    def told(self, report: LogReport) -> LogReport:
+        """The report of a log without failure, with what is not shown."""
+        if not self._records or report.failure is not None:
+            return report
+        many = len(self._records)
+        which = ", ".join(map(str, self._records[:_MOST])) + (f" and {many - _MOST} more" if many > _MOST else "")
+        what = (
+            f"the fallback that ended at record {which}"
+            if many == 1
+            else f"{many} fallbacks, ended at records {which},"
+        )
+        claim = Claim("fallback", f"that {what} brought the vehicle down: {UNCONFIRMED}")
+        return report._replace(unproven=(*report.unproven, claim))

@@ -1,1 +1,0 @@
-"""`rtshcua lint`: what it remembers, what it examines anew, what it ignores, fixes and reports."""

@@ -7,7 +7,7 @@ from urllib.parse import quote, unquote, urlsplit
 
 from rtshcua.adapters.store.readable import Readable
 from rtshcua.adapters.store.reading import walk
-from rtshcua.ground.editor.desk import Desk
+from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.ground.language.paths import shown
 
 SOURCE = ".rts"
@@ -16,9 +16,9 @@ MOST = 2_000
 _DRIVE = re.compile(r"/[A-Za-z]:(?=/|\Z)")
 
 
-def desk(library: str, readable: Readable) -> Desk:
+def desk(library: str, readable: Readable) -> Workspace:
     """An empty desk over what may be read of the disk."""
-    return Desk(readable.read, library, readable.listing, readable.pack)
+    return Workspace(readable.read, library, readable.listing, readable.pack)
 
 
 def sources(folders: Iterable[str]) -> Iterator[str]:

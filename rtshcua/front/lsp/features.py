@@ -14,19 +14,18 @@ from rtshcua.front.lsp.disk import name_of
 from rtshcua.front.lsp.searching import Search
 from rtshcua.front.lsp.session import Session
 from rtshcua.front.lsp.texts import ITEMS, SYMBOLS, Spot, Texts, diagnostic, place, range_of
-from rtshcua.ground.editor import colours as coloured
-from rtshcua.ground.editor import outline as outlined
+from rtshcua.ground.editor import document_structure as coloured
+from rtshcua.ground.editor import document_structure as outlined
 from rtshcua.ground.editor.actions import actions, all_safe
-from rtshcua.ground.editor.completion import complete
-from rtshcua.ground.editor.desk import View
+from rtshcua.ground.editor.code_completion import complete, signature
 from rtshcua.ground.editor.hover import hover
 from rtshcua.ground.editor.navigation import definitions, imported_at, importers, references, targets
-from rtshcua.ground.editor.positions import Lines, difference
+from rtshcua.ground.editor.positions import LineIndex, difference
 from rtshcua.ground.editor.rename import renamable, rename
-from rtshcua.ground.editor.signatures import signature
+from rtshcua.ground.editor.workspace import ProgramView
 from rtshcua.ground.format.format import formatted
 
-LEGEND = lsp.SemanticTokensLegend(list(coloured.KINDS), ["declaration"])
+LEGEND = lsp.SemanticTokensLegend(list(coloured.TOKEN_KINDS), ["declaration"])
 _MOST = 500
 """Symbols of a workspace that are listed."""
 
@@ -106,7 +105,7 @@ def outline(session: Session, params: lsp.DocumentSymbolParams) -> list[lsp.Docu
         return []
     cut, lines = opened
 
-    def told(symbol: outlined.Symbol) -> lsp.DocumentSymbol:
+    def told(symbol: outlined.OutlineSymbol) -> lsp.DocumentSymbol:
         return lsp.DocumentSymbol(
             name=symbol.name,
             kind=SYMBOLS.get(symbol.kind, lsp.SymbolKind.Object),
@@ -142,7 +141,7 @@ def coloured_all(session: Session, params: lsp.SemanticTokensParams) -> lsp.Sema
         return lsp.SemanticTokens([])
     data: list[int] = []
     line = column = 0
-    for each in coloured.colours(session.desk.view(name), name):
+    for each in coloured.semantic_tokens(session.desk.view(name), name):
         start, end = lines.place(each.start), lines.place(each.end)
         data += [start.line - line, start.column - (column if start.line == line else 0), end.column - start.column,
                  each.kind, int(each.declares)]  # fmt: skip
@@ -166,7 +165,7 @@ def renamed(texts: Texts, search: Search, params: lsp.RenameParams) -> lsp.Works
     """The changes that give a thing another name. Raises NotDone with the reason why not."""
     view, name, _, offset = _renaming(texts, params)
 
-    def steps(each: Sequence[View]) -> Iterator[View]:
+    def steps(each: Sequence[ProgramView]) -> Iterator[ProgramView]:
         return search.steps(each, told=False)
 
     files = search.steps(_names(texts))
@@ -256,7 +255,7 @@ def _workspace_edit(texts: Texts, changes: Mapping[str, list[tuple[Span, str]]])
     return lsp.WorkspaceEdit(document_changes=edits) if texts.versioned else lsp.WorkspaceEdit(changes=plain)
 
 
-def _text_edit(lines: Lines, span: Span, text: str) -> lsp.TextEdit:
+def _text_edit(lines: LineIndex, span: Span, text: str) -> lsp.TextEdit:
     return lsp.TextEdit(range_of(lines, span.start, span.end), text)
 
 

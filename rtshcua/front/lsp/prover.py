@@ -25,7 +25,7 @@ from rtshcua.app.lint.examine import find
 from rtshcua.app.lint.scope import ignored_in
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.front.lsp.disk import desk
-from rtshcua.ground.editor.desk import Desk, View
+from rtshcua.ground.editor.workspace import ProgramView, Workspace
 from rtshcua.ground.lint.filter import filter_findings
 from rtshcua.ground.project.settings import IgnoredCode
 
@@ -65,7 +65,7 @@ def main(library: str) -> None:
         outgoing.flush()
 
 
-def examined(known: Desk, job: Job) -> tuple[Diagnostic, ...]:
+def examined(known: Workspace, job: Job) -> tuple[Diagnostic, ...]:
     """Everything that `rtshcua lint` finds in a program, for its first file the habits too."""
     asked, texts, _ = job
     for name in [each for each in known.open if each not in texts]:
@@ -80,7 +80,7 @@ def examined(known: Desk, job: Job) -> tuple[Diagnostic, ...]:
     return filter_findings(found, view.program.sources, {asked}, _configured(view), untold).found
 
 
-def _configured(view: View) -> dict[str, tuple[IgnoredCode, ...]]:
+def _configured(view: ProgramView) -> dict[str, tuple[IgnoredCode, ...]]:
     """What the project's configuration ignores in the first file."""
     project = Projects().of(Path(view.name))
     return {view.name: ignored_in(project, Path(view.name))} if isinstance(project, Project) else {}

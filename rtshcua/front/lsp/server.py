@@ -20,7 +20,7 @@ from rtshcua.front.lsp.disk import path_of
 from rtshcua.front.lsp.searching import Shown
 from rtshcua.front.lsp.session import Session
 from rtshcua.front.lsp.texts import place
-from rtshcua.ground.editor.positions import Change, Encoding
+from rtshcua.ground.editor.positions import Encoding, TextChange
 
 GRACE = 5.0
 """Seconds from the end of the editor's stream until the process ends, whatever still runs in it."""
@@ -31,10 +31,10 @@ LONGEST = 64 << 10
 _WATCHED = "**/*.{rts,geojson,json,toml}"
 
 
-def _change(change: lsp.TextDocumentContentChangeEvent) -> Change:
+def _change(change: lsp.TextDocumentContentChangeEvent) -> TextChange:
     if isinstance(change, lsp.TextDocumentContentChangePartial):
-        return Change(place(change.range.start), place(change.range.end), change.text)
-    return Change(None, None, change.text)
+        return TextChange(place(change.range.start), place(change.range.end), change.text)
+    return TextChange(None, None, change.text)
 
 
 #: what the editor tells, and what the session does then

@@ -19,9 +19,8 @@ from rtshcua.front.lsp.disk import desk, name_of, path_of
 from rtshcua.front.lsp.prover import Found, Proving
 from rtshcua.front.lsp.searching import Searching
 from rtshcua.front.lsp.texts import Opened, Texts, diagnostic
-from rtshcua.ground.editor.moved import moved_finding
-from rtshcua.ground.editor.pieces import Cut
-from rtshcua.ground.editor.positions import Change, Lines, edited
+from rtshcua.ground.editor.incremental_parse import ParsedText, moved_finding
+from rtshcua.ground.editor.positions import LineIndex, TextChange, edited
 from rtshcua.ground.pipeline.program import check_declared
 from rtshcua.mavlink import dialect
 
@@ -73,13 +72,13 @@ class Session(Texts):
         name = name_of(uri)
         if not self.folders and path_of(uri) is not None:
             self._readable.ask(name)
-        self.opened[name] = Opened(uri, version, Lines(text, self.encoding))
+        self.opened[name] = Opened(uri, version, LineIndex(text, self.encoding))
         self.desk.put(name, text)
         self.desk.forget()
         gc.freeze()  # what is open stays: the collector need not look at it with every keystroke
         self._outdated(None, first=name)
 
-    def change(self, uri: str, version: int, changes: list[Change]) -> None:
+    def change(self, uri: str, version: int, changes: list[TextChange]) -> None:
         """A text was changed."""
         name = name_of(uri)
         opened = self.opened.get(name)
@@ -110,7 +109,7 @@ class Session(Texts):
 
     # -------------------------------------------------------------------------------------------- what is found
 
-    def _outdated(self, name: str | None, moves: Cut | None = None, first: str | None = None) -> None:
+    def _outdated(self, name: str | None, moves: ParsedText | None = None, first: str | None = None) -> None:
         """What depends on a file (None: everything) is checked again; where `moves` is given, it says the same."""
         for own, opened in self.opened.items():
             if name is None or own == name or name in opened.files:
@@ -197,7 +196,7 @@ class Session(Texts):
         self._last[name] = found
 
 
-def _only_moves(old: str, cut: Cut) -> bool:
+def _only_moves(old: str, cut: ParsedText) -> bool:
     """Whether an edit changed nothing but comments, and none that ignores findings."""
     if cut.since is None:
         return False
@@ -207,7 +206,7 @@ def _only_moves(old: str, cut: Cut) -> bool:
     return not any(_IGNORE in each for each in around)
 
 
-def _moved(found: tuple[Diagnostic, ...], cut: Cut) -> tuple[Diagnostic, ...]:
+def _moved(found: tuple[Diagnostic, ...], cut: ParsedText) -> tuple[Diagnostic, ...]:
     assert cut.since is not None
     by = cut.since.length - (cut.since.end - cut.since.start)
     return tuple(moved_finding(each, by, cut.since.end, cut.source.file) for each in found)

@@ -16,9 +16,9 @@ from rtshcua.diagnostics.codes import Code, Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Span
 from rtshcua.front.lsp.disk import name_of, sources, uri_of
-from rtshcua.ground.editor.desk import Desk, View
-from rtshcua.ground.editor.pieces import Cut
-from rtshcua.ground.editor.positions import Encoding, Lines, Place
+from rtshcua.ground.editor.incremental_parse import ParsedText
+from rtshcua.ground.editor.positions import Encoding, LineIndex, TextPosition
+from rtshcua.ground.editor.workspace import ProgramView, Workspace
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.project.settings import FormatSettings
 from rtshcua.mavlink.dialect import Dialect
@@ -57,7 +57,7 @@ class Opened:
 
     uri: str
     version: int
-    lines: Lines
+    lines: LineIndex
     stamp: int = 0  # goes up with every change of the program
     quick: tuple[Diagnostic, ...] = ()
     whole: tuple[Diagnostic, ...] | None = None  # None: not known for the present text
@@ -76,9 +76,9 @@ class Opened:
 class Spot(NamedTuple):
     """Where an editor points: a program, the name and the lines of its first file, and the character in these."""
 
-    view: View
+    view: ProgramView
     name: str
-    lines: Lines
+    lines: LineIndex
     offset: int
 
 
@@ -86,7 +86,7 @@ class Spot(NamedTuple):
 class Texts:
     """What is open, over what is on the disk, and how the editor counts and calls it."""
 
-    desk: Desk
+    desk: Workspace
     library: str
     dialect: Dialect
     encoding: Encoding = Encoding.UTF_16
@@ -106,7 +106,7 @@ class Texts:
         lines = self.lines(name)
         return None if lines is None else Spot(self.desk.view(name), name, lines, lines.offset(place(at)))
 
-    def cut(self, uri: str) -> tuple[Cut, Lines] | None:
+    def cut(self, uri: str) -> tuple[ParsedText, LineIndex] | None:
         """A text that is open, and its lines."""
         cut = self.desk.open.get(name_of(uri))
         lines = None if cut is None else self.lines(cut.source.file)
@@ -126,13 +126,13 @@ class Texts:
         settings = project.settings.format
         return None if project.excludes(Path(name), settings.exclude) else settings
 
-    def lines(self, name: str) -> Lines | None:
+    def lines(self, name: str) -> LineIndex | None:
         """The lines of a file, open or not."""
         opened = self.opened.get(name)
         if opened is not None:
             return opened.lines
         text = self.desk.text(name)
-        return None if text is None else Lines(text, self.encoding)
+        return None if text is None else LineIndex(text, self.encoding)
 
     def uri(self, name: str) -> str:
         """What the editor calls a file."""
@@ -149,23 +149,26 @@ class Texts:
         return uri_of(f"{self.library}/docs/codes/{code.id}.md")
 
 
-def position(place: Place) -> lsp.Position:
+def position(place: TextPosition) -> lsp.Position:
     """A place."""
     return lsp.Position(place.line, place.column)
 
 
-def place(at: lsp.Position) -> Place:
+def place(at: lsp.Position) -> TextPosition:
     """A place of the editor's."""
-    return Place(at.line, at.character)
+    return TextPosition(at.line, at.character)
 
 
-def range_of(lines: Lines, start: int, end: int) -> lsp.Range:
+def range_of(lines: LineIndex, start: int, end: int) -> lsp.Range:
     """A range of characters."""
     return lsp.Range(position(lines.place(start)), position(lines.place(end)))
 
 
 def diagnostic(
-    found: Diagnostic, lines: Lines, locate: Callable[[Span], lsp.Location | None], page: Callable[[Code], str | None]
+    found: Diagnostic,
+    lines: LineIndex,
+    locate: Callable[[Span], lsp.Location | None],
+    page: Callable[[Code], str | None],
 ) -> lsp.Diagnostic:
     """A finding in the file of `lines`; one without a place is at its beginning. `page` is where a code is told."""
     span = found.span

@@ -1,5 +1,5 @@
 """What an editor asks of sources while they are written: pure answers over texts, positions as character offsets.
 
-`positions` is the one place that knows how editors count; `pieces` parses again what an edit changed; `desk` holds what
-is open. The shell that speaks the protocol is `rtshcua.front.lsp`.
+`workspace` holds the open texts, `incremental_parse` parses again only what an edit changed, `positions` is the one
+place that knows how editors count. `rtshcua.front.lsp` speaks the protocol.
 """

@@ -1,4 +1,4 @@
-"""What may be done about a finding: the fixes that came with it, and to ignore a warning with a reason."""
+"""Code actions for findings: their fixes, and comments that ignore a warning with a reason."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from rtshcua.diagnostics.span import Span
 ALL = "correct everything that is safe to correct"
 
 
-class Action(NamedTuple):
+class CodeAction(NamedTuple):
     """A change with a title: the texts that replace spans, all of one file. `safe` keeps the author's meaning."""
 
     title: str
@@ -19,21 +19,21 @@ class Action(NamedTuple):
     safe: bool
 
 
-def actions(found: Sequence[Diagnostic], file: str, start: int, end: int, text: str) -> Iterator[Action]:
+def actions(found: Sequence[Diagnostic], file: str, start: int, end: int, text: str) -> Iterator[CodeAction]:
     """The actions for a range of a file."""
     for each in found:
         if each.span is None or each.span.file != file or each.span.start > end or each.span.end < start:
             continue
         for fix in each.fixes:
             if fix.span.file == file:
-                yield Action(fix.title, (fix,), each, fix.applicability is Applicability.SAFE)
+                yield CodeAction(fix.title, (fix,), each, fix.applicability is Applicability.SAFE)
         if each.severity is not Severity.ERROR and each.code.id.startswith("E13"):
-            yield Action(
+            yield CodeAction(
                 f"ignore `{each.code.slug}` here, with a reason", (_ignore(each, each.span, text),), each, False
             )
     together = all_safe(found, file)
     if len(together) > 1:
-        yield Action(ALL, together, None, True)
+        yield CodeAction(ALL, together, None, True)
 
 
 def all_safe(found: Iterable[Diagnostic], file: str) -> tuple[Fix, ...]:

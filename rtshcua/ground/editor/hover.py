@@ -1,26 +1,104 @@
-"""What a person sees who points at something: what it is, in Markdown."""
+"""What hovering over a place shows, in Markdown: declarations, quantities in other units, and sizes of zones."""
 
 from collections.abc import Iterator
+from fractions import Fraction
 from inspect import getdoc
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.faults import NAMED, example
+from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import WORDS, Declaration
-from rtshcua.ground.editor.desk import View
-from rtshcua.ground.editor.meanings import KEYWORDS, REASONS, TYPES
-from rtshcua.ground.editor.occurrences import at
-from rtshcua.ground.editor.quantities import told_number
-from rtshcua.ground.editor.sizes import size_of
-from rtshcua.ground.editor.syntax import note_before, path_to, token_at
-from rtshcua.ground.editor.targets import Occurrence, Sort, Target
+from rtshcua.ground.editor.keyword_help import KEYWORDS, REASONS, TYPES
+from rtshcua.ground.editor.occurrences import NameKind, Occurrence, Target, at
+from rtshcua.ground.editor.syntax import nodes_in, note_before, path_to, token_at
+from rtshcua.ground.editor.workspace import ProgramView
+from rtshcua.ground.geometry.polygons import doubled_area
+from rtshcua.ground.geometry.projection import projection_at
+from rtshcua.ground.geometry.shapes import Disc, Shape, bounds
+from rtshcua.ground.language.exact import CANONICAL
+from rtshcua.ground.lower.ground_plan import GroundPlans
 from rtshcua.mavlink.dialect import DATUM, Dialect
 from rtshcua.model.faults import parameters
-from rtshcua.model.ir.expression import Quantity
+from rtshcua.model.ir.expression import Coordinates, Quantity, Reference
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import Parameter, SkillDecl
-from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.quantity import UNITS, Dimension, Unit, display
+
+_DIGITS = 6  # behind the point, where a unit gives no whole number
+
+
+def quantity_in_units(node: Quantity) -> str:
+    """`20 m = 20000 mm`, and further units."""
+    dimension = Dimension.LENGTH if node.dimension is Dimension.ALTITUDE else node.dimension
+    datum = "" if node.datum is None else f" above {node.datum.value}"
+    if dimension is Dimension.COUNT:
+        return f"a plain number: {node.value}"
+    others = [f"{converted(node.value, unit)} {name}" for name, unit in UNITS.items() if unit.dimension is dimension]
+    kind = "altitude" if node.datum is not None else dimension.value
+    return f"{kind}{datum}, kept as {node.value} {CANONICAL[dimension]}\n\n" + " = ".join(others)
+
+
+def converted(value: int, unit: Unit) -> str:
+    """A canonical number in a unit, rounded where it has no end."""
+    scaled, rest = divmod(abs(value) * unit.denominator * 10**_DIGITS, unit.numerator)
+    about = "≈ " if rest else ""
+    whole, fraction = divmod(scaled, 10**_DIGITS)
+    digits = str(fraction).zfill(_DIGITS).rstrip("0")
+    return f"{about}{'-' if value < 0 else ''}{whole}{'.' + digits if digits else ''}"
+
+
+_PI = Fraction(355, 113)  # to 3e-7; what is shown has three digits
+_MM2 = 1_000_000  # in a square metre
+
+
+def size_of(view: ProgramView, zone: ZoneDecl) -> str | None:
+    """`120 m × 80 m, 9,400 m²`; None where the zone has no outline that could be measured."""
+    if _is_circular(view, zone):
+        return None
+    home = next((vehicle.home for vehicle in view.symbols.vehicles.values()), None) or next(
+        (each for each in nodes_in(zone) if isinstance(each, Coordinates)), None
+    )
+    projection = projection_at(*(home.latitude, home.longitude) if home is not None else (0, 0))
+    data = DataFiles(view.program.data, view.program.data_names)
+    plans = GroundPlans(projection, view.symbols.zones, data, Report(view.program.sources))
+    try:
+        shape = plans.of(zone)
+    except (KeyError, ValueError, AssertionError):  # a part of it is not declared, or makes no outline
+        return None
+    return None if shape is None else _size_in_words(shape)
+
+
+def _size_in_words(shape: Shape) -> str:
+    west, south, east, north = bounds(shape)
+    return f"{_metres(east - west)} × {_metres(north - south)}, {_area(shape):,} m²"
+
+
+def _metres(length: int) -> str:
+    return f"{(length + 500) // 1000:,} m"
+
+
+def _area(shape: Shape) -> int:
+    if isinstance(shape, Disc):
+        return int(_PI * shape.radius * shape.radius / _MM2)
+    doubled = sum(doubled_area(ring) for ring in shape.rings)
+    return abs(doubled) // (2 * _MM2)
+
+
+def _is_circular(view: ProgramView, zone: ZoneDecl) -> bool:
+    """Whether a zone is made of itself, or of what nothing declares."""
+    waiting = [(zone, frozenset({zone.name.text}))]
+    while waiting:
+        each, above = waiting.pop()
+        for name in [part.name for part in nodes_in(each.shape) if isinstance(part, Reference)]:
+            other = view.symbols.zones.get(name)
+            if other is None or name in above:
+                return True
+            waiting.append((other, above | {name}))
+    return False
+
 
 _LONG = 40  # lines of a declaration that are shown
 
@@ -32,20 +110,20 @@ class Hover(NamedTuple):
     span: Span
 
 
-def hover(view: View, file: str, offset: int, dialect: Dialect) -> Hover | None:
+def hover(view: ProgramView, file: str, offset: int, dialect: Dialect) -> Hover | None:
     """What stands at a place; None where nothing does that could be explained."""
     found = at(view.occurrences(file), offset)
-    said = list(dict.fromkeys(text for each in found if (text := told(view, each.target, dialect))))
+    said = list(dict.fromkeys(text for each in found if (text := describe(view, each.target, dialect))))
     if said:
         return Hover("\n\n---\n\n".join(said[:3]), found[0].span)
     unit = view.units.get(file)
     path = () if unit is None else path_to(unit, offset)
     if path and isinstance(path[-1], Quantity):
-        return Hover(told_number(path[-1]), path[-1].span)
-    return _word(view, file, offset, found)
+        return Hover(quantity_in_units(path[-1]), path[-1].span)
+    return _hover_word(view, file, offset, found)
 
 
-def _word(view: View, file: str, offset: int, found: tuple[Occurrence, ...]) -> Hover | None:
+def _hover_word(view: ProgramView, file: str, offset: int, found: tuple[Occurrence, ...]) -> Hover | None:
     token = token_at(view.text(file), offset)
     if token is None or token.kind not in ("word", "mark"):
         return None
@@ -58,45 +136,45 @@ def _word(view: View, file: str, offset: int, found: tuple[Occurrence, ...]) -> 
     return None if meaning is None else Hover(f"`{word}`: {meaning}", span)
 
 
-def told(view: View, target: Target, dialect: Dialect) -> str | None:
+def describe(view: ProgramView, target: Target, dialect: Dialect) -> str | None:
     """A target in words."""
     match target.sort:
-        case Sort.DECLARED:
+        case NameKind.DECLARED:
             declared = view.symbols.declared.get(target.name)
             return None if declared is None else _declaration(view, declared, dialect)
-        case Sort.PARAMETER:
+        case NameKind.PARAMETER:
             parameter = parameter_of(view, target.owner, target.name)
             return None if parameter is None else _parameter(view, parameter, target.owner)
-        case Sort.MEMBER:
+        case NameKind.MEMBER:
             enum = view.symbols.enums.get(target.owner)
-            value = next((each.value for each in enum.members if each.name.text == target.name), None) if enum else None
-            return f"`{target.name}` = {value}, a value of `{target.owner}`"
-        case Sort.CHOICE:
+            values = {} if enum is None else {each.name.text: each.value for each in enum.members}
+            return f"`{target.name}` = {values.get(target.name)}, a value of `{target.owner}`"
+        case NameKind.CHOICE:
             skill, _, parameter_name = target.owner.partition(".")
             return f"`{target.name}`: a choice for `{parameter_name}` of `{skill}`"
-        case Sort.PHASE:
+        case NameKind.PHASE:
             return f"phase `{target.name}`: a stretch of a mission"
-        case Sort.ROLE:
+        case NameKind.ROLE:
             return f"role `{target.name}`. {KEYWORDS['role']}"
-        case Sort.REASON:
+        case NameKind.REASON:
             meaning = REASONS.get(target.name)
-            return f"`{target.name}`" if meaning is None else f"`{target.name}`: {meaning}"
-        case Sort.TYPE:
+            return f"`{target.name}`" + ("" if meaning is None else f": {meaning}")
+        case NameKind.TYPE:
             return f"`{target.name}`: {TYPES[target.name]}" if target.name in TYPES else None
-        case Sort.FIELD | Sort.MESSAGE | Sort.DIALECT_ENUM:
+        case NameKind.FIELD | NameKind.MESSAGE | NameKind.DIALECT_ENUM:
             return _dialect(target, dialect)
-        case Sort.SOURCE | Sort.CLASS | Sort.RECORD | Sort.WORD:
+        case NameKind.SOURCE | NameKind.CLASS | NameKind.RECORD | NameKind.WORD:
             meaning = KEYWORDS.get(target.name)
             return f"{target.sort.value} `{target.name}`" + ("" if meaning is None else f": {meaning}")
-        case Sort.FAULT:
+        case NameKind.FAULT:
             return _fault(target.name)
-        case Sort.IMPORT:
+        case NameKind.IMPORT:
             return _import(view, target)
         case _:
             return f"{target.sort.value} `{target.name}`"
 
 
-def parameter_of(view: View, owner: str, name: str) -> Parameter | None:
+def parameter_of(view: ProgramView, owner: str, name: str) -> Parameter | None:
     """A parameter by its owner's name and its own."""
     symbols = view.symbols
     declared = symbols.skills.get(owner) or symbols.templates.get(owner) or symbols.missions.get(owner)
@@ -106,7 +184,7 @@ def parameter_of(view: View, owner: str, name: str) -> Parameter | None:
     return next((each for each in parameters if each.name.text == name), None)
 
 
-def _declaration(view: View, declared: Declaration, dialect: Dialect | None) -> str:
+def _declaration(view: ProgramView, declared: Declaration, dialect: Dialect | None) -> str:
     source = view.slice(declared.span)
     lines = source.split("\n")
     if len(lines) > _LONG:
@@ -118,7 +196,7 @@ def _declaration(view: View, declared: Declaration, dialect: Dialect | None) -> 
     return "\n\n".join(parts)
 
 
-def _facts(view: View, declared: Declaration, dialect: Dialect | None) -> Iterator[str]:
+def _facts(view: ProgramView, declared: Declaration, dialect: Dialect | None) -> Iterator[str]:
     match declared:
         case SignalDecl():
             yield "; ".join(_signal(declared, dialect))
@@ -147,7 +225,7 @@ def _signal(signal: SignalDecl, dialect: Dialect | None) -> Iterator[str]:
         yield "unknown at " + ", ".join(f"`{each.text}`" for each in signal.unknown_at)
 
 
-def _skill(view: View, skill: SkillDecl) -> Iterator[str]:
+def _skill(view: ProgramView, skill: SkillDecl) -> Iterator[str]:
     def shown(what: str, quantity: Quantity | None) -> Iterator[str]:
         if quantity is not None:
             yield f"{what} {display(quantity.value, quantity.dimension)}"
@@ -166,7 +244,7 @@ def _skill(view: View, skill: SkillDecl) -> Iterator[str]:
         yield "fallback " + ", ".join(f"`{view.slice(link.span)}`" for link in skill.fallback)
 
 
-def _parameter(view: View, parameter: Parameter, owner: str) -> str:
+def _parameter(view: ProgramView, parameter: Parameter, owner: str) -> str:
     source = " ".join(view.slice(parameter.span).split())
     parts = [f"```rts\n{source}\n```", f"parameter of `{owner}`"]
     if parameter.choices:
@@ -181,11 +259,11 @@ def _parameter(view: View, parameter: Parameter, owner: str) -> str:
 
 
 def _dialect(target: Target, dialect: Dialect) -> str:
-    if target.sort is Sort.DIALECT_ENUM:
+    if target.sort is NameKind.DIALECT_ENUM:
         values = dialect.enums.get(target.name)
         listed = "" if values is None else ": " + ", ".join(f"`{name}` = {value}" for name, value in values.items())
         return f"MAVLink enumeration `{target.name}`{listed}"
-    if target.sort is Sort.MESSAGE:
+    if target.sort is NameKind.MESSAGE:
         message = dialect.messages.get(target.name)
         listed = "" if message is None else ": " + ", ".join(f"`{name}`" for name in message.fields)
         return f"MAVLink message `{target.name}`{listed}"
@@ -206,7 +284,7 @@ def _fault(name: str) -> str | None:
     return f"fault `{name}`: {getdoc(kind)}\n\ntakes {', '.join(takes) or 'nothing'}"
 
 
-def _import(view: View, target: Target) -> str | None:
+def _import(view: ProgramView, target: Target) -> str | None:
     unit = view.units.get(target.owner)
     each = next((one for one in unit.imports if one.path == target.name), None) if unit is not None else None
     file = None if each is None else view.imports.target(target.owner, each)

@@ -1,15 +1,14 @@
-"""From a place to what it means: definitions, all places that mean the same, also in other programs."""
+"""Navigation: the meaning of a place, its definitions, and all places with the same meaning, also in other programs."""
 
 from collections.abc import Iterable
 
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.editor.desk import View
-from rtshcua.ground.editor.occurrences import at, spans
+from rtshcua.ground.editor.occurrences import NameKind, Target, at, spans
 from rtshcua.ground.editor.syntax import token_at
-from rtshcua.ground.editor.targets import Sort, Target
+from rtshcua.ground.editor.workspace import ProgramView
 
 
-def targets(view: View, file: str, offset: int) -> tuple[Target, ...]:
+def targets(view: ProgramView, file: str, offset: int) -> tuple[Target, ...]:
     """What a place means. Within what could not be parsed, a word that is declared somewhere."""
     found = tuple(dict.fromkeys(each.target for each in at(view.occurrences(file), offset)))
     if found:
@@ -19,15 +18,15 @@ def targets(view: View, file: str, offset: int) -> tuple[Target, ...]:
         return ()
     for name in (token.text, token.text.partition(".")[0]):
         if name in view.symbols.declared:
-            return (Target(Sort.DECLARED, name),)
+            return (Target(NameKind.DECLARED, name),)
     return ()
 
 
-def definitions(view: View, file: str, offset: int) -> tuple[Span, ...]:
+def definitions(view: ProgramView, file: str, offset: int) -> tuple[Span, ...]:
     """Where the name at a place is given; of an import, the beginning of the file."""
     found: list[Span] = []
     for target in targets(view, file, offset):
-        if target.sort is not Sort.IMPORT:
+        if target.sort is not NameKind.IMPORT:
             found += declared_at(view, target)
     imported = imported_at(view, file, offset)
     if imported is not None:
@@ -35,7 +34,7 @@ def definitions(view: View, file: str, offset: int) -> tuple[Span, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def imported_at(view: View, file: str, offset: int) -> str | None:
+def imported_at(view: ProgramView, file: str, offset: int) -> str | None:
     """The file that the import at a place means; None where there is none."""
     unit = view.units.get(file)
     imports = () if unit is None else unit.imports
@@ -43,16 +42,16 @@ def imported_at(view: View, file: str, offset: int) -> str | None:
                 None)  # fmt: skip
 
 
-def importers(views: Iterable[View], file: str) -> tuple[Span, ...]:
+def importers(views: Iterable[ProgramView], file: str) -> tuple[Span, ...]:
     """The imports of a file in these programs."""
     found = (each.span for view in views for unit in view.units.values() for each in unit.imports
              if view.imports.target(unit.file, each) == file)  # fmt: skip
     return tuple(sorted(set(found)))
 
 
-def declared_at(view: View, target: Target) -> list[Span]:
+def declared_at(view: ProgramView, target: Target) -> list[Span]:
     """The places that give a name."""
-    if target.sort is Sort.DECLARED:
+    if target.sort is NameKind.DECLARED:
         declared = view.symbols.declared.get(target.name)
         return [] if declared is None else [declared.name.span]
     owner = view.symbols.declared.get(target.owner.partition(".")[0])
@@ -62,7 +61,7 @@ def declared_at(view: View, target: Target) -> list[Span]:
     ]  # fmt: skip
 
 
-def references(views: Iterable[View], view: View, target: Target) -> dict[Span, bool]:
+def references(views: Iterable[ProgramView], view: ProgramView, target: Target) -> dict[Span, bool]:
     """All places that mean `target`, as `view` understands it, in these programs; whether each gives the name.
 
     One name may be declared in several files that no program has together: only programs in which it is declared at

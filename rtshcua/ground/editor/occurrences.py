@@ -1,54 +1,291 @@
 """Every place of a file that means something by name, with what it means in a program."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from enum import Enum
+from typing import Any, NamedTuple
+
+from msgspec.structs import astuple
 
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.checks.scenarios import OBSTACLE
+from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE
 from rtshcua.ground.checker.symbols import Declaration, Symbols
 from rtshcua.ground.checker.types import NAMED
-from rtshcua.ground.editor.conditions import Conditions, Scope
-from rtshcua.ground.editor.targets import Occurrence, Sort, Target
-from rtshcua.model.ir.missions import Item, MissionDecl, Step
+from rtshcua.model.ir.expression import Comparison, OneOf, Reference
+from rtshcua.model.ir.missions import Item, MissionDecl, Overrides, Step
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
+from rtshcua.model.ir.places import ENTRY, VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, RoleDecl, Rule, TemplateDecl, Use
 from rtshcua.model.ir.program import Import, Unit
-from rtshcua.model.ir.scenarios import ScenarioDecl
+from rtshcua.model.ir.scenarios import AfterStep, Decides, FaultCall, Flies, Keeps, Lands, OnCondition, ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import LinkDecl, Parameter, SizesDecl, SkillDecl
-from rtshcua.model.ir.tests import NominalDecl, TestDecl
+from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter, SizesDecl, SkillDecl
+from rtshcua.model.ir.tests import Asker, Assignment, Expectation, InPhase, Named, NominalDecl, Request, Table, TestDecl
 
 
-def occurrences(symbols: Symbols, unit: Unit) -> tuple[Occurrence, ...]:
-    """All places of a file, in the order of the text; a place that means several things is there for each."""
-    walk = _Walk(symbols)
-    found = [each for declaration in declarations(unit) for each in walk.declaration(declaration)]
-    return tuple(sorted(dict.fromkeys(found), key=lambda each: (each.span.start, each.span.end)))
+class NameKind(Enum):
+    """The kinds of names; the value is the word for a person."""
+
+    DECLARED = "declaration"
+    PARAMETER = "parameter"
+    MEMBER = "value of an enumeration"
+    CHOICE = "choice"
+    PHASE = "phase"
+    ROLE = "role"
+    SOURCE = "source of decisions"
+    PROPOSER = "proposer"
+    CLASS = "timing class"
+    RECORD = "kind of evidence"
+    TYPE = "type"
+    MESSAGE = "message of the dialect"
+    FIELD = "field of the dialect"
+    DIALECT_ENUM = "enumeration of the dialect"
+    REASON = "reason"
+    FAULT = "fault"
+    WORD = "word of the language"
+    IMPORT = "import"
 
 
-def declarations(
-    unit: Unit,
-) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl | RoleDecl | SizesDecl, ...]:
-    """All declarations of a file, in the order of the text."""
-    every: tuple[Any, ...] = (
-        *unit.imports, *unit.enums, *unit.signals, *unit.zones, *unit.vehicles, *unit.skills, *unit.templates,
-        *unit.policies, *unit.missions, *unit.nominals, *unit.tests, *unit.scenarios, *unit.roles,
-        *unit.sizes,
-    )  # fmt: skip
-    return tuple(sorted(every, key=lambda each: each.span.start))
+class Target(NamedTuple):
+    """What is meant: `owner` is the skill, template, mission or enumeration that a parameter or a member belongs to; of
+    a choice it is the skill and the parameter, of an import the importing file.
+    """
+
+    sort: NameKind
+    name: str
+    owner: str = ""
 
 
-class _Walk(Conditions):
-    """One file's places."""
+class Occurrence(NamedTuple):
+    """A place that means `target`; `declares` where it is the one that gives the name."""
+
+    span: Span
+    target: Target
+    declares: bool = False
+
+
+#: what the values of a fault's parameters name
+_OF_FAULTS = {"message": NameKind.MESSAGE, "role": NameKind.ROLE}
+#: what the names of parameters mean at a place; several where a rule is about several skills
+Scope = Mapping[str, tuple[Target, ...]]
+
+
+class _OccurrenceFinder:
+    """Finds the names in declarations, conditions, values, arguments, tests and scenarios."""
+
+    def __init__(self, symbols: Symbols) -> None:
+        self.symbols = symbols
+
+    def names(self, names: Iterable[Name], sort: NameKind) -> Iterator[Occurrence]:
+        """Names of one sort."""
+        for name in names:
+            yield Occurrence(name.span, Target(sort, name.text))
+
+    def role(self, name: Name, scope: Scope) -> Iterator[Occurrence]:
+        """A role, or a template's parameter for one."""
+        for target in scope.get(name.text, (Target(NameKind.ROLE, name.text),)):
+            yield Occurrence(name.span, target)
+
+    def contract(self, node: SkillDecl | Overrides, scope: Scope) -> Iterator[Occurrence]:
+        """The clauses, phases and records of a contract."""
+        yield from self.names(node.phases, NameKind.PHASE)
+        yield from self.names(node.record, NameKind.RECORD)
+        yield from self.within((node.require, node.assume, node.maintain), scope)
+
+    def within(self, node: Any, scope: Scope) -> Iterator[Occurrence]:
+        """All references below a condition, a value or a shape."""
+        if isinstance(node, Reference):
+            yield from self.reference(node, scope)
+        elif isinstance(node, Comparison):
+            yield from self._compared(node.left, node.right, scope)
+            yield from self._compared(node.right, node.left, scope)
+        elif isinstance(node, OneOf):
+            yield from self.within(node.subject, scope)
+            for name in node.names:
+                yield from self._member(Reference(span=name.span, name=name.text), node.subject, scope)
+        elif isinstance(node, Node):
+            for value in astuple(node):
+                yield from self.within(value, scope)
+        elif type(node) is tuple:
+            for each in node:
+                yield from self.within(each, scope)
+
+    def reference(self, node: Reference, scope: Scope) -> Iterator[Occurrence]:
+        """A name that stands for a value."""
+        name, (file, start, _) = node.name, node.span
+        if name in scope:
+            yield from (Occurrence(node.span, target) for target in scope[name])
+        elif name in self.symbols.declared:
+            yield Occurrence(node.span, Target(NameKind.DECLARED, name))
+        elif name in (LOCAL_TIME, PHASE):
+            yield Occurrence(node.span, Target(NameKind.WORD, name))
+        elif name.endswith(ENTRY):
+            zone = name.removesuffix(ENTRY)
+            yield Occurrence(Span(file, start + len(zone) + 1, node.span.end), Target(NameKind.WORD, "entry"))
+            yield from self.reference(Reference(span=Span(file, start, start + len(zone)), name=zone), scope)
+        else:
+            yield Occurrence(node.span, Target(NameKind.DECLARED, name))
+
+    def arguments(
+        self, written: Sequence[ArgumentValue], owner: SkillDecl | TemplateDecl | None, scope: Scope
+    ) -> Iterator[Occurrence]:
+        """The arguments of a step, a link or a use."""
+        parameters = () if owner is None else owner.parameters
+        named = {each.name.text: each for each in parameters}
+        for position, each in enumerate(written):
+            parameter = parameters[position] if position < len(parameters) else None
+            if each.name is not None:
+                parameter = named.get(each.name.text)
+                if owner is not None:
+                    yield Occurrence(each.name.span, Target(NameKind.PARAMETER, each.name.text, owner.name.text))
+            yield from self.argument(each.value, parameter, "" if owner is None else owner.name.text, scope)
+
+    def argument(self, value: Node, parameter: Parameter | None, owner: str, scope: Scope) -> Iterator[Occurrence]:
+        """A value for a parameter, which may be a choice or a role."""
+        if isinstance(value, Reference) and parameter is not None and value.name not in scope:
+            if any(choice.text == value.name for choice in parameter.choices):
+                yield Occurrence(value.span, Target(NameKind.CHOICE, value.name, f"{owner}.{parameter.name.text}"))
+                return
+            if parameter.type.text == "role":
+                yield Occurrence(value.span, Target(NameKind.ROLE, value.name))
+                return
+        yield from self.within(value, scope)
+
+    def case(self, node: NominalDecl | TestDecl) -> Iterator[Occurrence]:
+        """A nominal or a test."""
+        scope: dict[str, tuple[Target, ...]] = {}
+        if isinstance(node, TestDecl):
+            if node.nominal is not None:
+                yield Occurrence(node.nominal.span, Target(NameKind.DECLARED, node.nominal.text))
+            asked = "" if node.request is None else node.request.skill.text
+            skill = self.symbols.skills.get(asked)
+            for parameter in () if skill is None else skill.parameters:
+                scope[parameter.name.text] = (Target(NameKind.PARAMETER, parameter.name.text, asked),)
+        else:
+            yield from self.names((node.policy, node.vehicle), NameKind.DECLARED)
+        yield from self._case(tuple(value for value in astuple(node) if value is not node.name), scope)
+
+    def scenario(self, node: ScenarioDecl) -> Iterator[Occurrence]:
+        """A scenario."""
+        yield from self.names((node.mission,), NameKind.DECLARED)
+        faults = [each for each in node.start if isinstance(each, FaultCall)]
+        for incident in node.incidents:
+            match incident.moment:
+                case AfterStep(skill=skill):
+                    yield from self.names((skill,), NameKind.DECLARED)
+                case OnCondition(condition=condition):
+                    yield from self.within(condition, {})
+            faults.append(incident.fault)
+        for fault in faults:
+            yield from self._fault(fault)
+        for demand in node.demands:
+            match demand:
+                case Decides():
+                    yield from self._case(demand.decision, {})
+                case Flies(skill=name) | Lands(zone=name):
+                    yield from self.names((name,), NameKind.DECLARED)
+                case Keeps(place=name) if name.text != OBSTACLE:
+                    yield from self.names((name,), NameKind.DECLARED)
+
+    def _fault(self, fault: FaultCall) -> Iterator[Occurrence]:
+        """A fault, and what its values name: messages, roles; the words of others belong to the fault."""
+        yield from self.names((fault.name,), NameKind.FAULT)
+        for each in fault.arguments:
+            sort = None if each.name is None else _OF_FAULTS.get(each.name.text)
+            if sort is not None and isinstance(each.value, Reference):
+                yield Occurrence(each.value.span, Target(sort, each.value.name))
+
+    def _case(self, node: Any, scope: Scope) -> Iterator[Occurrence]:
+        match node:
+            case Asker():
+                yield from () if node.role is None else self.role(node.role, {})
+                yield from () if node.source is None else self.names((node.source,), NameKind.SOURCE)
+            case Assignment(subject=Named(name=name)):
+                yield from self.reference(Reference(span=name.span, name=name.text), {})
+                if node.cell.value is not None:
+                    subject = Reference(span=name.span, name=name.text)
+                    yield from self._compared(node.cell.value, subject, {})
+            case Table():
+                yield from self._table(node, scope)
+            case Request():
+                yield from self.names((node.skill,), NameKind.DECLARED)
+                yield from self.arguments(node.arguments, self.symbols.skills.get(node.skill.text), {})
+                yield from self._case(node.asker, scope)
+            case Expectation():
+                yield from () if node.target is None else self.names((node.target,), NameKind.DECLARED)
+                yield from () if node.reason is None else self.names((node.reason,), NameKind.REASON)
+            case InPhase():
+                yield from self.names((node.phase, *node.order), NameKind.PHASE)
+            case Node():
+                role = getattr(node, "role", None)
+                if isinstance(role, Name):
+                    yield from self.role(role, {})
+                condition = getattr(node, "condition", None)
+                if condition is not None:
+                    yield from self.within(condition, {})
+                else:
+                    for value in astuple(node):
+                        yield from self._case(value, scope)
+            case tuple() if not isinstance(node, Span):
+                for each in node:
+                    yield from self._case(each, scope)
+
+    def _table(self, table: Table, scope: Scope) -> Iterator[Occurrence]:
+        columns: list[Reference | None] = []
+        for column in table.columns:
+            if isinstance(column, Named):
+                reference = Reference(span=column.name.span, name=column.name.text)
+                yield from self.reference(reference, scope)
+                columns.append(reference)
+            else:
+                yield from self.within(column.condition, {})
+                columns.append(None)
+        for row in table.rows:
+            for cell, subject in zip(row.cells, columns, strict=False):
+                if cell.value is not None:
+                    yield from (
+                        self.within(cell.value, {}) if subject is None else self._compared(cell.value, subject, scope)
+                    )
+            yield from self._case(row.expectation, scope)
+
+    def _compared(self, side: Any, other: Any, scope: Scope) -> Iterator[Occurrence]:
+        """One side of a comparison, which may be a member of what the other side is."""
+        if isinstance(side, Reference) and side.name not in scope and side.name not in self.symbols.declared:
+            yield from self._member(side, other, scope)
+        else:
+            yield from self.within(side, scope)
+
+    def _member(self, node: Reference, other: Any, scope: Scope) -> Iterator[Occurrence]:
+        if isinstance(other, Reference):
+            if other.name == PHASE and PHASE not in scope:
+                yield Occurrence(node.span, Target(NameKind.PHASE, node.name))
+                return
+            signal = None if other.name in scope else self.symbols.signals.get(other.name)
+            enum = None if signal is None else self.symbols.enums.get(signal.type.text)
+            if enum is not None and any(member.name.text == node.name for member in enum.members):
+                yield Occurrence(node.span, Target(NameKind.MEMBER, node.name, enum.name.text))
+                return
+            chosen = tuple(self._choices(node.name, scope.get(other.name, ())))
+            if chosen:
+                yield from (Occurrence(node.span, target) for target in chosen)
+                return
+        yield from self.reference(node, scope)
+
+    def _choices(self, name: str, targets: Iterable[Target]) -> Iterator[Target]:
+        for target in targets:
+            owner = self.symbols.skills.get(target.owner) or self.symbols.missions.get(target.owner)
+            for parameter in () if owner is None else owner.parameters:
+                if parameter.name.text == target.name and any(each.text == name for each in parameter.choices):
+                    yield Target(NameKind.CHOICE, name, f"{target.owner}.{target.name}")
 
     def declaration(self, node: Node) -> Iterator[Occurrence]:
         """What a declaration says."""
         if isinstance(node, Import):
-            yield Occurrence(node.span, Target(Sort.IMPORT, node.path, node.span.file))
+            yield Occurrence(node.span, Target(NameKind.IMPORT, node.path, node.span.file))
             return
         name = getattr(node, "name", None)
         if isinstance(name, Name) and not isinstance(node, TestDecl | ScenarioDecl):
-            yield Occurrence(name.span, Target(Sort.DECLARED, name.text), True)
+            yield Occurrence(name.span, Target(NameKind.DECLARED, name.text), True)
         match node:
             case EnumDecl():
                 yield from self._enum(node)
@@ -65,7 +302,7 @@ class _Walk(Conditions):
             case PolicyDecl():
                 yield from self._policy(node)
             case RoleDecl():
-                yield from (Occurrence(each.span, Target(Sort.ROLE, each.text), True) for each in node.names)
+                yield from (Occurrence(each.span, Target(NameKind.ROLE, each.text), True) for each in node.names)
             case MissionDecl():
                 yield from self._mission(node)
             case NominalDecl() | TestDecl():
@@ -73,25 +310,25 @@ class _Walk(Conditions):
             case ScenarioDecl():
                 yield from self.scenario(node)
             case VehicleDecl():
-                yield from self.names(node.without, Sort.DECLARED)
+                yield from self.names(node.without, NameKind.DECLARED)
 
     def _enum(self, enum: EnumDecl) -> Iterator[Occurrence]:
         if enum.dialect is not None:
-            yield Occurrence(enum.dialect.span, Target(Sort.DIALECT_ENUM, enum.dialect.text))
+            yield Occurrence(enum.dialect.span, Target(NameKind.DIALECT_ENUM, enum.dialect.text))
         for member in enum.members:
-            yield Occurrence(member.name.span, Target(Sort.MEMBER, member.name.text, enum.name.text), True)
+            yield Occurrence(member.name.span, Target(NameKind.MEMBER, member.name.text, enum.name.text), True)
 
     def _signal(self, signal: SignalDecl) -> Iterator[Occurrence]:
         enum = None if signal.type.text in NAMED else self.symbols.enums.get(signal.type.text)
-        sort = Sort.TYPE if enum is None else Sort.DECLARED  # `signal position : position`: no name of a signal
+        sort = NameKind.TYPE if enum is None else NameKind.DECLARED  # `signal position : position`: no name of a signal
         yield Occurrence(signal.type.span, Target(sort, signal.type.text))
         for source in signal.sources:
-            yield Occurrence(source.message.span, Target(Sort.MESSAGE, source.message.text))
+            yield Occurrence(source.message.span, Target(NameKind.MESSAGE, source.message.text))
             for field in (*source.fields, *(each.field for each in source.where)):
-                yield Occurrence(field.span, Target(Sort.FIELD, field.text, source.message.text))
+                yield Occurrence(field.span, Target(NameKind.FIELD, field.text, source.message.text))
         for name in signal.unknown_at:
             if enum is not None and any(member.name.text == name.text for member in enum.members):
-                yield Occurrence(name.span, Target(Sort.MEMBER, name.text, enum.name.text))
+                yield Occurrence(name.span, Target(NameKind.MEMBER, name.text, enum.name.text))
 
     def _skill(self, skill: SkillDecl) -> Iterator[Occurrence]:
         owner = skill.name.text
@@ -104,17 +341,17 @@ class _Walk(Conditions):
             motion = skill.motion
             for name in (motion.target, motion.altitude, motion.speed, motion.pattern, motion.time):
                 if name is not None:
-                    yield Occurrence(name.span, Target(Sort.PARAMETER, name.text, owner))
+                    yield Occurrence(name.span, Target(NameKind.PARAMETER, name.text, owner))
         yield from self.contract(skill, scope)
         if skill.timing_class is not None:
-            yield Occurrence(skill.timing_class.span, Target(Sort.CLASS, skill.timing_class.text))
+            yield Occurrence(skill.timing_class.span, Target(NameKind.CLASS, skill.timing_class.text))
         for link in skill.fallback:
             yield from self._link(link, scope)
 
     def _sizes(self, sizes: SizesDecl) -> Iterator[Occurrence]:
-        yield from self.names((sizes.skill,), Sort.DECLARED)
+        yield from self.names((sizes.skill,), NameKind.DECLARED)
         for each in sizes.given:
-            yield Occurrence(each.name.span, Target(Sort.PARAMETER, each.name.text, sizes.skill.text))
+            yield Occurrence(each.name.span, Target(NameKind.PARAMETER, each.name.text, sizes.skill.text))
 
     def _template(self, template: TemplateDecl) -> Iterator[Occurrence]:
         scope = self._parameters(template.parameters, template.name.text)
@@ -130,16 +367,16 @@ class _Walk(Conditions):
         for delegation in policy.delegations:
             yield from self._delegation(delegation)
         if policy.airspace is not None:
-            yield from self.names((*policy.airspace.inside, *policy.airspace.outside), Sort.DECLARED)
+            yield from self.names((*policy.airspace.inside, *policy.airspace.outside), NameKind.DECLARED)
         for link in policy.contingency:
             yield from self._link(link, {})
 
     def _rule(self, rule: Rule, own: Scope | None) -> Iterator[Occurrence]:
         """A rule; `own` are the parameters of the template that it stands in."""
-        yield from self.names(rule.skills, Sort.DECLARED)
+        yield from self.names(rule.skills, NameKind.DECLARED)
         for role in (*rule.roles, *(each for each in (rule.approver, rule.another) if each is not None)):
             yield from self.role(role, own or {})
-        yield from self.names(rule.through, Sort.SOURCE)
+        yield from self.names(rule.through, NameKind.SOURCE)
         scope = self._of_skills(rule.skills) | dict(own or {})
         if rule.when is not None:
             yield from self.within(rule.when, scope)
@@ -147,37 +384,41 @@ class _Walk(Conditions):
             yield from self._link(rule.target, scope)
 
     def _delegation(self, delegation: Delegation) -> Iterator[Occurrence]:
-        yield from self.names(delegation.skills, Sort.DECLARED)
-        yield from self.names((delegation.grantor, delegation.grantee), Sort.ROLE)
-        yield from self.names(delegation.through, Sort.SOURCE)
+        yield from self.names(delegation.skills, NameKind.DECLARED)
+        yield from self.names((delegation.grantor, delegation.grantee), NameKind.ROLE)
+        yield from self.names(delegation.through, NameKind.SOURCE)
         if delegation.when is not None:
             yield from self.within(delegation.when, self._of_skills(delegation.skills))
 
     def _use(self, use: Use) -> Iterator[Occurrence]:
-        yield from self.names((use.template,), Sort.DECLARED)
+        yield from self.names((use.template,), NameKind.DECLARED)
         template = self.symbols.templates.get(use.template.text)
         yield from self.arguments(use.arguments, template, {})
 
     def _link(self, link: LinkDecl, scope: Scope) -> Iterator[Occurrence]:
-        yield from self.names((link.skill,), Sort.DECLARED)
+        yield from self.names((link.skill,), NameKind.DECLARED)
         yield from self.arguments(link.arguments, self.symbols.skills.get(link.skill.text), scope)
 
     def _mission(self, mission: MissionDecl) -> Iterator[Occurrence]:
-        yield from self.names((mission.policy, mission.vehicle), Sort.DECLARED)
-        for name, sort in ((mission.source, Sort.SOURCE), (mission.proposer, Sort.PROPOSER), (mission.role, Sort.ROLE)):
+        yield from self.names((mission.policy, mission.vehicle), NameKind.DECLARED)
+        for name, sort in (
+            (mission.source, NameKind.SOURCE),
+            (mission.proposer, NameKind.PROPOSER),
+            (mission.role, NameKind.ROLE),
+        ):
             if name is not None:
                 yield Occurrence(name.span, Target(sort, name.text))
         scope = self._parameters(mission.parameters, mission.name.text)
         yield from self._declared(mission.parameters, mission.name.text)
         for phase in mission.phases:
-            yield Occurrence(phase.name.span, Target(Sort.PHASE, phase.name.text), True)
+            yield Occurrence(phase.name.span, Target(NameKind.PHASE, phase.name.text), True)
             for item in phase.items:
                 yield from self._item(item, scope)
 
     def _item(self, item: Item, scope: Scope) -> Iterator[Occurrence]:
         if isinstance(item, Step):
             skill = self.symbols.skills.get(item.skill.text)
-            yield from self.names((item.skill,), Sort.DECLARED)
+            yield from self.names((item.skill,), NameKind.DECLARED)
             yield from self.arguments(item.arguments, skill, scope)
             if item.overrides is not None:
                 of_skill = {} if skill is None else self._parameters(skill.parameters, skill.name.text)
@@ -192,12 +433,12 @@ class _Walk(Conditions):
         """Parameters; the `sizes` of their skill may be the ends of their ranges, and their defaults."""
         for parameter in parameters:
             name = parameter.name.text
-            yield Occurrence(parameter.name.span, Target(Sort.PARAMETER, name, owner), True)
+            yield Occurrence(parameter.name.span, Target(NameKind.PARAMETER, name, owner), True)
             if parameter.choices:
                 for choice in parameter.choices:
-                    yield Occurrence(choice.span, Target(Sort.CHOICE, choice.text, f"{owner}.{name}"), True)
+                    yield Occurrence(choice.span, Target(NameKind.CHOICE, choice.text, f"{owner}.{name}"), True)
             elif parameter.type.span.start < parameter.type.span.end:
-                yield Occurrence(parameter.type.span, Target(Sort.TYPE, parameter.type.text))
+                yield Occurrence(parameter.type.span, Target(NameKind.TYPE, parameter.type.text))
             if parameter.range is not None:
                 yield from self.within(parameter.range, sizes or {})
             if parameter.default is not None:
@@ -211,12 +452,31 @@ class _Walk(Conditions):
             skill = self.symbols.skills.get(name)
             for parameter in () if skill is None else skill.parameters:
                 targets = found.get(parameter.name.text, ())
-                found[parameter.name.text] = (*targets, Target(Sort.PARAMETER, parameter.name.text, name))
+                found[parameter.name.text] = (*targets, Target(NameKind.PARAMETER, parameter.name.text, name))
         return found
 
     @staticmethod
     def _parameters(parameters: Sequence[Parameter], owner: str) -> dict[str, tuple[Target, ...]]:
-        return {each.name.text: (Target(Sort.PARAMETER, each.name.text, owner),) for each in parameters}
+        return {each.name.text: (Target(NameKind.PARAMETER, each.name.text, owner),) for each in parameters}
+
+
+def occurrences(symbols: Symbols, unit: Unit) -> tuple[Occurrence, ...]:
+    """All places of a file, in the order of the text; a place that means several things is there for each."""
+    walk = _OccurrenceFinder(symbols)
+    found = [each for declaration in declarations(unit) for each in walk.declaration(declaration)]
+    return tuple(sorted(dict.fromkeys(found), key=lambda each: (each.span.start, each.span.end)))
+
+
+def declarations(
+    unit: Unit,
+) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl | RoleDecl | SizesDecl, ...]:
+    """All declarations of a file, in the order of the text."""
+    every: tuple[Any, ...] = (
+        *unit.imports, *unit.enums, *unit.signals, *unit.zones, *unit.vehicles, *unit.skills, *unit.templates,
+        *unit.policies, *unit.missions, *unit.nominals, *unit.tests, *unit.scenarios, *unit.roles,
+        *unit.sizes,
+    )  # fmt: skip
+    return tuple(sorted(every, key=lambda each: each.span.start))
 
 
 def at(found: Sequence[Occurrence], offset: int) -> tuple[Occurrence, ...]:

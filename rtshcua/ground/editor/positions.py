@@ -6,7 +6,7 @@ The Language Server Protocol (3.17, "Text Documents") counts UTF-16 code units u
 
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import Enum
 from typing import NamedTuple
 
@@ -22,18 +22,18 @@ class Encoding(Enum):
     UTF_32 = "utf-32"
 
 
-class Place(NamedTuple):
+class TextPosition(NamedTuple):
     """A line, and a column in units of the encoding, both from 0."""
 
     line: int
     column: int
 
 
-class Change(NamedTuple):
+class TextChange(NamedTuple):
     """The text from `start` to `end` is replaced; without a start, all of it."""
 
-    start: Place | None
-    end: Place | None
+    start: TextPosition | None
+    end: TextPosition | None
     text: str
 
 
@@ -45,7 +45,7 @@ class Edit(NamedTuple):
     length: int
 
 
-class Lines:
+class LineIndex:
     """A text, its lines, and places in it."""
 
     def __init__(self, text: str, encoding: Encoding, starts: list[int] | None = None) -> None:
@@ -54,14 +54,14 @@ class Lines:
         self._starts = [0, *(found.end() for found in _LINE_END.finditer(text))] if starts is None else starts
         self._plain = text.isascii() or encoding is Encoding.UTF_32
 
-    def place(self, offset: int) -> Place:
+    def place(self, offset: int) -> TextPosition:
         """The place of a character; past the end it is the end. In the middle of `\\r\\n` it is the end of the line."""
         offset = max(0, min(offset, len(self.text)))
         line = bisect_right(self._starts, offset) - 1
         start = self._starts[line]
-        return Place(line, self._units(self.text[start : min(offset, self._line_end(line))]))
+        return TextPosition(line, self._units(self.text[start : min(offset, self._line_end(line))]))
 
-    def offset(self, place: Place) -> int:
+    def offset(self, place: TextPosition) -> int:
         """The character at a place. Past the end of a line it is the end of it, past the last line that of the text;
         in the middle of a character it is the start of that one.
         """
@@ -75,7 +75,7 @@ class Lines:
             return min(start + max(0, column), end)
         return start + self._characters(self.text[start:end], column)
 
-    def replaced(self, start: int, end: int, put: str) -> "Lines":
+    def replaced(self, start: int, end: int, put: str) -> "LineIndex":
         """The text with `put` in the place of `[start, end)`; only there it is looked at for lines again. Whether one
         begins at a character, the two around tell.
         """
@@ -85,7 +85,7 @@ class Lines:
         found = (each.end() for each in _LINE_END.finditer(text, max(0, start - 1), last + 1))
         within = [each for each in found if before[-1] < each <= last]
         behind = [each + by for each in self._starts[bisect_right(self._starts, end) :]]
-        return Lines(text, self.encoding, [*before, *within, *behind])
+        return LineIndex(text, self.encoding, [*before, *within, *behind])
 
     def _line_end(self, line: int) -> int:
         """Where a line ends, without what ends it."""
@@ -116,7 +116,7 @@ class Lines:
         return 1
 
 
-def edited(lines: Lines, changes: Iterable[Change]) -> Lines:
+def edited(lines: LineIndex, changes: Iterable[TextChange]) -> LineIndex:
     """The text after changes that were made one after the other.
 
     A change whose end is before its start replaces nothing, and inserts at the start.
@@ -137,28 +137,20 @@ def difference(old: str, new: str) -> Edit:
     if old == new:
         return Edit(len(old), len(old), 0)
     least = min(len(old), len(new))
-    start = _alike(old, new, least)
-    behind = _alike_behind(old, new, least - start)
+    start = _longest(least, lambda low, high: old[low:high] == new[low:high])
+    length, others = len(old), len(new)
+    behind = _longest(
+        least - start, lambda low, high: old[length - high : length - low] == new[others - high : others - low]
+    )
     return Edit(start, len(old) - behind, len(new) - behind - start)
 
 
-def _alike(old: str, new: str, most: int) -> int:
-    """How many characters in front are the same, at most `most`; halving, so that the work is done by comparisons."""
+def _longest(most: int, same: Callable[[int, int], bool]) -> int:
+    """How many characters are the same, at most `most`; halving, so that the work is done by comparisons."""
     low, high = 0, most
     while low < high:
         middle = (low + high + 1) // 2
-        if old[low:middle] == new[low:middle]:
-            low = middle
-        else:
-            high = middle - 1
-    return low
-
-
-def _alike_behind(old: str, new: str, most: int) -> int:
-    low, high = 0, most
-    while low < high:
-        middle = (low + high + 1) // 2
-        if old[len(old) - middle : len(old) - low] == new[len(new) - middle : len(new) - low]:
+        if same(low, middle):
             low = middle
         else:
             high = middle - 1

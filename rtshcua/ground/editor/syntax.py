@@ -1,11 +1,11 @@
-"""What stands at a place of a text as words and nodes, also where the text is not whole."""
+"""The tokens and nodes at a place of a text, also where the text is not complete."""
 
 import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from rtshcua.diagnostics.span import Span
-from rtshcua.ground.editor.moved import parts
+from msgspec.structs import astuple
+
 from rtshcua.ground.editor.occurrences import declarations
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.program import Unit
@@ -66,28 +66,27 @@ def path_to(unit: Unit, offset: int) -> tuple[Node, ...]:
 
 def _path(node: Node, offset: int) -> Iterator[Node]:
     yield node
-    inner = next((each for each in _inner(node) if each.span.start <= offset < each.span.end), None)
-    if inner is None:
-        inner = next((each for each in _inner(node) if each.span.start <= offset <= each.span.end), None)
+    around = [each for each in _inner(astuple(node)) if each.span.start <= offset <= each.span.end]
+    inner = next((each for each in around if offset < each.span.end), around[0] if around else None)
     if inner is not None:
         yield from _path(inner, offset)
 
 
-def _inner(node: Any) -> Iterator[Node]:
-    values = parts(node) if isinstance(node, Node) else node
-    for value in values:
-        if isinstance(value, Node):
-            yield value
-        elif type(value) is tuple and not isinstance(value, Span):
-            yield from _inner_of_tuple(value)
+def nodes_in(node: Node) -> Iterator[Node]:
+    """A node and every node below it, in source order."""
+    waiting = [node]
+    while waiting:
+        each = waiting.pop()
+        yield each
+        waiting += reversed([*_inner(astuple(each))])
 
 
-def _inner_of_tuple(values: tuple[Any, ...]) -> Iterator[Node]:
+def _inner(values: tuple[Any, ...]) -> Iterator[Node]:
     for value in values:
         if isinstance(value, Node):
             yield value
         elif type(value) is tuple:
-            yield from _inner_of_tuple(value)
+            yield from _inner(value)
 
 
 def note_before(text: str, start: int) -> str:

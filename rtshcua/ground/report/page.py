@@ -14,7 +14,7 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup, escape
 
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.ground.editor.meanings import REASONS
+from rtshcua.ground.editor.keyword_help import REASONS
 from rtshcua.ground.report.drawing.canvas import number
 from rtshcua.ground.report.drawing.patterns import drawn
 from rtshcua.ground.report.drawing.plan import mission_plan, plans

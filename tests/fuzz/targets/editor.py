@@ -10,17 +10,14 @@ from fuzz import corpus, world
 from fuzz.mutation.sentences import mutated as mutated
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.editor.actions import actions
-from rtshcua.ground.editor.colours import colours
-from rtshcua.ground.editor.completion import complete
-from rtshcua.ground.editor.desk import LOST, Desk
+from rtshcua.ground.editor.code_completion import complete, signature
+from rtshcua.ground.editor.document_structure import folds, outline, semantic_tokens
 from rtshcua.ground.editor.hover import hover
-from rtshcua.ground.editor.moved import moved_finding
+from rtshcua.ground.editor.incremental_parse import ParsedText, moved_finding
 from rtshcua.ground.editor.navigation import definitions, imported_at, importers, references, targets
-from rtshcua.ground.editor.outline import folds, outline
-from rtshcua.ground.editor.pieces import Cut
-from rtshcua.ground.editor.positions import Change, Encoding, Lines, difference, edited
+from rtshcua.ground.editor.positions import Encoding, LineIndex, TextChange, difference, edited
 from rtshcua.ground.editor.rename import renamable, rename
-from rtshcua.ground.editor.signatures import signature
+from rtshcua.ground.editor.workspace import LOST, Workspace
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.pipeline.program import check_declared
 from rtshcua.mavlink import dialect
@@ -37,7 +34,7 @@ _PUT = (
     "// rtshcua: ignore E1302", "\nenum e { a = 1 }\n",
 )  # fmt: skip
 _NAMES = ("pool", "a.b", "phase", "battery", "target", "1", "")
-_read: dict[str, Cut] = {}  # of the library; what a file says is held against its text
+_read: dict[str, ParsedText] = {}  # of the library; what a file says is held against its text
 
 
 def seeds() -> Iterable[bytes]:
@@ -46,7 +43,7 @@ def seeds() -> Iterable[bytes]:
 
 def one(data: bytes) -> None:
     of = Random(crc32(data))
-    lines = Lines(data.decode("utf-8", errors="replace").removeprefix("\ufeff"), of.choice(list(Encoding)))
+    lines = LineIndex(data.decode("utf-8", errors="replace").removeprefix("\ufeff"), of.choice(list(Encoding)))
     desk = _desk()
     desk.put(world.PROBE, lines.text)
     _asked(desk, of)
@@ -56,9 +53,9 @@ def one(data: bytes) -> None:
             lines = of.choice(before)  # undone
         else:
             at, end = _range(lines.text, of)
-            change = Change(lines.place(at), lines.place(end), of.choice(_PUT))
+            change = TextChange(lines.place(at), lines.place(end), of.choice(_PUT))
             lines = edited(lines, [change])
-            assert lines.place(len(lines.text)) == Lines(lines.text, lines.encoding).place(len(lines.text))
+            assert lines.place(len(lines.text)) == LineIndex(lines.text, lines.encoding).place(len(lines.text))
         last = before[-1].text
         found = check_declared(desk.view(world.PROBE).program, dialect.load())
         now = desk.put(world.PROBE, lines.text)
@@ -73,8 +70,8 @@ def one(data: bytes) -> None:
         _asked(desk, of)
 
 
-def _desk() -> Desk:
-    desk = Desk(world.reading({}), world.LIBRARY, world.listing)
+def _desk() -> Workspace:
+    desk = Workspace(world.reading({}), world.LIBRARY, world.listing)
     desk._files = _read
     return desk
 
@@ -84,7 +81,7 @@ def _range(text: str, of: Random) -> tuple[int, int]:
     return at, min(len(text), at + of.choice((0, 0, 0, 1, 1, 7, 40, 40 * LOST)))
 
 
-def _same_as_whole(desk: Desk, text: str) -> None:
+def _same_as_whole(desk: Workspace, text: str) -> None:
     now = desk.open[world.PROBE]
     assert now.parsed == parse(now.source)
     other = _desk()
@@ -96,11 +93,11 @@ def _same_as_whole(desk: Desk, text: str) -> None:
     world.hold(found, mine.sources)
 
 
-def _asked(desk: Desk, of: Random) -> None:
+def _asked(desk: Workspace, of: Random) -> None:
     """Everything that an editor may ask of a text."""
     file, now = world.PROBE, desk.open[world.PROBE]
     text, view = now.source.text, desk.view(file)
-    for kept in (outline(now), folds(now), colours(view, file)):
+    for kept in (outline(now), folds(now), semantic_tokens(view, file)):
         assert kept == tuple(dict.fromkeys(kept))
     found = check_declared(view.program, dialect.load())
     for _ in range(PLACES):

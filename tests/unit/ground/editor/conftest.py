@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.ground.editor.desk import Desk
-from rtshcua.ground.editor.pieces import Cut
+from rtshcua.ground.editor.incremental_parse import ParsedText
+from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.library import root
 
 SITE = """import "lib:skills/signals.rts"
@@ -68,7 +68,7 @@ mission dip(over: zone = pond, up: altitude in 10 m .. 30 m = 20 m) under lake@1
 LAKE = {"/w/site.rts": SITE, "/w/look.rts": SKILL, "/w/lake.rts": POLICY, "/w/dip.rts": MISSION}
 
 
-def lake(files: dict[str, str]) -> Desk:
+def lake(files: dict[str, str]) -> Workspace:
     """A desk over these files and the library."""
 
     def read(path: str) -> bytes:
@@ -79,27 +79,27 @@ def lake(files: dict[str, str]) -> Desk:
             return [name.removeprefix("/w/") for name in files]
         return [each.name for each in Path(path).iterdir()]
 
-    other = Desk(read, str(root()), listing)
+    other = Workspace(read, str(root()), listing)
     other._files = _PARSED  # of the library, once for all tests; what a file says is held against its text
     return other
 
 
-_PARSED: dict[str, Cut] = {}
+_PARSED: dict[str, ParsedText] = {}
 
 
 @pytest.fixture
-def make() -> Callable[[dict[str, str]], Desk]:
+def make() -> Callable[[dict[str, str]], Workspace]:
     """Makes desks."""
     return lake
 
 
 @pytest.fixture
-def desk() -> Desk:
+def desk() -> Workspace:
     """The lake: four files, of which none is open."""
     return lake(LAKE)
 
 
 @pytest.fixture(scope="module")
-def make_lake() -> Desk:
+def make_lake() -> Workspace:
     """The same for many examples, which change copies of it."""
     return lake(LAKE)

@@ -5,16 +5,16 @@ from pathlib import Path
 import pytest
 
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.editor.hover import hover
 from rtshcua.ground.editor.navigation import definitions, references, targets
+from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.library import root
 from rtshcua.mavlink import dialect
 
 DIP, LAKE, LOOK, SITE = "/w/dip.rts", "/w/lake.rts", "/w/look.rts", "/w/site.rts"
 
 
-def place(desk: Desk, file: str, around: str) -> int:
+def place(desk: Workspace, file: str, around: str) -> int:
     """The offset of `|` in a piece of a file's text."""
     text = desk.text(file)
     assert text is not None
@@ -23,7 +23,7 @@ def place(desk: Desk, file: str, around: str) -> int:
     return text.index(before + after) + len(before)
 
 
-def shown(desk: Desk, spans: list[Span] | tuple[Span, ...]) -> list[str]:
+def shown(desk: Workspace, spans: list[Span] | tuple[Span, ...]) -> list[str]:
     """Spans as the file's name and the line that they are on."""
     found = []
     for span in spans:
@@ -56,20 +56,20 @@ def shown(desk: Desk, spans: list[Span] | tuple[Span, ...]) -> list[str]:
         (SITE, "sea.mood : mo|od", ["site.rts: enum mood { calm = 0, wi"]),
     ],
 )  # fmt: skip
-def test_definitions(desk: Desk, file: str, around: str, where: list[str]) -> None:
+def test_definitions(desk: Workspace, file: str, around: str, where: list[str]) -> None:
     view = desk.view(DIP)
     found = definitions(view, file, place(desk, file, around))
     assert shown(desk, found) == [each[: each.index(": ") + 26] for each in where]
 
 
-def test_a_word_in_a_broken_declaration_is_found_too(desk: Desk) -> None:
+def test_a_word_in_a_broken_declaration_is_found_too(desk: Workspace) -> None:
     desk.put(DIP, 'import "lake.rts"\nmission m under lake@1 on quad { phase p { look(pond.entry, } }')
     assert shown(desk, definitions(desk.view(DIP), DIP, place(desk, DIP, "look(po|nd"))) == [
         "site.rts: zone pond = circle(47.39"
     ]
 
 
-def test_references_go_through_all_programs(desk: Desk) -> None:
+def test_references_go_through_all_programs(desk: Workspace) -> None:
     """Of the zone, in the file that declares it and in those that import it, but not in a program with another."""
     desk.put("/w/other.rts", "zone pond = circle(47.3 N, 8.5 E, 5 m)\nzone two = union(pond, pond)\n")
     view = desk.view(SITE)
@@ -111,7 +111,7 @@ def test_references_go_through_all_programs(desk: Desk) -> None:
         (DIP, 'import "lake|.rts"', ["declares `near`, `lake`"]),
     ],
 )
-def test_hover(desk: Desk, file: str, around: str, said: list[str]) -> None:
+def test_hover(desk: Workspace, file: str, around: str, said: list[str]) -> None:
     found = hover(desk.view(DIP), file, place(desk, file, around), dialect.load())
     assert found is not None
     assert [each for each in said if each not in found.text] == []
@@ -132,7 +132,7 @@ def test_hover(desk: Desk, file: str, around: str, said: list[str]) -> None:
         ("f|lies  dip", ["the mission"]),
     ],
 )
-def test_hover_over_a_scenario(desk: Desk, around: str, said: list[str]) -> None:
+def test_hover_over_a_scenario(desk: Workspace, around: str, said: list[str]) -> None:
     text = """import "dip.rts"
 scenario "it" {
   flies  dip
@@ -150,7 +150,7 @@ scenario "it" {
     assert [each for each in said if each not in found.text] == []
 
 
-def test_hover_says_nothing_of_nothing(desk: Desk) -> None:
+def test_hover_says_nothing_of_nothing(desk: Workspace) -> None:
     text = desk.text(DIP) or ""
     assert hover(desk.view(DIP), DIP, text.index("\n\n") + 1, dialect.load()) is None
     assert hover(desk.view("/w/none.rts"), "/w/none.rts", 3, dialect.load()) is None
@@ -158,7 +158,7 @@ def test_hover_says_nothing_of_nothing(desk: Desk) -> None:
 
 def test_every_name_of_the_library_means_something() -> None:
     """Each occurrence covers just its name, and but for roles, phases and the like is declared somewhere."""
-    desk = Desk(lambda path: Path(path).read_bytes(), str(root()))
+    desk = Workspace(lambda path: Path(path).read_bytes(), str(root()))
     view = desk.view(str(root() / "missions" / "standard.rts"))
     free = {
         "ROLE",

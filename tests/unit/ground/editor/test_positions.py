@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtshcua.ground.editor.positions import Change, Edit, Encoding, Lines, Place, difference, edited
+from rtshcua.ground.editor.positions import Edit, Encoding, LineIndex, TextChange, TextPosition, difference, edited
 from virtual.rows import rows
 
 TEXTS = st.lists(st.sampled_from(["a", "é", "€", "𝄞", "\n", "\r", "\r\n", "\f", " "]), max_size=20).map("".join)
@@ -16,7 +16,7 @@ def units(text: str, encoding: Encoding) -> int:
     return len(text.encode(codec)) // width
 
 
-def naive(text: str, offset: int, encoding: Encoding) -> Place:
+def naive(text: str, offset: int, encoding: Encoding) -> TextPosition:
     """Line by line, ends by `\\r\\n`, `\\n` or `\\r`; what stands in the middle of an end is at the end of its line."""
     line, start, at = 0, 0, 0
     while at < len(text):
@@ -24,15 +24,15 @@ def naive(text: str, offset: int, encoding: Encoding) -> Place:
         if end and at + end <= offset:
             line, start = line + 1, at + end
         elif end and at < offset:
-            return Place(line, units(text[start:at], encoding))
+            return TextPosition(line, units(text[start:at], encoding))
         at += end or 1
-    return Place(line, units(text[start:offset], encoding))
+    return TextPosition(line, units(text[start:offset], encoding))
 
 
 @given(TEXTS, ENCODINGS, st.integers(0, 30))
 def test_a_place_and_back(text: str, encoding: Encoding, offset: int) -> None:
     offset = min(offset, len(text))
-    lines = Lines(text, encoding)
+    lines = LineIndex(text, encoding)
     place = lines.place(offset)
     assert place == naive(text, offset, encoding)
     if text[offset - 1 : offset + 1] != "\r\n":
@@ -42,42 +42,46 @@ def test_a_place_and_back(text: str, encoding: Encoding, offset: int) -> None:
 @rows(
     ("place", "encoding", "offset"),
     [
-        (Place(0, 0), Encoding.UTF_16, 0),
-        (Place(0, 3), Encoding.UTF_16, 2),  # behind the two units of the clef
-        (Place(0, 2), Encoding.UTF_16, 1),  # in the middle of them: before it
-        (Place(0, 5), Encoding.UTF_8, 2),
-        (Place(0, 3), Encoding.UTF_8, 1),
-        (Place(0, 2), Encoding.UTF_32, 2),
-        (Place(0, 99), Encoding.UTF_16, 3),  # past the end of a line: its end
-        (Place(1, 0), Encoding.UTF_16, 5),
-        (Place(9, 0), Encoding.UTF_16, 6),  # past the last line: the end
-        (Place(-1, 4), Encoding.UTF_16, 0),
-        (Place(1, -4), Encoding.UTF_16, 5),
+        (TextPosition(0, 0), Encoding.UTF_16, 0),
+        (TextPosition(0, 3), Encoding.UTF_16, 2),  # behind the two units of the clef
+        (TextPosition(0, 2), Encoding.UTF_16, 1),  # in the middle of them: before it
+        (TextPosition(0, 5), Encoding.UTF_8, 2),
+        (TextPosition(0, 3), Encoding.UTF_8, 1),
+        (TextPosition(0, 2), Encoding.UTF_32, 2),
+        (TextPosition(0, 99), Encoding.UTF_16, 3),  # past the end of a line: its end
+        (TextPosition(1, 0), Encoding.UTF_16, 5),
+        (TextPosition(9, 0), Encoding.UTF_16, 6),  # past the last line: the end
+        (TextPosition(-1, 4), Encoding.UTF_16, 0),
+        (TextPosition(1, -4), Encoding.UTF_16, 5),
     ],
 )
-def test_places_by_hand(place: Place, encoding: Encoding, offset: int) -> None:
-    assert Lines("a𝄞b\r\nc", encoding).offset(place) == offset
+def test_places_by_hand(place: TextPosition, encoding: Encoding, offset: int) -> None:
+    assert LineIndex("a𝄞b\r\nc", encoding).offset(place) == offset
 
 
 @given(TEXTS, ENCODINGS, st.integers(0, 30), st.integers(0, 30), TEXTS)
 def test_a_change_is_cutting_and_putting(text: str, encoding: Encoding, one: int, other: int, put: str) -> None:
     start, end = sorted((min(one, len(text)), min(other, len(text))))
-    lines = Lines(text, encoding)
+    lines = LineIndex(text, encoding)
     middle = any(text[at - 1 : at + 1] == "\r\n" for at in (start, end))
     if not middle:
         assert (
-            edited(lines, [Change(lines.place(start), lines.place(end), put)]).text == text[:start] + put + text[end:]
+            edited(lines, [TextChange(lines.place(start), lines.place(end), put)]).text
+            == text[:start] + put + text[end:]
         )
-    assert edited(lines, [Change(None, None, put)]).text == put
+    assert edited(lines, [TextChange(None, None, put)]).text == put
     now = lines.replaced(start, end, put)
-    assert now._starts == Lines(now.text, encoding)._starts
+    assert now._starts == LineIndex(now.text, encoding)._starts
 
 
 def test_changes_come_one_after_the_other_and_backwards_inserts() -> None:
-    lines = Lines("abc", Encoding.UTF_16)
-    changes = [Change(Place(0, 1), Place(0, 2), "x\ny"), Change(Place(1, 1), Place(1, 2), "")]
+    lines = LineIndex("abc", Encoding.UTF_16)
+    changes = [
+        TextChange(TextPosition(0, 1), TextPosition(0, 2), "x\ny"),
+        TextChange(TextPosition(1, 1), TextPosition(1, 2), ""),
+    ]
     assert edited(lines, changes).text == "ax\ny"
-    assert edited(lines, [Change(Place(0, 2), Place(0, 1), "-")]).text == "ab-c"
+    assert edited(lines, [TextChange(TextPosition(0, 2), TextPosition(0, 1), "-")]).text == "ab-c"
 
 
 @given(TEXTS, TEXTS)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.editor.rename import RENAMED, Renaming, renamable, rename
+from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.ground.pipeline.program import check_declared
 from rtshcua.mavlink import dialect
 
@@ -18,7 +18,7 @@ DIALECT = dialect.load()
 FILES = DIP, LAKE, LOOK, SITE = "/w/dip.rts", "/w/lake.rts", "/w/look.rts", "/w/site.rts"
 
 
-def place(desk: Desk, file: str, around: str) -> int:
+def place(desk: Workspace, file: str, around: str) -> int:
     text = desk.text(file) or ""
     before, _, after = around.partition("|")
     assert text.count(before + after) == 1, around
@@ -48,20 +48,20 @@ def place(desk: Desk, file: str, around: str) -> int:
         (LOOK, "dead|line", "x", "no name here"),
     ],
 )
-def test_refused(desk: Desk, file: str, around: str, name: str, why: str) -> None:
+def test_refused(desk: Workspace, file: str, around: str, name: str, why: str) -> None:
     found = rename(desk, FILES, desk.view(DIP), file, place(desk, file, around), name, DIALECT)
     assert isinstance(found, Refusal)
     assert why in found.text
 
 
-def test_refused_while_a_program_has_errors(desk: Desk) -> None:
+def test_refused_while_a_program_has_errors(desk: Workspace) -> None:
     desk.put("/w/half.rts", 'import "site.rts"\nzone half = union(pond')
     found = rename(desk, FILES, desk.view(DIP), SITE, place(desk, SITE, "zone po|nd"), "pool", DIALECT)
     assert isinstance(found, Refusal)
     assert "half.rts` has errors" in found.text
 
 
-def test_refused_where_a_rule_reads_the_parameter_of_two_skills(desk: Desk) -> None:
+def test_refused_where_a_rule_reads_the_parameter_of_two_skills(desk: Workspace) -> None:
     text = (desk.text(LAKE) or "").replace("forbid look by any when target", "forbid look, goto by any when target")
     desk.put(LAKE, text)
     found = renamable(desk, desk.view(DIP), LAKE, place(desk, LAKE, "goto by any when tar|get"))
@@ -69,7 +69,7 @@ def test_refused_where_a_rule_reads_the_parameter_of_two_skills(desk: Desk) -> N
     assert "`look` and `goto` at once" in found.text
 
 
-def test_through_all_files(desk: Desk) -> None:
+def test_through_all_files(desk: Workspace) -> None:
     """The zone with its entry, the argument's name in steps and rules, the signal with dots."""
     made = rename(desk, FILES, desk.view(DIP), LOOK, place(desk, LOOK, "height_abov|e: altitude"), "clearance", DIALECT)
     assert isinstance(made, Renaming)
@@ -93,7 +93,7 @@ NAMES = st.one_of(
 
 @settings(max_examples=settings().max_examples // 4)
 @given(st.data(), st.sampled_from(FILES), NAMES)
-def test_what_is_renamed_means_the_same(make_lake: Desk, data: st.DataObject, file: str, name: str) -> None:
+def test_what_is_renamed_means_the_same(make_lake: Workspace, data: st.DataObject, file: str, name: str) -> None:
     view = make_lake.view(DIP)
     places = [each for each in view.occurrences(file) if each.target.sort in RENAMED]
     each = data.draw(st.sampled_from(places))
@@ -116,7 +116,7 @@ def test_what_is_renamed_means_the_same(make_lake: Desk, data: st.DataObject, fi
         assert all(back.applied(one, changed.text(one) or "") == view.text(one) for one in made.places)
 
 
-def test_the_places_do_not_overlap(desk: Desk) -> None:
+def test_the_places_do_not_overlap(desk: Workspace) -> None:
     made = rename(desk, FILES, desk.view(DIP), SITE, place(desk, SITE, "zone po|nd"), "pool", DIALECT)
     assert isinstance(made, Renaming)
     for spans in made.places.values():

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.editor.desk import Desk
 from rtshcua.ground.editor.navigation import targets
+from rtshcua.ground.editor.occurrences import NameKind
 from rtshcua.ground.editor.rename import Renaming, rename
-from rtshcua.ground.editor.targets import Sort
+from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.library import root
 from rtshcua.mavlink import dialect
 
@@ -48,10 +48,10 @@ test "chief" { when up(30 m) by role chief expect deny at "use low(top = 25 m): 
 """  # fmt: skip  # noqa: E501
 S, T = "/w/s.rts", "/w/t.rts"
 SITE = {S: HEAD + OWN + POLICY, T: TESTS}
-Make = Callable[[dict[str, str]], Desk]
+Make = Callable[[dict[str, str]], Workspace]
 
 
-def asked(desk: Desk, file: str, around: str, name: str, files: tuple[str, ...]) -> Renaming | Refusal:
+def asked(desk: Workspace, file: str, around: str, name: str, files: tuple[str, ...]) -> Renaming | Refusal:
     text = desk.text(file) or ""
     before, _, after = around.partition("|")
     at = text.index(before + after) + len(before)
@@ -110,8 +110,8 @@ def test_the_type_of_a_signal_is_not_the_signal_of_that_name(make: Make) -> None
     desk = make({S: (SKILLS / "signals.rts").read_text()})
     text = desk.text(S) or ""
     declared, typed = text.index("signal position") + 7, text.index(": position") + 2
-    assert [each.sort for each in targets(desk.view(S), S, declared)] == [Sort.DECLARED]
-    assert [each.sort for each in targets(desk.view(S), S, typed)] == [Sort.TYPE]
+    assert [each.sort for each in targets(desk.view(S), S, declared)] == [NameKind.DECLARED]
+    assert [each.sort for each in targets(desk.view(S), S, typed)] == [NameKind.TYPE]
 
 
 def test_a_survey_pattern_keeps_its_name(make: Make) -> None:

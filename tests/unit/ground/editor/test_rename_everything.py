@@ -10,9 +10,9 @@ import pytest
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.editor.desk import Desk, View
-from rtshcua.ground.editor.pieces import Cut
+from rtshcua.ground.editor.incremental_parse import ParsedText
 from rtshcua.ground.editor.rename import RENAMED, rename
+from rtshcua.ground.editor.workspace import ProgramView, Workspace
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.program import examine_program
@@ -34,7 +34,7 @@ SEED = 20261122
 #: parts of the flat form that are where a source says it, and how
 TOLD = {"text", "start", "end", "source_digests"}
 NEW = "_zz"  # behind a name, and in none that there is
-_PARSED: dict[str, Cut] = {}
+_PARSED: dict[str, ParsedText] = {}
 
 
 class Named(NamedTuple):
@@ -52,13 +52,13 @@ class Told(NamedTuple):
     decided: Sequence[tuple[object, ...]]
 
 
-class _Anyones(Desk):
+class _Anyones(Workspace):
     """A desk on which the sources that ship may be changed as any others."""
 
     def is_shipped(self, name: str) -> bool:
         return False
 
-    def with_texts(self, texts: Mapping[str, str]) -> Desk:
+    def with_texts(self, texts: Mapping[str, str]) -> Workspace:
         other = super().with_texts(texts)
         other.__class__ = _Anyones
         return other
@@ -68,19 +68,19 @@ def _read(path: str) -> bytes:
     return Path(path).read_bytes()
 
 
-def _desk() -> Desk:
+def _desk() -> Workspace:
     desk = _Anyones(_read, str(root()), lambda folder: [each.name for each in Path(folder).iterdir()])
     desk._files = _PARSED
     return desk
 
 
-def _names(desk: Desk, file: str, files: tuple[str, ...]) -> Iterator[Named]:
+def _names(desk: Workspace, file: str, files: tuple[str, ...]) -> Iterator[Named]:
     for each in desk.view(file).occurrences(file):
         if each.declares and each.target.sort in RENAMED:
             yield Named(files, each.span)
 
 
-def told(view: View) -> Told:
+def told(view: ProgramView) -> Told:
     program = view.program
     checked = examine_program(program, DIALECT)
     found = [
@@ -105,7 +105,7 @@ def _plain(flat: Any) -> Any:
     return flat.replace(NEW, "") if isinstance(flat, str) else flat
 
 
-def hold(desk: Desk, before: dict[str, Told], named: Named, chance: Random, most: int) -> bool:
+def hold(desk: Workspace, before: dict[str, Told], named: Named, chance: Random, most: int) -> bool:
     """Renames, looks at `most` of the programs that change, and renames back; whether it could be renamed.
 
     `before` keeps what programs come to.

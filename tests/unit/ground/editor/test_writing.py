@@ -10,11 +10,10 @@ from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.editor.actions import actions, all_safe
-from rtshcua.ground.editor.completion import complete
-from rtshcua.ground.editor.desk import Desk
-from rtshcua.ground.editor.outline import folds, outline
-from rtshcua.ground.editor.pieces import cut
-from rtshcua.ground.editor.signatures import signature
+from rtshcua.ground.editor.code_completion import complete, signature
+from rtshcua.ground.editor.document_structure import folds, outline
+from rtshcua.ground.editor.incremental_parse import parse_text
+from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.mavlink import dialect
 
 FILE = "/w/new.rts"
@@ -26,7 +25,7 @@ MISSION = HEAD + "mission m under lake@1 on quad {\n  "
 SKILL = HEAD + "skill s(far: length in 1 m .. 5 m, area: zone) {\n  "
 
 
-def proposed(desk: Desk, before: str, after: str = "") -> dict[str, str]:
+def proposed(desk: Workspace, before: str, after: str = "") -> dict[str, str]:
     """What is proposed between two texts, with its kind."""
     now = desk.put(FILE, before + after)
     return {item.text: item.kind for item in complete(desk, desk.view(FILE), now, len(before), dialect.load())}
@@ -107,7 +106,7 @@ def proposed(desk: Desk, before: str, after: str = "") -> dict[str, str]:
         (POLICY + "forbid )\n  permit ", ["look"], ["pond"]),  # behind an error in the same block
     ],
 )  # fmt: skip
-def test_proposals(desk: Desk, before: str, some: list[str], none: list[str]) -> None:
+def test_proposals(desk: Workspace, before: str, some: list[str], none: list[str]) -> None:
     found = proposed(desk, before, "\n\nzone z = pond\n")
     assert [each for each in some if each not in found] == []
     assert [each for each in none if each in found] == []
@@ -115,7 +114,7 @@ def test_proposals(desk: Desk, before: str, some: list[str], none: list[str]) ->
 
 @settings(max_examples=settings().max_examples // 2)
 @given(st.integers(0, 10_000), st.integers(0, 400))
-def test_any_place_has_an_answer(make_lake: Desk, start: int, cut_off: int) -> None:
+def test_any_place_has_an_answer(make_lake: Workspace, start: int, cut_off: int) -> None:
     """Also in the middle of anything: no place makes it fail, and what is proposed begins where the word does."""
     text = "".join(make_lake.text(file) or "" for file in ("/w/site.rts", "/w/look.rts", "/w/lake.rts", "/w/dip.rts"))
     start %= len(text)
@@ -137,7 +136,7 @@ def test_any_place_has_an_answer(make_lake: Desk, start: int, cut_off: int) -> N
         ("phase a { nothing(", None, 0),
     ],
 )
-def test_signatures(desk: Desk, before: str, label: str | None, active: int) -> None:
+def test_signatures(desk: Workspace, before: str, label: str | None, active: int) -> None:
     now = desk.put(FILE, MISSION + before)
     found = signature(desk.view(FILE), now, len(MISSION + before))
     assert (found is None) == (label is None)
@@ -150,7 +149,7 @@ def test_signatures(desk: Desk, before: str, label: str | None, active: int) -> 
 def test_outline_and_folds() -> None:
     text = 'import "a"\nimport "b"\n\n// one\n// two\nenum e {\n  a = 1,\n  b = 2,\n}\n'
     text += "mission m under p@1 on q {\n  phase x { }\n}\n"
-    now = cut(Source(FILE, text))
+    now = parse_text(Source(FILE, text))
     assert [(each.kind, each.name, [one.name for one in each.inner]) for each in outline(now)] == [
         ("enum", "e", ["a", "b"]),
         ("mission", "m", ["x"]),
@@ -191,7 +190,7 @@ def test_actions() -> None:
     assert list(actions(found, "/w/other.rts", 0, 99, text)) == []
 
 
-def test_a_desk_reads_what_is_open_before_what_is_on_disk(make: Callable[[dict[str, str]], Desk]) -> None:
+def test_a_desk_reads_what_is_open_before_what_is_on_disk(make: Callable[[dict[str, str]], Workspace]) -> None:
     desk = make(
         {"/w/a.rts": 'import "b.rts"\nzone one = union(two, two)\n', "/w/b.rts": "zone two = circle(47 N, 8 E, 5 m)\n"}
     )

@@ -1,4 +1,4 @@
-"""The texts that are open in an editor, over the files on disk, and the programs that they make."""
+"""The workspace of an editor: the open texts over the files on disk, and the programs that they make."""
 
 import posixpath
 from collections.abc import Iterable, Iterator, Mapping
@@ -7,9 +7,8 @@ from itertools import chain
 
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.symbols import Symbols, collect
-from rtshcua.ground.editor.occurrences import occurrences
-from rtshcua.ground.editor.pieces import Cut, cut, cut_again
-from rtshcua.ground.editor.targets import Occurrence
+from rtshcua.ground.editor.incremental_parse import ParsedText, parse_edited, parse_text
+from rtshcua.ground.editor.occurrences import Occurrence, occurrences
 from rtshcua.ground.language.load import Listing, Program, Read, load
 from rtshcua.ground.language.parse import Parsed
 from rtshcua.ground.language.paths import SHELVES, Packs, shown
@@ -25,7 +24,7 @@ one that brings them back: so many texts from before such edits are kept.
 
 
 @dataclass(slots=True)
-class View:
+class ProgramView:
     """One program as it is just now: a file and all that it imports."""
 
     name: str
@@ -59,7 +58,7 @@ class View:
         return self._found[file]
 
 
-class Desk:
+class Workspace:
     """Open texts by the names of their files, as `shown` gives them. Nothing here reads a file but `read`, which may
     raise OSError; what it read is kept until `forget`.
     """
@@ -71,22 +70,22 @@ class Desk:
         self._library = library
         self._listing = listing
         self._packs: Packs = packs or (lambda _: None)
-        self._open: dict[str, Cut] = {}
-        self._earlier: dict[str, tuple[Cut, ...]] = {}
-        self._files: dict[str, Cut] = {}
+        self._open: dict[str, ParsedText] = {}
+        self._earlier: dict[str, tuple[ParsedText, ...]] = {}
+        self._files: dict[str, ParsedText] = {}
         self._bytes: dict[str, bytes] = {}
-        self._views: dict[str, View] = {}
+        self._views: dict[str, ProgramView] = {}
 
     @property
-    def open(self) -> Mapping[str, Cut]:
+    def open(self) -> Mapping[str, ParsedText]:
         """What is open."""
         return self._open
 
-    def put(self, name: str, text: str) -> Cut:
+    def put(self, name: str, text: str) -> ParsedText:
         """Opens a text, or changes it."""
         old = self._open.get(name)
         earlier = self._earlier.get(name, ())
-        self._open[name] = now = cut(Source(name, text)) if old is None else cut_again(old, text, earlier)
+        self._open[name] = now = parse_text(Source(name, text)) if old is None else parse_edited(old, text, earlier)
         if old is not None and len(now.pieces) + LOST < len(old.pieces):
             self._earlier[name] = (*earlier, old)[-KEPT:]
         self._views.clear()
@@ -103,18 +102,18 @@ class Desk:
         self._bytes.clear()
         self._views.clear()
 
-    def view(self, name: str) -> View:
+    def view(self, name: str) -> ProgramView:
         """The program of a file."""
         found = self._views.get(name)
         if found is None:
             program = load([name], self.read, self._library, self._listing, self._parse, self._packs)
             imports = Imports(program.units, program.stable)
-            found = self._views[name] = View(name, program, collect(program.units, program.broken), imports)
+            found = self._views[name] = ProgramView(name, program, collect(program.units, program.broken), imports)
         return found
 
-    def with_texts(self, texts: Mapping[str, str]) -> "Desk":
-        """Another desk, with these texts open besides; what is on disk was read already, and is not read again."""
-        other = Desk(self._read, self._library, self._listing, self._packs)
+    def with_texts(self, texts: Mapping[str, str]) -> "Workspace":
+        """Another workspace, with these texts open besides; what is on disk was read already, and is not read again."""
+        other = Workspace(self._read, self._library, self._listing, self._packs)
         other._open, other._files, other._bytes = dict(self._open), dict(self._files), dict(self._bytes)
         for name, text in texts.items():
             other.put(name, text)
@@ -129,7 +128,7 @@ class Desk:
         except (OSError, ValueError):
             return None
 
-    def views(self, names: Iterable[str]) -> Iterator[View]:
+    def views(self, names: Iterable[str]) -> Iterator[ProgramView]:
         """The programs of several files, and of all that are open."""
         seen: set[str] = set()
         for name in chain(tuple(self._open), names):
@@ -137,15 +136,15 @@ class Desk:
                 seen.add(name)
                 yield self.view(name)
 
-    def cut(self, name: str) -> Cut | None:
+    def cut(self, name: str) -> ParsedText | None:
         """A text in pieces, open or not; None where it cannot be had."""
         if name in self._open:
             return self._open[name]
         text = self.text(name)
         return None if text is None else self._cut(Source(name, text))
 
-    def learn(self, other: "Desk") -> None:
-        """Keeps what another desk has parsed of files on disk; each is held against its text before it counts."""
+    def learn(self, other: "Workspace") -> None:
+        """Keeps what another workspace has parsed of files on disk; each is held against its text before it counts."""
         self._files.update(other._files)
 
     def read(self, path: str) -> bytes:
@@ -176,7 +175,7 @@ class Desk:
     def _parse(self, source: Source) -> Parsed:
         return self._cut(source).parsed
 
-    def _cut(self, source: Source) -> Cut:
+    def _cut(self, source: Source) -> ParsedText:
         own = self._open.get(source.file)
         if own is not None and own.source.text == source.text:
             return own
@@ -184,5 +183,5 @@ class Desk:
         if known is None or known.source.text != source.text:
             if len(self._files) >= REMEMBERED:
                 self._files.clear()
-            known = self._files[source.file] = cut(source)
+            known = self._files[source.file] = parse_text(source)
         return known

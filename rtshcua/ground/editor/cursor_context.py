@@ -1,10 +1,10 @@
-"""What is asked at a place of an unfinished text: the tokens that the parser would take, and what a name is for."""
+"""What may stand at a place of an unfinished text: the tokens that the parser accepts, and the use of a name there."""
 
 from enum import Enum
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.editor.pieces import Cut
+from rtshcua.ground.editor.incremental_parse import ParsedText
 from rtshcua.ground.editor.syntax import Token, tokens
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.reader import Enough, Reader
@@ -17,7 +17,7 @@ _BEGINNINGS = frozenset(word for word in table().words if shifts(table().rows[0]
 _STOP = "\x01"  # at which no token begins, so the parser stops there with its stacks as they are
 
 
-class Wanted(Enum):
+class NameUse(Enum):
     """What a name at a place is for."""
 
     NOTHING = "a new name"
@@ -48,14 +48,14 @@ class Wanted(Enum):
     DAY = "day of the week"
 
 
-class Asked(NamedTuple):
+class AcceptedSymbols(NamedTuple):
     """The symbols that the parser would take, and the words of the language among them as they are written."""
 
     symbols: frozenset[str]
     words: tuple[str, ...]
 
 
-class Call(NamedTuple):
+class OpenCall(NamedTuple):
     """The innermost call that a place stands in: its name, the arguments before, and the name of the present one."""
 
     name: str
@@ -66,25 +66,30 @@ class Call(NamedTuple):
 
 #: what stands behind a word, until another of them
 _BEHIND = {
-    "under": Wanted.POLICY, "on": Wanted.VEHICLE, "use": Wanted.TEMPLATE, "from": Wanted.NOMINAL,
-    "permit": Wanted.SKILL, "forbid": Wanted.SKILL, "confirm": Wanted.SKILL, "degrade": Wanted.SKILL,
-    "delegate": Wanted.SKILL, "fallback": Wanted.SKILL, "contingency": Wanted.SKILL, "to": Wanted.SKILL,
-    "through": Wanted.SOURCE, "role": Wanted.ROLE, "class": Wanted.CLASS, "record": Wanted.RECORD,
-    "during": Wanted.PHASE, "inside": Wanted.ZONE, "outside": Wanted.ZONE, "airspace": Wanted.ZONE,
-    "when": Wanted.VALUE, "require": Wanted.VALUE, "assume": Wanted.VALUE, "maintain": Wanted.VALUE,
-    "and": Wanted.VALUE, "or": Wanted.VALUE, "not": Wanted.VALUE, "rising": Wanted.VALUE, "falling": Wanted.VALUE,
-    "without": Wanted.SIGNAL, "sizes": Wanted.SKILL,
-    "given": Wanted.SIGNAL, "table": Wanted.SIGNAL, "because": Wanted.REASON, "motion": Wanted.PARAMETER,
-    "by": Wanted.SOURCE, "union": Wanted.ZONE, "difference": Wanted.ZONE, "grow": Wanted.ZONE,
-    "policy": Wanted.NOTHING, "mission": Wanted.NOTHING, "skill": Wanted.NOTHING, "zone": Wanted.NOTHING,
-    "signal": Wanted.NOTHING, "enum": Wanted.NOTHING, "vehicle": Wanted.NOTHING, "template": Wanted.NOTHING,
-    "nominal": Wanted.NOTHING, "phase": Wanted.NOTHING,
-    "flies": Wanted.MISSION, "aboard": Wanted.AUTOPILOT, "ends": Wanted.ENDING, "after": Wanted.SKILL,
-    "never": Wanted.SKILL, "lands": Wanted.ZONE, "distance": Wanted.ZONE,
+    "under": NameUse.POLICY, "on": NameUse.VEHICLE, "use": NameUse.TEMPLATE, "from": NameUse.NOMINAL,
+    "permit": NameUse.SKILL, "forbid": NameUse.SKILL, "confirm": NameUse.SKILL, "degrade": NameUse.SKILL,
+    "delegate": NameUse.SKILL, "fallback": NameUse.SKILL, "contingency": NameUse.SKILL, "to": NameUse.SKILL,
+    "through": NameUse.SOURCE, "role": NameUse.ROLE, "class": NameUse.CLASS, "record": NameUse.RECORD,
+    "during": NameUse.PHASE, "inside": NameUse.ZONE, "outside": NameUse.ZONE, "airspace": NameUse.ZONE,
+    "when": NameUse.VALUE, "require": NameUse.VALUE, "assume": NameUse.VALUE, "maintain": NameUse.VALUE,
+    "and": NameUse.VALUE, "or": NameUse.VALUE, "not": NameUse.VALUE, "rising": NameUse.VALUE, "falling": NameUse.VALUE,
+    "without": NameUse.SIGNAL, "sizes": NameUse.SKILL,
+    "given": NameUse.SIGNAL, "table": NameUse.SIGNAL, "because": NameUse.REASON, "motion": NameUse.PARAMETER,
+    "by": NameUse.SOURCE, "union": NameUse.ZONE, "difference": NameUse.ZONE, "grow": NameUse.ZONE,
+    "policy": NameUse.NOTHING, "mission": NameUse.NOTHING, "skill": NameUse.NOTHING, "zone": NameUse.NOTHING,
+    "signal": NameUse.NOTHING, "enum": NameUse.NOTHING, "vehicle": NameUse.NOTHING, "template": NameUse.NOTHING,
+    "nominal": NameUse.NOTHING, "phase": NameUse.NOTHING,
+    "flies": NameUse.MISSION, "aboard": NameUse.AUTOPILOT, "ends": NameUse.ENDING, "after": NameUse.SKILL,
+    "never": NameUse.SKILL, "lands": NameUse.ZONE, "distance": NameUse.ZONE,
 }  # fmt: skip
 
 
-def asked(cut: Cut, offset: int) -> Asked:
+def last_declaration_start(text: ParsedText, offset: int) -> int:
+    """Where the last declaration before a place begins that the parser may begin at."""
+    return max((piece.start for piece in text.pieces if piece.firm and piece.start <= offset), default=0)
+
+
+def accepted_symbols(cut: ParsedText, offset: int) -> AcceptedSymbols:
     """What the parser would take at a place, given all that stands before it."""
     text = cut.source.text[:offset] + _STOP
     start = max((piece.start for piece in cut.pieces if piece.firm and piece.start < offset), default=None)
@@ -99,14 +104,14 @@ def asked(cut: Cut, offset: int) -> Asked:
             if failure.start >= offset:
                 symbols = accepted(automaton)
                 words = (phrase(automaton, each) for each in symbols if each.replace("_", "").isalpha())
-                return Asked(frozenset(symbols), tuple(sorted(words)))
+                return AcceptedSymbols(frozenset(symbols), tuple(sorted(words)))
             at = resume(automaton, misread(automaton, failure).start)
     except Enough:
         pass
-    return Asked(frozenset(), ())
+    return AcceptedSymbols(frozenset(), ())
 
 
-def before(text: str, offset: int, since: int) -> list[Token]:
+def tokens_before(text: str, offset: int, since: int) -> list[Token]:
     """The tokens of the declaration that a place is in, without comments. One that is not whole is told by its first
     word at the beginning of a line.
     """
@@ -115,17 +120,17 @@ def before(text: str, offset: int, since: int) -> list[Token]:
     return found[max(begins, default=0) :]
 
 
-def wanted(written: list[Token]) -> Wanted:
+def name_use(written: list[Token]) -> NameUse:
     """What a name is for behind these tokens."""
     last = written[-1].text if written else ""
     if last in ("==", "!=", "<", "<=", ">", ">="):
-        return Wanted.COMPARED
+        return NameUse.COMPARED
     head = written[0].text if written else ""
     if head in ("signal", "enum"):
         return _of_signal(written, head)
-    call = call_of(written)
+    call = open_call(written)
     if call is not None:
-        return _within(written, call, last)
+        return _in_call(written, call, last)
     depth = 0
     for number, token in enumerate(reversed(written)):
         if token.text in (")", "}"):
@@ -137,56 +142,56 @@ def wanted(written: list[Token]) -> Wanted:
         elif depth == 0 and token.kind == "word" and token.text in _BEHIND:
             follows = written[len(written) - number : len(written) - number + 1]
             if token.text == "phase" and follows and follows[0].text == "in":
-                return Wanted.PHASE
-            return _behind(written, len(written) - 1 - number)
-    return Wanted.VALUE
+                return NameUse.PHASE
+            return _behind_word(written, len(written) - 1 - number)
+    return NameUse.VALUE
 
 
-def _behind(written: list[Token], at: int) -> Wanted:
+def _behind_word(written: list[Token], at: int) -> NameUse:
     """What stands behind a word, which may depend on the word before it."""
     word, before_it = written[at].text, written[at - 1].text if at else ""
     if word == "on":
         header = written[0].text == "mission" and all(token.text != "{" for token in written)
-        return Wanted.VEHICLE if header or written[0].text == "nominal" else Wanted.DAY
+        return NameUse.VEHICLE if header or written[0].text == "nominal" else NameUse.DAY
     if word == "flies" and before_it == "expect":
-        return Wanted.SKILL
-    return Wanted.ZONE if word == "to" and before_it == "distance" else _BEHIND[word]
+        return NameUse.SKILL
+    return NameUse.ZONE if word == "to" and before_it == "distance" else _BEHIND[word]
 
 
-def _of_signal(written: list[Token], head: str) -> Wanted:
+def _of_signal(written: list[Token], head: str) -> NameUse:
     marks = {token.text for token in written}
     if head == "enum":
-        return Wanted.DIALECT_ENUM if "=" in marks and "{" not in marks else Wanted.NOTHING
+        return NameUse.DIALECT_ENUM if "=" in marks and "{" not in marks else NameUse.NOTHING
     if "=" in marks:
-        return Wanted.COMPARED if "unknown" in marks else Wanted.MESSAGE
-    return Wanted.TYPE if ":" in marks else Wanted.NOTHING
+        return NameUse.COMPARED if "unknown" in marks else NameUse.MESSAGE
+    return NameUse.TYPE if ":" in marks else NameUse.NOTHING
 
 
-def _within(written: list[Token], call: Call, last: str) -> Wanted:
+def _in_call(written: list[Token], call: OpenCall, last: str) -> NameUse:
     if call.name in ("union", "difference", "grow", "circle", "polygon", "corridor"):
-        return Wanted.ZONE
+        return NameUse.ZONE
     if call.name in ("abs", "min", "max", "and", "or", "when", "require", "assume", "maintain", "not"):
-        return Wanted.VALUE
+        return NameUse.VALUE
     header = written[0].text in ("skill", "template", "mission") and not any(each.text == "{" for each in written)
     if header:
-        return Wanted.TYPE if last == ":" else Wanted.NOTHING
-    return Wanted.ARGUMENT
+        return NameUse.TYPE if last == ":" else NameUse.NOTHING
+    return NameUse.ARGUMENT
 
 
-def _in_block(outer: list[Token], last: str) -> Wanted:
+def _in_block(outer: list[Token], last: str) -> NameUse:
     """In `{ }`, where no word tells: the steps of a phase, the members that are compared with, the cells of a table."""
     said = [token.text for token in outer if token.kind == "word"][-2:]
     if "phase" in said[:1] or "repeat" in said:
-        return Wanted.STEP
-    return Wanted.COMPARED if "in" in said else Wanted.VALUE
+        return NameUse.STEP
+    return NameUse.COMPARED if "in" in said else NameUse.VALUE
 
 
-def sizing(written: list[Token]) -> bool:
+def in_sizes(written: list[Token]) -> bool:
     """Whether a place is among the sizes that a program gives to a skill."""
     return bool(written) and written[0].text == "sizes"
 
 
-def call_of(written: list[Token]) -> Call | None:
+def open_call(written: list[Token]) -> OpenCall | None:
     """The innermost call that is open."""
     depth, position, argument = 0, 0, None
     named: list[str] = []
@@ -201,7 +206,9 @@ def call_of(written: list[Token]) -> Call | None:
         elif text == "(":
             if depth == 0:
                 name = written[number - 1] if number else None
-                return None if name is None or name.kind != "word" else Call(name.text, position, argument, (*named,))
+                return (
+                    None if name is None or name.kind != "word" else OpenCall(name.text, position, argument, (*named,))
+                )
             depth -= 1
         elif depth == 0 and text == ",":
             position += 1

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics.excerpt import hiding
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.editor import pieces
-from rtshcua.ground.editor.pieces import Cut, cut, cut_again
+from rtshcua.ground.editor import incremental_parse
+from rtshcua.ground.editor.incremental_parse import ParsedText, parse_edited, parse_text
 from rtshcua.ground.language.parse import parse
 from rtshcua.library import root
 
@@ -27,11 +27,11 @@ PARTS = (
 
 
 def agree(old: str, *texts: str) -> None:
-    now = cut(Source("a.rts", old))
+    now = parse_text(Source("a.rts", old))
     assert now.parsed == parse(Source("a.rts", old))
-    earlier: tuple[Cut, ...] = ()
+    earlier: tuple[ParsedText, ...] = ()
     for text in texts:
-        earlier, now = (*earlier, now), cut_again(now, text, earlier)
+        earlier, now = (*earlier, now), parse_edited(now, text, earlier)
         whole = parse(Source("a.rts", text))
         assert now.parsed.diagnostics == whole.diagnostics
         assert now.parsed == whole
@@ -70,24 +70,28 @@ def test_one_character_at_each_place(char: str) -> None:
 def test_few_pieces_are_parsed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The point of it: an edit in one declaration of many has the parser read that one, and see the next."""
     text = "".join(f"zone z{n} = circle(47.39{n:03} N, 8.54 E, 5 m) // {n}\n" for n in range(200))
-    old = cut(Source("a.rts", text))
+    old = parse_text(Source("a.rts", text))
     read: list[int] = []
-    plain = pieces._Cutting.close
-    monkeypatch.setattr(pieces._Cutting, "close", lambda self, *a, **k: (read.append(1), plain(self, *a, **k))[1])
+    plain = incremental_parse._PieceBuilder.close
+    monkeypatch.setattr(
+        incremental_parse._PieceBuilder, "close", lambda self, *a, **k: (read.append(1), plain(self, *a, **k))[1]
+    )
     for change in (("5 m) // 100\n", "55 m) // 100\n"), ("// 100", "// one hundred"), ("zone z100", "zone other")):
         read.clear()
-        now = cut_again(old, text.replace(*change, 1))
+        now = parse_edited(old, text.replace(*change, 1))
         assert now.parsed == parse(now.source)
         assert len(read) <= 2
 
 
 def test_a_comment_that_is_closed_again_brings_back_what_was_read(monkeypatch: pytest.MonkeyPatch) -> None:
     text = "".join(f"zone z{n} = circle(47.39{n:03} N, 8.54 E, 5 m) // {n}\n" for n in range(200))
-    before = cut(Source("a.rts", text))
-    opened = cut_again(before, text.replace("zone z50", "/* zone z50"))
+    before = parse_text(Source("a.rts", text))
+    opened = parse_edited(before, text.replace("zone z50", "/* zone z50"))
     read: list[int] = []
-    plain = pieces._Cutting.close
-    monkeypatch.setattr(pieces._Cutting, "close", lambda self, *a, **k: (read.append(1), plain(self, *a, **k))[1])
+    plain = incremental_parse._PieceBuilder.close
+    monkeypatch.setattr(
+        incremental_parse._PieceBuilder, "close", lambda self, *a, **k: (read.append(1), plain(self, *a, **k))[1]
+    )
     for now in (text, text.replace("zone z50", "/* */ zone z50")):
-        assert cut_again(opened, now, (before,)).parsed == parse(Source("a.rts", now))
+        assert parse_edited(opened, now, (before,)).parsed == parse(Source("a.rts", now))
         assert len(read) <= 2

@@ -11,13 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 809,
+    "modules": 798,
     "code lines": 84_417,
-    "shared class names": 62,
-    "of them across packages": 41,
+    "shared class names": 58,
+    "of them across packages": 38,
     "shared file names": 95,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 38,
+    "modules below 80 lines with one importer": 35,
     "functions of more than 60 lines": 21,
     "functions of a complexity over 15": 150,
     "functions of a complexity over 25": 9,

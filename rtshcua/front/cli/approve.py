@@ -29,7 +29,7 @@ from rtshcua.front.cli.documents import WHERE, WHOSE, deliver
 from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.unlock import terminal, unlock_person
-from rtshcua.ground.analysis.confirming import may_match
+from rtshcua.ground.analysis.solve import may_match
 from rtshcua.ground.lower.signed_paths import PlannedPath, path_planned_otherwise
 from rtshcua.model.step_number import index_of, number_of
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval

@@ -1,4 +1,4 @@
-"""What is asked of the time of day, or of the week, at which something begins that is not known yet."""
+"""What a step requires of the time of day, or of the week, at which its mission is issued, which is not known yet."""
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
@@ -14,7 +14,7 @@ class Arc(NamedTuple):
     length: int
 
 
-class Asked(NamedTuple):
+class IssueRequirement(NamedTuple):
     """One of these arcs of each `period` must hold all from `low` to `high` us after the issue; where it is written."""
 
     arcs: tuple[Arc, ...]
@@ -32,7 +32,7 @@ class Asked(NamedTuple):
         )
 
 
-def met_by_some(asked: Sequence[Asked]) -> bool:
+def met_by_some(asked: Sequence[IssueRequirement]) -> bool:
     """Whether some time of issue meets all; each is met from some moments on, so by one of these, or none."""
     whole = max((one.period for one in asked), default=1)
     issues = {0} | {

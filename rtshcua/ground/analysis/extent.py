@@ -1,10 +1,13 @@
-"""How far a condition reaches: bounds outside of which it cannot hold, and the conjunction that it is.
+"""How far a condition reaches: bounds outside of which it cannot hold, and the conjunction that it is; and of many such
+bounds those that enclose others, by a k-d tree.
 
 What many rules have in common is asked of these first, for comparing numbers costs a thousandth of a search over boxes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from heapq import heappop, heappush
 from math import isqrt
+from operator import lt
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
@@ -23,7 +26,7 @@ PHASE: Final[Cell] = (False, -1)
 _PARTS = 8
 
 
-class Other(NamedTuple):
+class OtherCondition(NamedTuple):
     """A condition that is no bounds. Its kind is told in `words`: nodes of two kinds with the same fields are equal."""
 
     words: str
@@ -34,7 +37,7 @@ class Conjunction(NamedTuple):
     """Bounds that must hold, and other conditions that must."""
 
     bounds: Bounds
-    others: frozenset[Other]
+    others: frozenset[OtherCondition]
 
 
 def alternatives(node: tree.Node) -> tuple[Conjunction, ...]:
@@ -42,7 +45,7 @@ def alternatives(node: tree.Node) -> tuple[Conjunction, ...]:
     are kept, for what they are about may be missing.
     """
     found = _alternatives(node, holds=True)
-    return (Conjunction({}, frozenset((Other(repr(node), node),))),) if found is None else tuple(found)
+    return (Conjunction({}, frozenset((OtherCondition(repr(node), node),))),) if found is None else tuple(found)
 
 
 def _alternatives(node: tree.Node, *, holds: bool) -> list[Conjunction] | None:
@@ -62,7 +65,7 @@ def _alternatives(node: tree.Node, *, holds: bool) -> list[Conjunction] | None:
     written = node if holds else tree.Negation(node)
     interval = _interval(written)
     if interval is None:
-        return [Conjunction({}, frozenset((Other(repr(written), written),)))]
+        return [Conjunction({}, frozenset((OtherCondition(repr(written), written),)))]
     cell, low, high = interval
     return [Conjunction({cell: (low, high)}, frozenset())]
 
@@ -91,11 +94,11 @@ class Extents:
                     return _few([*one, *other])
                 return _few([both for a in one for b in other for both in [_common(a, b)] if both is not None])
             case tree.AtMost(terms, bound):
-                return _linear(terms, -FAR, bound) if holds else _linear(terms, bound + 1, FAR)
+                return _sum_bounds(terms, -FAR, bound) if holds else _sum_bounds(terms, bound + 1, FAR)
             case tree.Equal(terms, value):
                 if holds:
-                    return _linear(terms, value, value)
-                return [*_linear(terms, -FAR, value - 1), *_linear(terms, value + 1, FAR)]
+                    return _sum_bounds(terms, value, value)
+                return [*_sum_bounds(terms, -FAR, value - 1), *_sum_bounds(terms, value + 1, FAR)]
             case tree.Member(argument, at, members) if holds:
                 return [_hull((argument, at), self._tables.sets[members])]
             case tree.PhaseIn(members) if holds:
@@ -113,11 +116,11 @@ class Extents:
     def _box(self, number: int) -> tuple[int, int, int, int]:
         found = self._around.get(number)
         if found is None:
-            found = self._around[number] = _around(self._zones[number])
+            found = self._around[number] = _zone_bounds(self._zones[number])
         return found
 
 
-def _around(zone: Zone) -> tuple[int, int, int, int]:
+def _zone_bounds(zone: Zone) -> tuple[int, int, int, int]:
     """West, south, east and north of a zone's ground plan."""
     if zone.shape == CIRCLE:
         x, y, square = zone.data
@@ -144,7 +147,7 @@ def _interval(node: tree.Node) -> tuple[Cell, int, int] | None:
             return None
 
 
-def _linear(terms: tuple[tree.LinearTerm, ...], low: int, high: int) -> list[Bounds]:
+def _sum_bounds(terms: tuple[tree.LinearTerm, ...], low: int, high: int) -> list[Bounds]:
     """The bounds of a sum in `low`..`high`; any, where it is of several cells."""
     moving = [term for term in terms if term.factor]
     if len(moving) != 1:
@@ -183,3 +186,99 @@ def _few(parts: list[Bounds]) -> list[Bounds]:
         return parts
     cells = set(parts[0]).intersection(*parts[1:])
     return [{cell: (min(part[cell][0] for part in parts), max(part[cell][1] for part in parts)) for cell in cells}]
+
+
+Row: TypeAlias = tuple[int, ...]
+
+_LEAF = 8
+
+
+class _Node:
+    """Some entries, or two nodes: the greatest number on each side, and the first and the last that are there."""
+
+    __slots__ = ("children", "entries", "first", "last", "most", "parent")
+
+    def __init__(self, entries: list[tuple[int, Row]], parent: "_Node | None", depth: int) -> None:
+        self.parent = parent
+        self.most: Row = tuple(map(max, zip(*(row for _, row in entries), strict=True)))
+        self.entries: dict[int, list[Row]] = {}
+        self.children: tuple[_Node, ...] = ()
+        self.first = min(number for number, _ in entries)
+        self.last = max(number for number, _ in entries)
+        side = self._side(entries, depth) if len(entries) > _LEAF else None
+        if side is None:
+            for number, row in entries:
+                self.entries.setdefault(number, []).append(row)
+            return
+        entries.sort(key=lambda each: each[1][side])
+        middle = len(entries) // 2
+        self.children = tuple(_Node(part, self, side + 1) for part in (entries[:middle], entries[middle:]))
+
+    def _side(self, entries: list[tuple[int, Row]], depth: int) -> int | None:
+        """The side by which the entries are parted, each in its turn; None where all are alike."""
+        sides = len(self.most)
+        for turn in range(sides):
+            side = (depth + turn) % sides
+            if any(row[side] != self.most[side] for _, row in entries):
+                return side
+        return None
+
+    def without(self, number: int) -> None:
+        """Take out an entry, and say so above."""
+        del self.entries[number]
+        node: _Node | None = self
+        while node is not None:
+            within = [(each.first, each.last) for each in node.children if each.last >= 0] or [
+                (each, each) for each in node.entries
+            ]
+            node.first, node.last = (
+                (min(each[0] for each in within), max(each[1] for each in within)) if within else (0, -1)
+            )
+            node = node.parent
+
+
+class EnclosingBoxes:
+    """The rows of numbered boxes; one number may have several. What was removed is not found any more."""
+
+    def __init__(self, entries: Sequence[tuple[int, Row]]) -> None:
+        self._root = _Node(list(entries), None, 0) if entries else None
+        self._leaves: dict[int, dict[_Node, None]] = {}
+        waiting = [] if self._root is None else [self._root]
+        while waiting:
+            node = waiting.pop()
+            waiting += node.children
+            for number in node.entries:
+                self._leaves.setdefault(number, {})[node] = None
+
+    def remove(self, number: int) -> None:
+        """Forget a box, if it is there."""
+        for leaf in self._leaves.pop(number, ()):
+            leaf.without(number)
+
+    def around(self, row: Row, after: int = -1) -> Iterator[int]:
+        """The numbers above `after` of the boxes that enclose a row, the least first, each once."""
+        heap: list[tuple[int, int, _Node | None]] = []
+        count = 0
+        last = after
+
+        def enter(node: _Node) -> None:
+            nonlocal count
+            if node.last > after and not any(map(lt, node.most, row)):
+                count += 1
+                heappush(heap, (node.first, count, node))
+
+        if self._root is not None:
+            enter(self._root)
+        while heap:
+            number, _, node = heappop(heap)
+            if node is None:
+                if number > last:
+                    last = number
+                    yield number
+                continue
+            for child in node.children:
+                enter(child)
+            for entry, rows in node.entries.items():
+                if entry > last and any(not any(map(lt, each, row)) for each in rows):
+                    count += 1
+                    heappush(heap, (entry, count, None))

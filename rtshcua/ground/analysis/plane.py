@@ -7,8 +7,10 @@ from typing import Protocol
 from rtshcua.decision.outline import rings as outline
 from rtshcua.ground.geometry.polygons import Point, Ring
 from rtshcua.ground.geometry.shapes import Region, are_disjoint, bounds, lies_within, shape_of
-from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE, Zone
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zone
 
+#: straight pieces of a quarter circle, where floats draw one
+_QUARTER = 64
 #: how finely a zone is searched for a place before shapely is asked
 _GRID = 8
 _FAR: tuple[Point, ...] = (
@@ -64,7 +66,7 @@ class Plane:
 
     def _region(self, number: int) -> Region | None:
         if number not in self._regions:
-            self._regions[number] = _region(self._zones[number])
+            self._regions[number] = _exact_region(self._zones[number])
         return self._regions[number]
 
     def contains(self, zone: int, place: Point) -> bool:
@@ -111,13 +113,32 @@ class Plane:
 
 
 def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iterator[Point]:
-    """Places within what is left of some zones without others, as floats tell; for the caller to verify."""
-    from rtshcua.ground.analysis.shapely_places import places  # noqa: PLC0415  shapely is slow to import
+    """Places within what is left of some zones without others: one in each part, the largest part first. Floats find
+    them: each is only a guess, to be verified.
+    """
+    import shapely  # noqa: PLC0415  it is slow to import
 
-    yield from places([zones[zone] for zone in inside], [zones[zone] for zone in outside])
+    def plan(zone: Zone) -> shapely.Geometry:
+        if zone.shape == CIRCLE:
+            x, y, square = zone.data
+            return shapely.Point(x, y).buffer(square**0.5, quad_segs=_QUARTER)
+        found = shapely.Polygon()
+        for ring in rings_of(zone):  # a hole takes away from what is around it, a part in a hole adds
+            found = found.symmetric_difference(shapely.Polygon(ring))
+        return found
+
+    left = plan(zones[inside[0]])
+    for zone in inside[1:]:
+        left = left.intersection(plan(zones[zone]))
+    for zone in outside:
+        left = left.difference(plan(zones[zone]))
+    parts = [part for part in shapely.get_parts(left) if part.area > 0]
+    for part in sorted(parts, key=lambda each: -float(each.area)):
+        point = part.representative_point()
+        yield round(point.x), round(point.y)
 
 
-def _region(zone: Zone) -> Region | None:
+def _exact_region(zone: Zone) -> Region | None:
     """The ground plan of a zone for the exact relations; None for a circle whose radius is no whole number."""
     shape = shape_of(zone)
     return None if shape is None else Region(shape, LOWEST, HIGHEST)
@@ -130,7 +151,7 @@ def rings_of(zone: Zone) -> tuple[Ring, ...]:
 
 def _bounds(zone: Zone) -> tuple[int, int, int, int]:
     """West, south, east, north of a zone."""
-    region = _region(zone)
+    region = _exact_region(zone)
     if region is not None:
         return bounds(region.shape)
     x, y, square = zone.data

@@ -1,4 +1,4 @@
-"""What a situation may be: the start of every search."""
+"""What a situation may be: the start of every search. And what a signal as it is read on board may report."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
@@ -9,21 +9,39 @@ from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.times import LocalTime
 from rtshcua.decision.values import MISSING, Span, Value, interval, maybe, members
 from rtshcua.ground.analysis.plane import Plane
-from rtshcua.ground.analysis.reported import means_unknown
+from rtshcua.ground.checker.ranges import OPEN, Carrier, carried
+from rtshcua.ground.checker.symbols import Extent
+from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract
 from rtshcua.model.flat.limits import DAY, FULL, MAX_VALUE, WEEK
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
+from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, Signal
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.quantity import Dimension
+
+
+def means_unknown(signal: Signal, value: int) -> bool:
+    """Whether the value of an enumeration is one that each of its sources lists under `unknown at`."""
+    return signal.kind == ENUMERATION and all(value in source.unknown for source in signal.sources)
+
+
+def reported_range(signal: Signal, dialect: Dialect) -> Extent:
+    """From the least to the greatest value of a number; open for what is none, or is read from an unknown message."""
+    if signal.kind != NUMBER or any(source.message not in dialect.messages for source in signal.sources):
+        return OPEN
+    carriers = (
+        Carrier(source.message, source.fields, source.numerator, source.denominator) for source in signal.sources
+    )
+    return carried(dialect, Dimension(signal.dimension), carriers)
+
 
 ANYWHERE = interval(-MAX_COORDINATE, MAX_COORDINATE)
 #: dimensions in which nothing is below zero, and what is the most
 _WHOLE = frozenset({Dimension.RATIO.value})
 
 
-class Space(NamedTuple):
+class SituationSpace(NamedTuple):
     """A set of situations: a value for each argument cell and state slot, UTC and its error.
 
     `phases` are the phases that the invocation may be in, as indexes into the policy's names; -1 stands for all that
@@ -40,13 +58,13 @@ class Space(NamedTuple):
     plane: Plane
 
 
-def space_of(prepared: PreparedPolicy, contract: Contract | None, plane: Plane | None = None) -> Space:
+def space_of(prepared: PreparedPolicy, contract: Contract | None, plane: Plane | None = None) -> SituationSpace:
     """Any situation that an invocation of a skill may be met in; None: of any skill, without its arguments.
 
     Pass the `plane` of an earlier space of the policy, which remembers how its zones lie.
     """
     policy = prepared.policy
-    return Space(
+    return SituationSpace(
         arguments=() if contract is None else arguments_of(contract),
         slots=(*signals(policy), MISSING),
         utc=_moments(prepared, contract),

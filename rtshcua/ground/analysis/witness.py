@@ -1,15 +1,23 @@
-"""A single situation out of a box, and its replay in the evaluator that decides on board."""
+"""A single situation out of a box, its replay in the evaluator that decides on board, and its words, as in
+`battery = 20 % and wind.speed = 7 m/s`.
+"""
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
+from rtshcua.decision.times import LocalTime, time_of_week
 from rtshcua.decision.values import ABSENT, MISSING, PRESENT, TRUE, Truth, Value, point
-from rtshcua.ground.analysis.box import VEHICLE, Box, Cell, Who, clipped
-from rtshcua.ground.analysis.narrow import narrow
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.box import VEHICLE, Cell, ValueBox, Who, clipped, narrow
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.geometry.polygons import Point
+from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Contract
+from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
+from rtshcua.model.flat.zone import unproject
+from rtshcua.model.quantity import Dimension, display
 
 #: how many values of a cell are tried where sums tie it to others
 _TRIES = 3
@@ -21,15 +29,15 @@ class Witness(NamedTuple):
     at: Environment
     cells: Mapping[Cell, int | None]
     places: Mapping[Who, Point | None]
-    box: Box
+    box: ValueBox
 
-    def truth(self, node: tree.Node, space: Space) -> Truth:
+    def truth(self, node: tree.Node, space: SituationSpace) -> Truth:
         """The truth of a condition in this situation."""
         self.at.place = None
         return build(node, space.tables)(self.at)
 
 
-def witness(box: Box, space: Space) -> Witness | None:
+def witness(box: ValueBox, space: SituationSpace) -> Witness | None:
     """A situation in the box, which narrowing found nothing against; None where none was found."""
     tied = {(term.argument, term.at) for form in box.forms for term in form}
     fixed = _fixed(box, space, [cell for cell in sorted(tied) if not box.cells[cell][2]])
@@ -47,12 +55,12 @@ def witness(box: Box, space: Space) -> Witness | None:
     return Witness(_environment(fixed, cells, places, space), cells, places, fixed)
 
 
-def plain(space: Space) -> Environment:
+def plain(space: SituationSpace) -> Environment:
     """One situation of a space: of each value the plainest, and nothing of what may be missing."""
-    return _environment(Box({}, {}, {}, {}, space.utc, space.phases, 0), {}, {}, space)
+    return _environment(ValueBox({}, {}, {}, {}, space.utc, space.phases, 0), {}, {}, space)
 
 
-def halves(box: Box) -> list[Box]:
+def halves(box: ValueBox) -> list[ValueBox]:
     """The box with the first half of the widest value that a sum ties to others, and with the other half."""
     tied = [
         cell for form in box.forms for cell in ((term.argument, term.at) for term in form) if not box.cells[cell][2]
@@ -83,7 +91,7 @@ def plainest(value: Value) -> int:
     return -(-low // step) * step if low > 0 else high // step * step
 
 
-def _fixed(box: Box, space: Space, tied: list[Cell]) -> Box | None:
+def _fixed(box: ValueBox, space: SituationSpace, tied: list[Cell]) -> ValueBox | None:
     """The box with single values in the cells that sums tie together."""
     if not tied:
         return box
@@ -98,7 +106,7 @@ def _fixed(box: Box, space: Space, tied: list[Cell]) -> Box | None:
     return None
 
 
-def _place(box: Box, who: Who, space: Space) -> Point | None:
+def _place(box: ValueBox, who: Who, space: SituationSpace) -> Point | None:
     sides = {zone: side == TRUE for (other, zone), side in box.sides.items() if other == who and side in (1, 2)}
     if who == VEHICLE:
         x, y = space.slots[space.tables.known.x], space.slots[space.tables.known.y]
@@ -114,7 +122,7 @@ def _place(box: Box, who: Who, space: Space) -> Point | None:
 
 
 def _environment(
-    box: Box, cells: Mapping[Cell, int | None], places: Mapping[Who, Point | None], space: Space
+    box: ValueBox, cells: Mapping[Cell, int | None], places: Mapping[Who, Point | None], space: SituationSpace
 ) -> Environment:
     slots = [_any(value) for value in space.slots]
     arguments = [_any(value) for value in space.arguments]
@@ -138,3 +146,80 @@ def _any(value: Value) -> Value:
     if gap != PRESENT:
         return MISSING
     return point(plainest((low, high, gap, elements)))
+
+
+#: what of a coordinate a person reads: 1e-7 degree in 1e-5, about a metre
+_DEGREE = 10_000_000
+
+
+def witness_text(witness: Witness, policy: Policy, contract: Contract | None) -> str:
+    """What the conditions read in a witness, in the order of arguments, signals and the rest."""
+    found = [each for each in (_argument(witness, cell, policy, contract) for cell in _cells(contract)) if each]
+    for signal in policy.signals:
+        if signal.kind == POSITION:
+            continue
+        cell = (False, signal.slot)
+        if cell in witness.cells:
+            value = witness.cells[cell]
+            found.append(
+                f"`{signal.name}` unknown" if value is None else f"`{signal.name} = {_signal_text(signal, value)}`"
+            )
+    if VEHICLE in witness.places:
+        place = witness.places[VEHICLE]
+        found.append("the position unknown" if place is None else f"the vehicle at {_place_text(place, policy)}")
+    return " and ".join(found) or "any time"
+
+
+def _cells(contract: Contract | None) -> list[int]:
+    return [] if contract is None else [parameter.cell for parameter in contract.parameters]
+
+
+def _argument(witness: Witness, cell: int, policy: Policy, contract: Contract | None) -> str | None:
+    assert contract is not None
+    parameter = next(each for each in contract.parameters if each.cell == cell)
+    if parameter.kind == PLACE:
+        place = witness.places.get(cell)
+        return None if place is None else f"`{parameter.name} = {_place_text(place, policy)}`"
+    value = witness.cells.get((True, cell))
+    if value is None:
+        return None
+    if parameter.kind == QUANTITY:
+        text = _quantity(value, parameter.dimension)
+    elif parameter.kind == ZONE:
+        text = policy.zones[value].name
+    else:
+        text = parameter.labels[value]
+    return f"`{parameter.name} = {text}`"
+
+
+def _signal_text(signal: Signal, value: int) -> str:
+    if signal.kind == ENUMERATION:
+        return dict(signal.labels).get(value, str(value))
+    return _quantity(value, signal.dimension)
+
+
+def _quantity(value: int, dimension: str) -> str:
+    try:
+        return display(value, Dimension(dimension))
+    except ValueError:
+        return str(value)
+
+
+def _place_text(place: tuple[int, int], policy: Policy) -> str:
+    latitude, longitude = unproject(policy.projection, *place)
+    return f"{_degrees(latitude)} N, {_degrees(longitude)} E"
+
+
+def _degrees(value: int) -> str:
+    whole, rest = divmod(abs(value) + 50, _DEGREE)
+    return f"{'-' if value < 0 else ''}{whole}.{rest // 100:05d}"
+
+
+_DAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+
+
+def local_time_text(moment_us: int, local: LocalTime, *, day: bool = False) -> str:
+    """The local time of day of a moment of UTC, to the minute; with `day`, that of the week too."""
+    time_us = moment_us + local.offset(moment_us)
+    minutes = time_us % DAY // 60_000_000
+    return f"{_DAYS[time_of_week(time_us) // DAY] + ' ' if day else ''}{minutes // 60:02d}:{minutes % 60:02d}"

@@ -20,7 +20,7 @@ from rtshcua.decision.values import Span as Between
 from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.plane import rings_of
 from rtshcua.ground.analysis.solve import Goal, No
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.geometry.shapes import Disc, Region, lies_within, polygonal
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
@@ -111,7 +111,7 @@ class ConditionEffects:
     def __init__(self, ground: ProofContext) -> None:
         self.rules = Ruleset(ground)
         self._ground = ground
-        self._spaces: dict[int, Space] = {}
+        self._spaces: dict[int, SituationSpace] = {}
 
     def always_permit(self, numbers: Sequence[int], skill: int) -> bool:
         """Whether it is proved that in each step of a skill one of some permits has its condition met."""
@@ -150,7 +150,7 @@ class ConditionEffects:
         key = ("within reach", skill, *((self.rules.code(number), truth) for number, truth in wanted))
         return isinstance(self._ground.questions.ask(key, goals, self._space(skill)), No)
 
-    def _space(self, skill: int) -> Space:
+    def _space(self, skill: int) -> SituationSpace:
         found = self._spaces.get(skill)
         if found is None:
             policy = self._ground.prepared.policy
@@ -158,7 +158,7 @@ class ConditionEffects:
         return found
 
 
-def _when_admitted(space: Space, policy: Policy, contract: Contract) -> Space:
+def _when_admitted(space: SituationSpace, policy: Policy, contract: Contract) -> SituationSpace:
     """The situations of a space in which a step may be admitted, and perhaps more; every sensor reports."""
     vehicle, reach = policy.vehicle, reach_of(policy.vehicle)
     arguments, slots = list(space.arguments), list(space.slots)

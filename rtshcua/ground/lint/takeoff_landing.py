@@ -20,7 +20,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.solve import No
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.lint.lint_input import LintInput, rules_of
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
@@ -87,7 +87,7 @@ def _for_skill(ground: ProofContext, rules: Ruleset, skill: int, signals: tuple[
             yield _keeps_grounded(ground.span(clause), contract.name, "this", signals)
 
 
-def _standing_space(policy: Policy, space: Space, unknown: set[int]) -> Space:
+def _standing_space(policy: Policy, space: SituationSpace, unknown: set[int]) -> SituationSpace:
     """The situations of a space in which the vehicle stands on the ground, and all but some signals are known."""
     slots = [MISSING if slot in unknown else present(value) for slot, value in enumerate(space.slots)]
     height = policy.vehicle.height
@@ -96,7 +96,7 @@ def _standing_space(policy: Policy, space: Space, unknown: set[int]) -> Space:
     return space._replace(slots=tuple(slots))
 
 
-def _with_monitors(ground: ProofContext, skill: int, space: Space) -> Space:
+def _with_monitors(ground: ProofContext, skill: int, space: SituationSpace) -> SituationSpace:
     """The same, with what conditions over time may say there. What one says of a window is what its condition was at
     some moment of it, or UNKNOWN; one that rises or falls was UNKNOWN, or what it may be, at the observation before.
     """
@@ -113,7 +113,7 @@ def _with_monitors(ground: ProofContext, skill: int, space: Space) -> Space:
     return space
 
 
-def _can_be(ground: ProofContext, of: tuple[int, int], node: Node, truth: Truth, space: Space) -> bool:
+def _can_be(ground: ProofContext, of: tuple[int, int], node: Node, truth: Truth, space: SituationSpace) -> bool:
     """Whether what a monitor looks at may have a truth there; `of`: about which skill, and the monitor's number."""
     return not isinstance(ground.questions.ask(("looked at", *of, truth), lambda: [(node, truth)], space), No)
 

@@ -15,7 +15,7 @@ from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Span
 from rtshcua.decision.zones import NO_BOX
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.analysis.witness import Witness
 from rtshcua.ground.lower.zones import EVERYWHERE
 from rtshcua.ground.prove.proof_context import ALWAYS, NEVER, ProofContext, optimistic
@@ -34,7 +34,7 @@ class TimeKnowledge(Enum):
 def certain_refusals(
     proof: ProofContext,
     invocation: PreparedInvocation,
-    space: Space,
+    space: SituationSpace,
     known: TimeKnowledge,
     given: tuple[Goal, ...] = (),
 ) -> Iterator[tuple[Witness, Rule | None]]:

@@ -16,7 +16,7 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.solve import Goal, No, Undecided, Yes, satisfiable
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.prove.conjuncts import minimal_conflict
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.model.flat.contract import Contract
@@ -138,7 +138,7 @@ def _airspace(proof: ProofContext) -> Iterator[Conjunct]:
 def _together(
     proof: ProofContext,
     parts: Sequence[Conjunct],
-    space: Space,
+    space: SituationSpace,
     key: tuple[object, ...],
     messages: tuple[str, str],
     labels: list[tuple[Span, str]],

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
-from rtshcua.ground.analysis.daytime import Arc, Asked, arcs_where, met_by_some
+from rtshcua.ground.analysis.daytime import Arc, IssueRequirement, arcs_where, met_by_some
 from rtshcua.ground.analysis.space import reads_days
-from rtshcua.ground.analysis.words import clock, words
+from rtshcua.ground.analysis.witness import local_time_text, witness_text
 from rtshcua.ground.prove.certain_refusal import TimeKnowledge, certain_refusals, refusing_rules
 from rtshcua.ground.prove.parameter_ranges import ArgumentLine
 from rtshcua.ground.prove.proof_context import ProofContext
@@ -54,14 +54,14 @@ def _report_refused(
     )
     for witness, rule in certain_refusals(proof, invocation, space, TimeKnowledge.ALL, line.given):
         local, day = proof.prepared.tables.local, reads_days(proof.policy)
-        at, first, last = (clock(moment, local, day=day) for moment in (witness.at.utc[0][0], *window))
+        at, first, last = (local_time_text(moment, local, day=day) for moment in (witness.at.utc[0][0], *window))
         told = [each.rule for each in invocation.candidates.permits] if rule is None else [rule]
         does = "forbids it"
         if rule is None:
             does = "does not permit it"
         elif rule.target is not None:
             does = "flies another skill in its place"
-        moved = f" with {words(witness, proof.policy, flat.contract)}" if line.moving else ""
+        moved = f" with {witness_text(witness, proof.policy, flat.contract)}" if line.moving else ""
         proof.report.add(
             codes.NOT_ALWAYS_PERMITTED,
             step.span,
@@ -102,7 +102,7 @@ class _Unmet(NamedTuple):
 
     step: int
     low: int
-    asked: Sequence[Asked]
+    asked: Sequence[IssueRequirement]
 
 
 def _first_unmet(
@@ -112,7 +112,7 @@ def _first_unmet(
     lines: Sequence[ArgumentLine | None],
 ) -> _Unmet | None:
     """The first step up to which no one time of issue will do for all arguments on the lines."""
-    asked: list[Asked] = []
+    asked: list[IssueRequirement] = []
     periods = along_lines(comes, invocations, lines)
     for number, (invocation, line, period) in enumerate(zip(invocations, lines, periods, strict=True)):
         if line is None or line.empty or may_be_skipped(invocation):
@@ -126,7 +126,7 @@ def _first_unmet(
 
 def _demands(
     proof: ProofContext, invocation: PreparedInvocation, line: ArgumentLine, period: StepTime
-) -> Iterator[Asked]:
+) -> Iterator[IssueRequirement]:
     """What the rules that read the time of day ask."""
     arguments = invocation.invocation.arguments
     rules = (*(each.rule for each in invocation.candidates.permits), *refusing_rules(invocation))
@@ -137,7 +137,7 @@ def _demands(
         windows = [window for _, (windows, _) in read for window in windows]
         cycle = IssueCycle.of(proof, windows)
         arcs = _permitted(proof, invocation, line, cycle, cycle.edges(windows))
-        yield Asked(arcs, period.low, period.high, cycle.period, labels)
+        yield IssueRequirement(arcs, period.low, period.high, cycle.period, labels)
 
 
 def _permitted(
@@ -167,7 +167,7 @@ def _report_unmet(
     told = (
         line.words(one.invocation.contract) for line, one in zip(lines, invocations, strict=True) if line is not None
     )
-    moved = next((words for words in told if words), "")
+    moved = next((witness_text for witness_text in told if witness_text), "")
     proof.report.add(
         codes.NOT_ALWAYS_PERMITTED,
         steps[failed.step].span,

@@ -14,7 +14,7 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.extent import FAR
 from rtshcua.ground.analysis.solve import No, Yes
-from rtshcua.ground.analysis.words import words
+from rtshcua.ground.analysis.witness import witness_text
 from rtshcua.ground.prove.rule_index import RuleQuery
 from rtshcua.ground.prove.ruleset import Ruleset, WrittenRule
 from rtshcua.model.flat.contract import Link
@@ -102,7 +102,7 @@ def _after_wider(rules: Ruleset, earlier: WrittenRule, later: WrittenRule) -> bo
         return False
     policy = rules.policy
     name = policy.contracts[target.skill].name
-    situation = words(witness[0].witness, policy, policy.contracts[witness[1]])
+    situation = witness_text(witness[0].witness, policy, policy.contracts[witness[1]])
     rules.proof.report.add(
         codes.SHADOWED_RULE if always else codes.CONFLICTING_RULES,
         later.span,

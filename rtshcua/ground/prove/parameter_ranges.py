@@ -17,9 +17,8 @@ from rtshcua.decision import tree
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE, Span, Value, interval
 from rtshcua.diagnostics import codes
-from rtshcua.ground.analysis.questions import Tried
-from rtshcua.ground.analysis.solve import Goal
-from rtshcua.ground.analysis.words import words
+from rtshcua.ground.analysis.solve import Goal, StepInstance
+from rtshcua.ground.analysis.witness import witness_text
 from rtshcua.ground.prove.certain_refusal import TimeKnowledge, certain_refusals
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.step_times import StepTime
@@ -105,7 +104,9 @@ def unmoved_lines(invocations: Sequence[PreparedInvocation]) -> list[ArgumentLin
     return [ArgumentLine(each.invocation.arguments, each.invocation.arguments) for each in invocations]
 
 
-def lines_from(before: Sequence[Tried], invocations: Sequence[PreparedInvocation]) -> Iterator[ArgumentLine | None]:
+def lines_from(
+    before: Sequence[StepInstance], invocations: Sequence[PreparedInvocation]
+) -> Iterator[ArgumentLine | None]:
     """For each step the line from an earlier instance; None where the two differ in more than numbers."""
     for earlier, each in zip(before, invocations, strict=True):
         now = each.invocation
@@ -134,7 +135,7 @@ def prove_between(
 ) -> None:
     """Report the first value between this instance and an earlier one with which a step is refused."""
     now = tuple(
-        Tried(one.invocation.skill, one.invocation.arguments, tuple(period.asked))
+        StepInstance(one.invocation.skill, one.invocation.arguments, tuple(period.asked))
         for one, period in zip(invocations, comes, strict=True)
     )
     earlier = proof.questions.instances.setdefault(mission.name.text, [])
@@ -158,7 +159,7 @@ def _report_refused(proof: ProofContext, step: Step, invocation: PreparedInvocat
     )
     for witness, rule in certain_refusals(proof, invocation, space, TimeKnowledge.NOTHING, line.given):
         policy = proof.policy
-        situation = words(witness, policy, invocation.invocation.contract)
+        situation = witness_text(witness, policy, invocation.invocation.contract)
         rules = [each.rule for each in invocation.candidates.permits] if rule is None else [rule]
         label = "this does not permit it" if rule is None else "by this rule"
         code, said = codes.OUT_OF_SCOPE, f"outside of what `{policy.name}` permits"

@@ -12,7 +12,7 @@ from rtshcua.decision.tree import Node, where
 from rtshcua.decision.values import MISSING, Sets, Value
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span as Where
-from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.analysis.solve import Questions
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.lower.policy import LoweredPolicy

@@ -7,7 +7,7 @@ from rtshcua.decision.flying import slower
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, at_slowest, paths_fit, prepare
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.analysis.solve import Questions
 from rtshcua.ground.analysis.space import signals
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.lower.policy import LoweredPolicy

@@ -12,8 +12,7 @@ from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.values import ABSENT
 from rtshcua.ground.analysis.box import Cell
-from rtshcua.ground.analysis.enclosing import Enclosing
-from rtshcua.ground.analysis.extent import FAR, PHASE, Bounds, Conjunction, Other
+from rtshcua.ground.analysis.extent import FAR, PHASE, Bounds, Conjunction, EnclosingBoxes, OtherCondition
 from rtshcua.model.flat.policy import Rule
 
 #: of the cells that conditions read, so many are told apart; the rest is asked of the conditions themselves
@@ -59,13 +58,13 @@ class RuleIndex:
         self._cells: tuple[Cell, ...] = tuple(cell for cell, _ in named.most_common(_CELLS))
         self._exact = {entry.number: entry.exact for entry in every}
         self._implies = implies
-        self._weaker: dict[frozenset[Other], tuple[frozenset[Other], ...]] = {}
-        self._meeting = Enclosing([(each.number, self._row(each, part)) for each in every for part in each.parts])
-        rows: dict[frozenset[Other], list[tuple[int, tuple[int, ...]]]] = {}
+        self._weaker: dict[frozenset[OtherCondition], tuple[frozenset[OtherCondition], ...]] = {}
+        self._meeting = EnclosingBoxes([(each.number, self._row(each, part)) for each in every for part in each.parts])
+        rows: dict[frozenset[OtherCondition], list[tuple[int, tuple[int, ...]]]] = {}
         for each in every:
             for part in each.exact:
                 rows.setdefault(part.others, []).append((each.number, self._row(each, part.bounds)))
-        self._holding = {others: Enclosing(found) for others, found in rows.items()}
+        self._holding = {others: EnclosingBoxes(found) for others, found in rows.items()}
 
     def remove(self, number: int) -> None:
         """Forget a rule."""
@@ -93,10 +92,10 @@ class RuleIndex:
                 if any(self._encloses(part, exact) for part in self._exact[number] if part.others == others):
                     yield number
 
-    def _found_weaker(self, others: frozenset[Other]) -> Iterator[frozenset[Other]]:
+    def _found_weaker(self, others: frozenset[OtherCondition]) -> Iterator[frozenset[OtherCondition]]:
         """The conditions besides bounds, of rules, that hold wherever others do."""
         if len(self._holding) > _DIFFERENT:
-            yield from (each for each in dict.fromkeys((others, frozenset[Other]())) if each in self._holding)
+            yield from (each for each in dict.fromkeys((others, frozenset[OtherCondition]())) if each in self._holding)
             return
         for each in sorted(self._holding, key=lambda each: each != others):  # the same ones first
             if all(one in others or any(self._implies(other.node, one.node) for other in others) for one in each):
@@ -121,7 +120,7 @@ class RuleIndex:
         )
 
 
-def _in_order(tree: Enclosing, about: RuleQuery, sides: list[int], after: int) -> Iterator[int]:
+def _in_order(tree: EnclosingBoxes, about: RuleQuery, sides: list[int], after: int) -> Iterator[int]:
     low, high = about.effect
     row = (*sides, -about.skill, about.skill, *_hull(about.roles), *_hull(about.sources))
     return tree.around((*row, -high, low, -about.within_us), after)

@@ -20,7 +20,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.box import Cell, clipped
 from rtshcua.ground.analysis.extent import PHASE, Conjunction, Extents, alternatives
 from rtshcua.ground.analysis.solve import Answer, Goal, Undecided, Yes
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.analysis.witness import plain
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.rule_index import IndexedRule, RuleIndex, RuleQuery
@@ -107,7 +107,7 @@ class Ruleset:
         """The skills that a flat rule is about."""
         return self.rule(number).skills or range(len(self.policy.contracts))
 
-    def space(self, skill: int) -> Space:
+    def space(self, skill: int) -> SituationSpace:
         """Any situation in which a skill may be asked for."""
         return self.proof.questions.space(skill)
 
@@ -344,7 +344,7 @@ class Ruleset:
             )
 
 
-def _corners(space: Space, exact: Conjunction, cells: Sequence[Cell]) -> Iterable[tuple[int, ...]]:
+def _corners(space: SituationSpace, exact: Conjunction, cells: Sequence[Cell]) -> Iterable[tuple[int, ...]]:
     """The values of some cells at the ends of their bounds (of many, all at the lower or all at the upper ones), and in
     the middle of them.
     """

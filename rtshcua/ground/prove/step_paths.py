@@ -21,7 +21,7 @@ from rtshcua.decision.zones import PlaceSet as Places
 from rtshcua.decision.zones import Sweep
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.analysis.words import clock
+from rtshcua.ground.analysis.witness import local_time_text
 from rtshcua.ground.geometry.polygons import Point
 from rtshcua.ground.lower.mission import argument_span
 from rtshcua.ground.prove.airspace_keeping import (
@@ -291,7 +291,7 @@ def _report_broken(proof: ProofContext, step: Step, broken: _BrokenClause, label
     clause, policy = broken.clause, proof.policy
     at = where = ""
     if broken.moment is not None:
-        at = f" at {clock(broken.moment, proof.prepared.tables.local)}, local time, when it may begin"
+        at = f" at {local_time_text(broken.moment, proof.prepared.tables.local)}, local time, when it may begin"
     if broken.place is not None:
         where = f": it fails near {place_text(policy, broken.place)}"
     elif broken.height is not None:

@@ -18,9 +18,9 @@ from rtshcua.decision.values import FALSE, TRUE, Span
 from rtshcua.decision.zones import PlaceSet, PreparedZone
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span as Where
-from rtshcua.ground.analysis.daytime import Asked, arcs_where
+from rtshcua.ground.analysis.daytime import IssueRequirement, arcs_where
 from rtshcua.ground.analysis.space import reads_days
-from rtshcua.ground.analysis.words import clock
+from rtshcua.ground.analysis.witness import local_time_text
 from rtshcua.ground.prove.proof_context import EVER, ProofContext
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.limits import DAY
@@ -92,7 +92,7 @@ class StepTime:
     low: int
     high: int
     lasts_us: int
-    asked: list[Asked] = field(default_factory=list)
+    asked: list[IssueRequirement] = field(default_factory=list)
 
     def utc(self, further: int) -> tuple[Span, ...]:
         """All moments from its earliest begin to `further` us after its latest, as far as they are known."""
@@ -144,7 +144,7 @@ class StepTime:
         )
         sometimes = "at some times of the day" if flat.daily else "at some times of the week"
         label = (zone_span(self.proof, zone), f"`{flat.name}` exists {sometimes} only")
-        self._ask(Asked(arcs, self.low, self.high + further, cycle.period, (label,)))
+        self._ask(IssueRequirement(arcs, self.low, self.high + further, cycle.period, (label,)))
 
     def missing(self, airspace: PreparedAirspace, further: int) -> PreparedZone | None:
         """A zone to stay inside of that may not exist all that time; for a time of issue that is known."""
@@ -158,7 +158,7 @@ class StepTime:
         """That time in words; it is known."""
         local, day = self.proof.prepared.tables.local, reads_days(self.proof.policy)
         ((low, high),) = self.utc(further)
-        return f"from {clock(low, local, day=day)} to {clock(high, local, day=day)}, local time"
+        return f"from {local_time_text(low, local, day=day)} to {local_time_text(high, local, day=day)}, local time"
 
     def fails(
         self,
@@ -194,14 +194,14 @@ class StepTime:
         arcs = arcs_where(edges, lambda at: holds(cycle.at(at)), cycle.period)
         if arcs and arcs[0].length < cycle.period:
             label = (self.proof.span(clause), "the contract asks for this")
-            self._ask(Asked(arcs, self.low, self.high, cycle.period, (label,)))
+            self._ask(IssueRequirement(arcs, self.low, self.high, cycle.period, (label,)))
         return Failure(not arcs)
 
     def timed(self, clause: Clause, arguments: Sequence[int]) -> bool:
         """Whether what a condition says depends on the time."""
         return any(changes_read(self.proof, clause, arguments))
 
-    def _ask(self, asked: Asked) -> None:
+    def _ask(self, asked: IssueRequirement) -> None:
         if asked not in self.asked:
             self.asked.append(asked)
 

@@ -11,7 +11,7 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
-from rtshcua.ground.analysis.reported import means_unknown
+from rtshcua.ground.analysis.space import means_unknown
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.parts import walk
 from rtshcua.ground.checker.symbols import suggestion

@@ -16,8 +16,7 @@ from rtshcua.decision import tree
 from rtshcua.decision.contracts import Energy
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
-from rtshcua.ground.analysis.questions import Questions
-from rtshcua.ground.analysis.solve import No
+from rtshcua.ground.analysis.solve import No, Questions
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.limits import FULL, MAX_TEXT

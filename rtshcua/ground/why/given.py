@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.analysis.reported import extent, means_unknown
+from rtshcua.ground.analysis.space import means_unknown, reported_range
 from rtshcua.ground.checker.ranges import accepted
 from rtshcua.ground.checker.symbols import Extent
 from rtshcua.ground.language.exact import exact
@@ -96,7 +96,7 @@ def _value(signal: Signal, text: str, policy: Policy, dialect: Dialect) -> tuple
         near = nearest(text, labels)
         help = f"did you mean `{near}`?" if near is not None else f"it is one of {', '.join(labels)}"
         return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help) if value is None else (value,)
-    return _number(signal, text, extent(signal, dialect))
+    return _number(signal, text, reported_range(signal, dialect))
 
 
 def _number(signal: Signal, text: str, values: Extent) -> tuple[int, ...] | Refusal:

@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 from rtshcua.decision.times import local_time
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.analysis.solve import Questions
 from rtshcua.ground.analysis.space import signals
 from rtshcua.ground.checker.checks.tests import MAX_CASES
 from rtshcua.ground.testing.boundaries import case_values

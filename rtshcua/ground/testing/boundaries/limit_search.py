@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.contracts import drains
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.testing.boundaries.case_values import always_tested
 from rtshcua.ground.testing.boundaries.clause_limits import (
     ClauseLimit,
@@ -64,7 +64,7 @@ class _Field(NamedTuple):
 
     parts: Sequence[PolicyPart]
     scene: Scene
-    space: Space
+    space: SituationSpace
     fits: Callable[[ClauseLimit], bool]
 
 
@@ -77,7 +77,7 @@ class _Question(NamedTuple):
     whole: PolicyPart
 
 
-def limits(parts: Sequence[PolicyPart], scene: Scene, space: Space) -> Iterator[ClauseLimit]:
+def limits(parts: Sequence[PolicyPart], scene: Scene, space: SituationSpace) -> Iterator[ClauseLimit]:
     """The limits of all parts, as the scene has everything else; each part in its order."""
     yield from search(parts, parts, scene, space).limits
 
@@ -86,7 +86,7 @@ def search(
     chosen: Sequence[PolicyPart],
     parts: Sequence[PolicyPart],
     scene: Scene,
-    space: Space,
+    space: SituationSpace,
     fits: Callable[[ClauseLimit], bool] = lambda _: True,
 ) -> LimitSearch:
     """The limits of the chosen ones of all parts that bear on an invocation; `fits` says whether one can be asked."""

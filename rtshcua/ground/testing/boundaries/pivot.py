@@ -11,7 +11,7 @@ from rtshcua.decision import tree
 from rtshcua.decision.evaluate import build
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
-from rtshcua.ground.analysis.space import Space, reads_days
+from rtshcua.ground.analysis.space import SituationSpace, reads_days
 from rtshcua.ground.analysis.witness import Witness
 from rtshcua.ground.testing.boundaries.scene import PolicyPart, Scene, SceneChanges, SceneVariable
 from rtshcua.model.flat.contract import PLACE
@@ -99,7 +99,7 @@ def permitted(parts: Sequence[PolicyPart], scene: Scene) -> Iterator[Goal]:
 
 
 def pivots(
-    part: PolicyPart, atom: tree.Atom, parts: Sequence[PolicyPart], scene: Scene, space: Space
+    part: PolicyPart, atom: tree.Atom, parts: Sequence[PolicyPart], scene: Scene, space: SituationSpace
 ) -> Iterator[SceneChanges]:
     """What is changed in a scene so that an atom decides, the nearest first: empty where it does already, nothing where
     no situation was found. What has several limits, as a zone has, shows each where it is so, and some where it is not.
@@ -117,7 +117,7 @@ def pivots(
                 break
 
 
-def settled(goals: Sequence[Goal], space: Space, scene: Scene) -> SceneChanges | None:
+def settled(goals: Sequence[Goal], space: SituationSpace, scene: Scene) -> SceneChanges | None:
     """The changes of a scene that reach goals, of variables as few as one after the other can be kept."""
     invocation = scene.invocation
     preferred = dict(_present(scene))
@@ -144,7 +144,7 @@ def settled(goals: Sequence[Goal], space: Space, scene: Scene) -> SceneChanges |
     }
 
 
-def _plain(space: Space, signals: Sequence[Signal]) -> Space:
+def _plain(space: SituationSpace, signals: Sequence[Signal]) -> SituationSpace:
     """The same without numbers that no vehicle reports."""
     most = {
         each.slot: min(_MOST_RAW * source.numerator // source.denominator for source in each.sources)
@@ -178,7 +178,9 @@ def _present(scene: Scene) -> Iterator[tuple[SceneVariable, Value | tuple[Value,
         yield SceneVariable(False, slot), ((one, at.slots[slot + 1]) if slot == policy.vehicle.position else one)
 
 
-def _narrowed(space: Space, kept: dict[SceneVariable, Value | tuple[Value, Value]], scene: Scene) -> Space:
+def _narrowed(
+    space: SituationSpace, kept: dict[SceneVariable, Value | tuple[Value, Value]], scene: Scene
+) -> SituationSpace:
     arguments, slots = list(space.arguments), list(space.slots)
     utc = space.utc
     for variable, value in kept.items():

@@ -13,8 +13,7 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.decision.volume import HOME
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.analysis.questions import Questions
-from rtshcua.ground.analysis.solve import Goal
+from rtshcua.ground.analysis.solve import Goal, Questions
 from rtshcua.ground.analysis.witness import plainest
 from rtshcua.ground.testing.boundaries.pivot import permitted, settled
 from rtshcua.ground.testing.boundaries.scene import Scene, SceneChanges, SceneVariable, Value, parts_of

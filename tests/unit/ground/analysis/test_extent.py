@@ -8,8 +8,7 @@ from rtshcua.decision.evaluate import Environment, Tables, build
 from rtshcua.decision.times import LocalTime
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Truth, Value, point
 from rtshcua.decision.zones import PreparedZone, WellKnown
-from rtshcua.ground.analysis.enclosing import Enclosing
-from rtshcua.ground.analysis.extent import PHASE, Bounds, Conjunction, Extents, alternatives
+from rtshcua.ground.analysis.extent import PHASE, Bounds, Conjunction, EnclosingBoxes, Extents, alternatives
 from rtshcua.model.flat.zone import AREA, CIRCLE, POLYGON, Zone
 
 ZONES = (
@@ -95,7 +94,7 @@ ROWS = st.lists(st.tuples(st.integers(0, 20), st.tuples(*[st.integers(0, 4)] * 3
 def test_what_encloses_is_found_in_order(
     rows: list[tuple[int, tuple[int, ...]]], removed: set[int], row: tuple[int, ...], after: int
 ) -> None:
-    found = Enclosing(rows)
+    found = EnclosingBoxes(rows)
     for number in removed:
         found.remove(number)
     expected = {

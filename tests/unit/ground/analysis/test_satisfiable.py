@@ -14,7 +14,7 @@ from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interv
 from rtshcua.decision.zones import PreparedZone, WellKnown
 from rtshcua.ground.analysis.plane import Plane
 from rtshcua.ground.analysis.solve import No, Undecided, Yes, implies, satisfiable
-from rtshcua.ground.analysis.space import Space
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 
@@ -51,7 +51,9 @@ SLOTS: tuple[Value, ...] = (
     maybe(members((0, 1, 7))),
     MISSING,
 )
-SPACE = Space(ARGUMENTS, SLOTS, ((0, DAY - 1),), (0, 0), frozenset((-1, 0)), (7, 7), TABLES, Plane(ZONES, PREPARED))
+SPACE = SituationSpace(
+    ARGUMENTS, SLOTS, ((0, DAY - 1),), (0, 0), frozenset((-1, 0)), (7, 7), TABLES, Plane(ZONES, PREPARED)
+)
 
 NUMBERS = ((True, 0), (True, 1), (False, 0), (False, 1))
 TERMS = st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=3, unique=True).flatmap(

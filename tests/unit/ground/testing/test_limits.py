@@ -13,7 +13,7 @@ from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.decision.times import time_of_week
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.analysis.questions import Questions
+from rtshcua.ground.analysis.solve import Questions
 from rtshcua.ground.testing.boundaries.clause_limits import ClauseLimit
 from rtshcua.ground.testing.boundaries.limit_search import limits
 from rtshcua.ground.testing.boundaries.scene import TIME, PolicyPart, Scene, SceneVariable, Value, part_truth, parts_of

@@ -7,7 +7,7 @@ from itertools import pairwise
 from reference import independent_verifier
 from rtshcua.adapters.store.logs import lines
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.quick import outline, quick, scan
+from rtshcua.evidence.quick_verification import outline, quick, scan
 from rtshcua.evidence.records import Genesis
 from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of

@@ -13,7 +13,7 @@ from typing import BinaryIO, Final, NamedTuple
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.quick import LONGEST_SEGMENT, LogOutline, Octets, SegmentPart, outline, quick, scan
+from rtshcua.evidence.quick_verification import LONGEST_SEGMENT, LogOutline, Octets, SegmentPart, outline, quick, scan
 from rtshcua.evidence.records import AnyRecord
 from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of, trusted
 from rtshcua.ground.audit.frames import Frames

@@ -60,13 +60,13 @@ def _unknown(word: str) -> ExitCode:
 
 def _call(row: Row, words: list[str]) -> int:
     """Imports the command of `row` and runs it through typer, whose own way of reporting errors is left out."""
-    if row.quick:
-        from rtshcua.front.cli.quick import QUICK
+    if row.fast_path:
+        from rtshcua.front.cli import fast_path
 
         before = gc.get_threshold()
         gc.set_threshold(*_COLLECTING)
         try:
-            code = QUICK[row.name](words)
+            code = fast_path.COMMANDS[row.name](words)
         finally:
             gc.set_threshold(*before)
         if code is not None:

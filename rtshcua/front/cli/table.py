@@ -21,7 +21,7 @@ class Row(NamedTuple):
     name: str
     group: str
     help: str
-    quick: bool = False  # plain command lines of it are read by `rtshcua.front.cli.quick`, without typer
+    fast_path: bool = False  # plain command lines of it are read by `rtshcua.front.cli.fast_path`, without typer
     reports: bool = False  # its `--json` is that of `Findings`, also where the command line is wrong
     ends_in_order: bool = False  # Ctrl-C raises in it, for something is put in order; else the signal ends it
 
@@ -37,14 +37,14 @@ COMMANDS = (
         "write",
         "report everything that is wrong with sources or a mission specification",
         reports=True,
-        quick=True,
+        fast_path=True,
     ),
     Row(
         "lint",
         "write",
         "report that and what is worth a second look; fix it, ignore it, for CI too",
         reports=True,
-        quick=True,
+        fast_path=True,
     ),
     Row("fmt", "write", "lay sources out in the one style; comments stay where they are", reports=True),
     Row("test", "write", "run the tests of sources, say what they cover, and write tests for each limit", reports=True),
@@ -64,7 +64,7 @@ COMMANDS = (
     Row("keys", "fly", "make, list, replace and revoke keys, and the trust root", ends_in_order=True),
     Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),
     Row("approve", "fly", "answer a step that asks for confirmation, with your signature", ends_in_order=True),
-    Row("recall", "fly", "call a flight home, with your signature", quick=True),
+    Row("recall", "fly", "call a flight home, with your signature", fast_path=True),
     Row("operator", "fly", "follow a flight, and hold its recall ready: one key calls it home"),
     Row("replace", "fly", "hand a flight the mission that takes the place of its own"),
     Row("mcp", "fly", "let an agent's host propose missions to a vehicle that waits (MCP)"),

@@ -10,12 +10,12 @@ from typer.main import get_command
 
 from rtshcua.app.lint.scope import LintOptions
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import check, lint, quick, recall
+from rtshcua.front.cli import check, fast_path, lint, recall
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.table import COMMANDS
 
-COMMAND = {"lint": (lint, quick.LINT), "check": (check, quick.CHECK), "recall": (recall, quick.RECALL)}
-#: what the quick reader leaves to typer
+COMMAND = {"lint": (lint, fast_path.LINT), "check": (check, fast_path.CHECK), "recall": (recall, fast_path.RECALL)}
+#: what the fast path leaves to typer
 LEFT = {"recall": {"--for"}}
 
 
@@ -33,19 +33,21 @@ def test_both_know_the_same_options(name: str) -> None:
     assert declared == {each: (names.get(to, to), plain.get(kind, kind)) for each, (to, kind) in known.items()}
 
 
-def test_the_table_says_which_are_read_quickly() -> None:
-    assert {row.name for row in COMMANDS if row.quick} == set(quick.QUICK)
+def test_the_table_says_which_commands_have_one() -> None:
+    assert {row.name for row in COMMANDS if row.fast_path} == set(fast_path.COMMANDS)
 
 
 WORDS = st.one_of(
-    st.sampled_from([*quick.LINT, "--", "-", "", "--help", "-h", "--fixx", "--no-fix", "-ox", "--output=", "--json=1"]),
+    st.sampled_from(
+        [*fast_path.LINT, "--", "-", "", "--help", "-h", "--fixx", "--no-fix", "-ox", "--output=", "--json=1"]
+    ),
     st.sampled_from(["a.rts", "b", "--format=json", "--with=c", "--base=x", "human", "--output=-x", "-o=1"]),
 )
 
 
 @given(st.lists(WORDS, max_size=6))
-def test_what_is_read_quickly_typer_reads_so(words: list[str]) -> None:
-    found = quick.read(words, quick.LINT)
+def test_typer_reads_the_same_words_the_same_way(words: list[str]) -> None:
+    found = fast_path.read(words, fast_path.LINT)
     if found is None or not found[0]:
         return
     given: list[LintOptions] = []
@@ -59,13 +61,13 @@ def test_what_is_read_quickly_typer_reads_so(words: list[str]) -> None:
 
 
 def test_what_is_left_to_typer(capsys: pytest.CaptureFixture[str]) -> None:
-    assert quick.lint([]) is quick.lint(["--fix"]) is quick.check(["--json"]) is None
+    assert fast_path.lint([]) is fast_path.lint(["--fix"]) is fast_path.check(["--json"]) is None
     for words in (
         ["--help"],
         ["a.rts", "--formt", "json"],
         ["a.rts", "--format"],
         ["a.rts", "--json=1"],
     ):
-        assert quick.read(words, quick.LINT) is None, words
+        assert fast_path.read(words, fast_path.LINT) is None, words
     assert main(["check", "--since"]) == ExitCode.USAGE
     assert "requires an argument" in capsys.readouterr().err.lower()

@@ -4,9 +4,9 @@ It finds the segments from the end, and hashes each apart from the others; so it
 the signed records, and no other. It says yes or nothing: whenever anything is out of place, `rtshcua.evidence.verify`
 reads the log line by line, and names what it is.
 
-Fast twin of `verify`. Goal: at most 6.5 times SHA-256 of the file, and 1.3 by the octets alone (bench/verify.py); on a
-busy machine 7.4 and 1.7 with it, 25 without (docs/adr/0037). tests/unit/evidence/test_quick.py holds that it says yes
-where the careful one does, and nothing where that one finds anything.
+Processor time, against `verify`: 0.32 in a log of 36 MB, 0.54 in one of 60 KB. Goal: at most 6.5 times SHA-256 of the
+file, and 1.3 by the octets alone (bench/verify.py). tests/unit/evidence/test_quick_verification.py holds that it says
+yes where the careful one does, and nothing where that one finds anything.
 """
 
 from array import array

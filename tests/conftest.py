@@ -2,8 +2,6 @@
 
 import atexit
 import gc
-import gzip
-import json
 import os
 import signal
 import stat
@@ -22,9 +20,8 @@ from typing import Any
 
 import pytest
 from _pytest.assertion import rewrite
-from hypothesis import settings
-from hypothesis.internal import charmap
-from hypothesis.internal.conjecture import providers
+from hypothesis import HealthCheck, Phase, given, is_hypothesis_test, settings
+from hypothesis import strategies as st
 
 from processes import Processes
 from virtual import once
@@ -32,7 +29,7 @@ from virtual.forked import Forked, forked
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
-# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same few examples everywhere;
+# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same few examples each time;
 # `make soak` tries many in every property test, and new ones each time. A test that needs more or fewer than others
 # takes a share of the profile's: `@settings(max_examples=settings().max_examples * 2)`. `make mutate` needs
 # the same examples for each change, and enough of them to notice it.
@@ -42,27 +39,13 @@ settings.register_profile("soak", deadline=None, max_examples=5_000)
 settings.load_profile("test")
 
 
-def same_examples() -> None:
-    """Keep Hypothesis from drawing constants that it finds in whatever modules are loaded by now.
+@settings(max_examples=20, database=None, derandomize=True, phases=[Phase.generate], suppress_health_check=HealthCheck)
+@given(st.lists(st.integers(), min_size=30), st.text(min_size=1))
+def have_hypothesis_ready(numbers: list[int], text: str) -> None:
+    """Let Hypothesis read what it draws from: the table of all characters, and the constants in what is loaded.
 
-    They make the examples of a test depend on the tests before it, and to read all modules for them takes a second or
-    two in each process. `make soak` draws them too.
+    Once, before processes are forked. In a new checkout it takes some seconds, which no test then has to answer for.
     """
-    providers._get_local_constants = lambda: providers._local_constants
-
-
-def every_character() -> None:
-    """Tell Hypothesis what UTF-8 can encode: all characters but the surrogates.
-
-    In a new checkout each process would find that out by trying all of them, for five seconds.
-    """
-    made = charmap.charmap_file("codec-v2-utf-8")
-    if not made.exists():
-        charmap.charmap()  # keeps it in the same folder, which it makes
-        known = [[[0, 0xD7FF], [0xE000, sys.maxunicode]], []]
-        written = made.with_suffix(f".{os.getpid()}")
-        written.write_bytes(gzip.compress(json.dumps(known).encode(), mtime=1))
-        written.replace(made)
 
 
 #: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
@@ -92,8 +75,6 @@ def pytest_addoption(parser: Any) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """All processes of a run share a folder, and byte code."""
-    if config.getoption("--hypothesis-profile") != "soak":
-        same_examples()
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell starts what runs in the background
         signal.signal(signal.SIGINT, signal.default_int_handler)  # else commands would inherit it
     shared = TemporaryDirectory(prefix="rtshcua_once_")
@@ -147,7 +128,6 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
     What is collected stays for as long as the process: looking for garbage in it, time and again, took a third of
     collecting. What the tests make is looked through as ever, but for that in it that was there before them.
     """
-    every_character()
     gc.disable()
     helper = rewriting_from_the_end(session.config)
     try:
@@ -237,6 +217,8 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
     Of a command that is called many times in a process, typer makes its parser once: it takes a tenth of such tests.
     """
+    if any(is_hypothesis_test(getattr(item, "obj", None)) for item in session.items):
+        have_hypothesis_ready()
     if (typer := sys.modules.get("typer.main")) is not None:
         typer.get_command = cache(typer.get_command)  # type: ignore[attr-defined]
     wanted = any("commands" in getattr(item, "fixturenames", ()) for item in session.items)
@@ -258,7 +240,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return any(path.is_relative_to(folder) for folder in covering)
 
     for item in items:
-        if not covers(item.path) or getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+        if not covers(item.path) or is_hypothesis_test(getattr(item, "obj", None)):
             item.add_marker("unmeasured")
 
 

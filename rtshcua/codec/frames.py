@@ -171,7 +171,6 @@ class ReceivedFrame(NamedTuple):
     """The frame as it came, for the raw log."""
 
 
-_received = tuple.__new__  # the constructor that a named tuple is given is a function more
 _LEAST, _BEHIND_SIGNED = HEADER + CHECKSUM, CHECKSUM + SIGNATURE
 
 
@@ -277,7 +276,7 @@ def _decode(frame: bytes) -> ReceivedFrame | None:
         message = build(*fields.unpack_from(frame, HEADER))
     else:
         message = build(*fields.unpack(frame[HEADER:end].ljust(size, b"\0")))  # zeros at the end are not sent
-    return _received(ReceivedFrame, (message, name, system, component, sequence, flags != 0, frame))
+    return ReceivedFrame(message, name, system, component, sequence, flags != 0, frame)
 
 
 def _frame_end(datagram: bytes, start: int) -> int:

@@ -43,8 +43,6 @@ from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 
-# an enumeration's attributes are slow to find
-_ALLOW, _FALLBACK, _ADMITTED = Outcome.ALLOW, Outcome.FALLBACK, Reason.ADMITTED
 #: the `step` of a decision that all steps passed
 _PASSED_ALL = 8
 
@@ -81,11 +79,13 @@ def decide(
     for step, found in steps(invocation, policy, context, sets, at, exact=True):
         if found is not PASSED and found[0] is not PASS:
             outcome, reason, clause = found[0]
-            choice = next(fallbacks(invocation, sets, policy, START, exact=True)) if outcome is _FALLBACK else None
+            choice = (
+                next(fallbacks(invocation, sets, policy, START, exact=True)) if outcome is Outcome.FALLBACK else None
+            )
             link, target = (None, None) if choice is None else (choice.index, choice.link)
             return Decision(outcome, reason, step, clause, link, target, now.monotonic_us, context.consumed)
     until_us = valid_until(invocation, state, context, sets, at)
-    return Decision(_ALLOW, _ADMITTED, _PASSED_ALL, None, None, None, until_us, context.consumed)
+    return Decision(Outcome.ALLOW, Reason.ADMITTED, _PASSED_ALL, None, None, None, until_us, context.consumed)
 
 
 def possible(
@@ -96,15 +96,15 @@ def possible(
     found: set[Possible] = set()
     for _, verdicts in steps(invocation, policy, context, sets, at, exact):
         for verdict in verdicts:
-            if verdict.outcome is _FALLBACK:
+            if verdict.outcome is Outcome.FALLBACK:
                 for choice in fallbacks(invocation, sets, policy, START, exact):
-                    found.add(Possible(_FALLBACK, verdict.reason, None if choice is None else choice.link))
+                    found.add(Possible(Outcome.FALLBACK, verdict.reason, None if choice is None else choice.link))
             elif verdict is not PASS:
                 found.add(Possible(verdict.outcome, verdict.reason, None))
         if verdicts[-1] is not PASS:
             break
     else:
-        found.add(Possible(_ALLOW, _ADMITTED, None))
+        found.add(Possible(Outcome.ALLOW, Reason.ADMITTED, None))
     return frozenset(found)
 
 
@@ -353,11 +353,7 @@ def valid_until(invocation: PreparedInvocation, state: State, context: Context, 
     (now, _), ((utc, _),), (error, _) = sets.monotonic_us, sets.utc_us, sets.utc_error_us
     end = invocation.invocation.issued_at_us + contract.validity_us
     (released, _), valid = release(invocation, context, at), end - utc - error
-    left = (released - now if released < now else 0) + contract.deadline_us  # `min` is slow
-    if valid < left:
-        left = valid
-    if invocation.rests_us < left:
-        left = invocation.rests_us
+    left = min(min(released - now, 0) + contract.deadline_us, valid, invocation.rests_us)
     values, ages = state.values, state.ages
     for slot, stale in invocation.reads:
         if 0 <= stale - ages[slot] < left and values[slot] is not None:
@@ -367,7 +363,6 @@ def valid_until(invocation: PreparedInvocation, state: State, context: Context, 
 
 # ---------------------------------------------------------------- 6 and 7: state and safety
 
-_STATE_UNKNOWN, _SAFETY_UNKNOWN = Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN
 _TOO_FAST = (RuleVerdict(Outcome.FALLBACK, Reason.ENVELOPE, None),)
 
 
@@ -408,7 +403,7 @@ class ConditionTally:
 
 def state(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found:
     """Falls back on the first clause that is false, else defers on the first that is unknown."""
-    tally = ConditionTally(_STATE_UNKNOWN, exact)
+    tally = ConditionTally(Reason.STATE_UNKNOWN, exact)
     for guards in (invocation.require, invocation.assume):
         for clause, condition in guards:
             truth = condition(at)
@@ -419,7 +414,7 @@ def state(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found
 
 def safety(invocation: PreparedInvocation, at: Environment, exact: bool) -> Found:
     """Falls back on the first condition that is false, else defers on the first that is unknown."""
-    tally = ConditionTally(_SAFETY_UNKNOWN, exact)
+    tally = ConditionTally(Reason.SAFETY_UNKNOWN, exact)
     policy, known = invocation.policy, invocation.policy.tables.known
     if invocation.invocation.plan.speed > policy.policy.vehicle.speed:
         return _TOO_FAST

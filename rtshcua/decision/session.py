@@ -271,10 +271,6 @@ _WAITS: Final = (OnInadmissible.HOLD, OnInadmissible.REPLAN)
 _INTEGRITY: Final = 1
 _STATE: Final = 6
 _PASSED: Final = 8
-# an enumeration's attributes are slow to find
-_ALLOW, _DENY, _DEFER, _FALLBACK = Outcome.ALLOW, Outcome.DENY, Outcome.DEFER, Outcome.FALLBACK
-_ADMITTED, _BINDING_MISMATCH, _STATE_VIOLATED = Reason.ADMITTED, Reason.BINDING_MISMATCH, Reason.STATE_VIOLATED
-_UNKNOWN_STEP, _NOT_CURRENT = Status.UNKNOWN_STEP, Status.NOT_CURRENT
 
 
 class Session:
@@ -314,26 +310,26 @@ class Session:
         """
         kind, step, link = ref
         if kind == CONTINGENCY_LINK:
-            return None if step == -1 and 0 <= link < len(self._policy.contingency) else _UNKNOWN_STEP
+            return None if step == -1 and 0 <= link < len(self._policy.contingency) else Status.UNKNOWN_STEP
         invocations = self._in_force.invocations
         if not 0 <= step < len(invocations):
-            return _UNKNOWN_STEP
+            return Status.UNKNOWN_STEP
         if kind == FALLBACK_LINK:
             if not DEGRADE <= link < len(invocations[step].chain):
-                return _UNKNOWN_STEP
-            return None if step == self._latest else _NOT_CURRENT
+                return Status.UNKNOWN_STEP
+            return None if step == self._latest else Status.NOT_CURRENT
         if kind != STEP or link != -1:
-            return _UNKNOWN_STEP
+            return Status.UNKNOWN_STEP
         passed_over = step < self._latest and step not in self._consumed
-        return _NOT_CURRENT if self._in_force.called_off or passed_over or step > self._latest + 1 else None
+        return Status.NOT_CURRENT if self._in_force.called_off or passed_over or step > self._latest + 1 else None
 
     def decide_step(self, step: int, state: State, context: Context, now: Now) -> Decision:
         """Decide on a step that may be asked for (`refusal`), and remember it."""
         invocation = self._in_force.invocations[step]
         decision = decide(invocation, state, self._policy, context, now)
-        if decision.outcome is not _DENY or not self._enforced:
-            self._latest = max(self._latest, step)  # `max` is slow
-        if decision.outcome is _ALLOW or not self._enforced:
+        if decision.outcome is not Outcome.DENY or not self._enforced:
+            self._latest = max(self._latest, step)
+        if decision.outcome is Outcome.ALLOW or not self._enforced:
             self._allowed = max(self._allowed, step)
         if decision.step > _AUTHORITY and not may_ask_again(invocation.invocation, decision.outcome, decision.reason):
             self._consumed.add(step)
@@ -360,15 +356,15 @@ class Session:
             invocation = self._in_force.invocations[step]
             bound, chain, phase = invocation.invocation.binding, invocation.chain, invocation.phase
         if binding != bound:
-            return Decision(_DENY, _BINDING_MISMATCH, _INTEGRITY, None, None, None, now.monotonic_us)
+            return Decision(Outcome.DENY, Reason.BINDING_MISMATCH, _INTEGRITY, None, None, None, now.monotonic_us)
         if number == DEGRADE:
             choice = choose_fallback(invocation, state, self._policy, now)
             link = None if choice is None or choice.index != DEGRADE else choice.link
         else:
             link = chain[number].link if link_admissible(chain[number], state, self._policy, now, phase) else None
         if link is None:
-            return Decision(_FALLBACK, _STATE_VIOLATED, _STATE, None, None, None, now.monotonic_us)
-        return Decision(_ALLOW, _ADMITTED, _PASSED, None, None, link, now.monotonic_us + LINK_VALID_US)
+            return Decision(Outcome.FALLBACK, Reason.STATE_VIOLATED, _STATE, None, None, None, now.monotonic_us)
+        return Decision(Outcome.ALLOW, Reason.ADMITTED, _PASSED, None, None, link, now.monotonic_us + LINK_VALID_US)
 
     def take(self, document: bytes, now: Now, released: int = 0) -> Receipt:
         """Take in a signed document, if it is to be trusted; see `InForce.take`.
@@ -388,6 +384,6 @@ def may_ask_again(invocation: Invocation, outcome: Outcome, reason: Reason) -> b
     """Whether an answer leaves the id unused: a deferred step is asked for again, and so is one that its mission holds
     for, until its deadline.
     """
-    if outcome is _FALLBACK:
+    if outcome is Outcome.FALLBACK:
         return invocation.on_inadmissible in _WAITS and reason is not Reason.NO_SLACK
-    return outcome is _DEFER
+    return outcome is Outcome.DEFER

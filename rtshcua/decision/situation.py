@@ -13,7 +13,6 @@ from rtshcua.model.flat.situation import Now, State
 
 #: what a single situation may say of a temporal monitor
 SINGLE = frozenset({TRUE, FALSE, UNKNOWN})
-_tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
 
 
 def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
@@ -45,7 +44,7 @@ def remembered(state: State, policy: PreparedPolicy, now: Now) -> SeenSituation:
     """This situation, with what was answered about it so far."""
     seen = policy.seen
     if seen is None or seen.now != now or seen.state != state:
-        seen = policy.seen = _tuple(SeenSituation, (state, now, _situation(state, policy, now), [], [], []))
+        seen = policy.seen = SeenSituation(state, now, _situation(state, policy, now), [], [], [])
     return seen
 
 
@@ -68,7 +67,7 @@ def _situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     if len(monitors) != count or (count and not SINGLE.issuperset(monitors)):
         monitors = (UNKNOWN,) * count
     utc, error = now.utc_us, max(now.utc_error_us, 0)
-    return _tuple(Sets, (values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error), monitors))
+    return Sets(values, (now.monotonic_us, now.monotonic_us), ((utc, utc),), (error, error), monitors)
 
 
 def _all_known(told: Sequence[int | None], ages: Sequence[int], policy: PreparedPolicy) -> TypeGuard[Sequence[int]]:

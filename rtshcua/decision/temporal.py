@@ -34,7 +34,6 @@ from rtshcua.model.flat.policy import MonitorKind
 from rtshcua.model.flat.situation import Now, State
 
 _NEVER: Final = -(1 << 62)  # us: before any window
-_FOR_LAST, _WITHIN_LAST, _RISING = (int(kind) for kind in tuple(MonitorKind)[:3])  # an enumeration's are slow to find
 
 
 class Remembered(NamedTuple):
@@ -108,10 +107,10 @@ def _observed(before: Remembered, truth: Truth, last_us: int | None, at_us: int)
 def _says(monitor: PreparedMonitor, before: Remembered, after: Remembered, at_us: int) -> Truth:
     """What a monitor says at an observation, given what was remembered before it and is now."""
     kind, start_us = monitor.kind, at_us - monitor.window_us
-    if kind == _FOR_LAST:  # H[0, w] c: FALSE if some moment of t - w .. t was FALSE, else UNKNOWN if one was, else TRUE
+    if kind == MonitorKind.FOR_LAST:  # H[0, w] c: FALSE if some moment was FALSE, else UNKNOWN if one was, else TRUE
         return FALSE if after.false_us >= start_us else UNKNOWN if after.unknown_us >= start_us else TRUE
-    if kind == _WITHIN_LAST:  # O[0, w] c: TRUE if some moment was TRUE, else UNKNOWN if one was, else FALSE
+    if kind == MonitorKind.WITHIN_LAST:  # O[0, w] c: TRUE if some moment was TRUE, else UNKNOWN if one was, else FALSE
         return TRUE if after.true_us >= start_us else UNKNOWN if after.unknown_us >= start_us else FALSE
-    if kind == _RISING:  # not c at the observation before, and c now: FALSE where either rules it out
+    if kind == MonitorKind.RISING:  # not c at the observation before, and c now: FALSE where either rules it out
         return AND[NOT[before.last]][after.last]
     return AND[before.last][NOT[after.last]]

@@ -32,7 +32,6 @@ class PredictedPath(NamedTuple):
     lasts_us: int
 
 
-_tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
 UNKNOWN_AHEAD = PredictedPath(UNKNOWN_VOLUME, 0)
 
 
@@ -68,8 +67,8 @@ def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -
     sweep = Sweep((x, y, to_x, to_y), (-reach, -reach, reach, reach))
     farthest = max(distance(x, y), distance(to_x, to_y))
     place = PlaceSet(((sweep, low, high),), PRESENT, height_gap)
-    volume = _tuple(Volume, (place, (low, high, height_gap, None), (farthest, farthest)))
-    return _tuple(PredictedPath, (volume, goes_us - age_us - (-speed * SECOND // braking)))
+    volume = Volume(place, (low, high, height_gap, None), (farthest, farthest))
+    return PredictedPath(volume, goes_us - age_us - (-speed * SECOND // braking))
 
 
 def _root(square: int) -> int:

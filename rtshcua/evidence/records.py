@@ -110,7 +110,7 @@ def in_words(
     clause, target = decided.clause, decided.target if decided.outcome == Outcome.FALLBACK else None
     return (
         _OUTCOMES[decided.outcome],
-        decided.reason._value_,  # `value` is a property in Python, and slow
+        decided.reason.value,
         decided.step,
         None if clause is None else clause.text,
         None if clause is None else (clause.source, clause.start, clause.end),

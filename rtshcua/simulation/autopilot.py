@@ -47,7 +47,6 @@ _REMIND_FIRST_US, _REMIND_US = 1_200_000, 30_000_000
 SYSTEM_PARAMETERS = ("MAV_SYS_ID", "SYSID_THISMAV")
 """The parameters that hold the vehicle's own system id."""
 
-_GUIDED = FlightMode.GUIDED  # an enumeration's attributes are slow to find
 
 Handler = Callable[["Autopilot", VehicleCommand], tuple[int, ...]]
 """Obeys a command or refuses it; the results (MAV_RESULT) to acknowledge with, usually one."""
@@ -319,7 +318,7 @@ class Autopilot:
         if self.surroundings.pillars and vehicle.in_air and self.surroundings.is_hit(vehicle.body):
             vehicle.crash()
         self.failsafes.step(_TICK_S)
-        if vehicle.mode is _GUIDED:
+        if vehicle.mode is FlightMode.GUIDED:
             self._keep_targets()
         self._follow_plans()
         if self._boot_texts:

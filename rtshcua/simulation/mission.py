@@ -31,9 +31,6 @@ class MissionState(IntEnum):
     COMPLETE = 5
 
 
-_MODE, _ACTIVE = FlightMode.MISSION, MissionState.ACTIVE  # an enumeration's attributes are slow to find
-
-
 @dataclass(frozen=True, slots=True)
 class MissionRules:
     """What a flavour does its own way."""
@@ -181,9 +178,9 @@ class MissionProgress:
         if self._judge_at_us is not None and now_us >= self._judge_at_us:
             self._judge()
         vehicle = self._vehicle
-        if vehicle.mode is not _MODE:
+        if vehicle.mode is not FlightMode.MISSION:
             self._entered = False
-            if self.state is _ACTIVE:
+            if self.state is MissionState.ACTIVE:
                 self.state = MissionState.PAUSED
                 self._begun, self._arrived_us = False, None
                 self._send(self.message())

@@ -59,16 +59,10 @@ class Activity(Enum):
     CRUISE = auto()
 
 
-# bound once, for an enumeration's attributes are slow to find and a step looks at many
-_REST, _CLIMB, _TRACK, _RETURN_CLIMB, _RETURN_CROSS, _RETURN_WAIT = tuple(Activity)[:6]
-_CIRCLE, _DESCEND, _TOUCHED, _FALL, _WRECK, _CRUISE = tuple(Activity)[6:]
-
-_RETURN = FlightMode.RETURN
-
 _FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
 
-_DOWN = (_REST, _TOUCHED, _WRECK)
-_STEADY = (_TRACK, _DESCEND, _CIRCLE, _CRUISE)
+_DOWN = (Activity.REST, Activity.TOUCHED, Activity.WRECK)
+_STEADY = (Activity.TRACK, Activity.DESCEND, Activity.CIRCLE, Activity.CRUISE)
 """Activities that go on until something else is asked for, or the ground comes."""
 _VELOCITY_S = 3.0
 """A velocity that is not commanded again holds for so long (GUID_TIMEOUT); then it stands."""
@@ -107,7 +101,7 @@ class Multirotor:
         self._stood_s = 0.0  # since it was armed, or came down
         self._lifting_s: float | None = None  # until the motors carry it, if it is to lift off
         self._has_flown = False  # since it was armed
-        self._activity = _REST
+        self._activity = Activity.REST
         self._error = (0.0, 0.0)  # how far its estimate is off
         self._speed: float | None = None
         self._waiting_s = 0.0
@@ -121,22 +115,22 @@ class Multirotor:
     @property
     def in_air(self) -> bool:
         """Whether it has left the ground, and does not know that it came down."""
-        return self._activity is not _REST
+        return self._activity is not Activity.REST
 
     @property
     def flies(self) -> bool:
         """Whether it is in the air and obeys."""
-        return self._activity not in (_REST, _FALL, _WRECK)
+        return self._activity not in (Activity.REST, Activity.FALL, Activity.WRECK)
 
     @property
     def lies(self) -> bool:
         """Whether it lies on the ground as it came down."""
-        return self._activity is _WRECK
+        return self._activity is Activity.WRECK
 
     @property
     def descends(self) -> bool:
         """Whether it is on its way down to land, or has come down."""
-        return self._activity in (_DESCEND, _TOUCHED)
+        return self._activity in (Activity.DESCEND, Activity.TOUCHED)
 
     @property
     def orders(self) -> tuple[object, ...]:
@@ -147,7 +141,7 @@ class Multirotor:
     def speed(self) -> float:
         """The ground speed that it flies to a target with."""
         handling, speed = self.handling, self._speed
-        if self.mode is _RETURN and handling.return_speed > 0:
+        if self.mode is FlightMode.RETURN and handling.return_speed > 0:
             speed = handling.return_speed
         elif speed is None:
             speed = handling.cruise
@@ -178,10 +172,10 @@ class Multirotor:
         self.takeoff_up = None
         self.destination, self.sent, self.paused = None, False, False
         self._lifting_s = None
-        if self._activity in (_REST, _TOUCHED, _WRECK):
-            self._activity, self.landed = _REST, Landed.ON_GROUND
+        if self._activity in (Activity.REST, Activity.TOUCHED, Activity.WRECK):
+            self._activity, self.landed = Activity.REST, Landed.ON_GROUND
         else:
-            self._activity = _FALL
+            self._activity = Activity.FALL
             self.landed = Landed.ON_GROUND  # autopilots call a vehicle landed that is disarmed, wherever it is
         self.events.append(event)
         if self.handling.after_landing is not None and not self.in_air:
@@ -199,7 +193,7 @@ class Multirotor:
         """Has flown into something: it falls. The motors are on, for all that the autopilot knows."""
         if not self.crashed:
             self.crashed = True
-            self._activity = _FALL
+            self._activity = Activity.FALL
             self.body.crash()
 
     def set_mode(self, mode: FlightMode) -> None:
@@ -236,10 +230,10 @@ class Multirotor:
     def climb(self) -> None:
         """Takes off to `takeoff_up` if armed, and if that is above where it is."""
         up = self.takeoff_up
-        if not self.armed or up is None or up <= self.body.up or self._activity is _FALL:
+        if not self.armed or up is None or up <= self.body.up or self._activity is Activity.FALL:
             return
         if self.in_air:
-            self._hold(_CLIMB, up)
+            self._hold(Activity.CLIMB, up)
             self.landed = Landed.TAKEOFF
         else:
             self._lift(self._believed(self.body.north, self.body.east, up))
@@ -278,7 +272,7 @@ class Multirotor:
     def land_here(self) -> None:
         """Descends and lands, whatever the mode."""
         if self.flies:
-            self._hold(_DESCEND, self.body.up)
+            self._hold(Activity.DESCEND, self.body.up)
             self._waiting_s = 0.0
             self.landed = Landed.LANDING
 
@@ -288,7 +282,7 @@ class Multirotor:
         """
         if self.flies:
             body = self.body
-            self._hold(_RETURN_CLIMB, body.up)
+            self._hold(Activity.RETURN_CLIMB, body.up)
             if self.handling.comes_back:
                 self.target = self.destination = self._believed(body.north, body.east, body.up)
                 self._steer_to_target()
@@ -313,14 +307,14 @@ class Multirotor:
             self.destination, self.sent = target, True
             if self.paused:
                 return
-            if target != self.target or self._activity is not _TRACK:
+            if target != self.target or self._activity is not Activity.TRACK:
                 self._past, self._comes_back = None, False
                 if past:
                     self._fly_past(target)
             self.target = target
             self._nose = None
             self._steer_to_target()
-            self._activity = _TRACK
+            self._activity = Activity.TRACK
             self.landed = Landed.IN_AIR
         elif self.armed and not self.in_air and self.handling.lifts_to_targets and target.up > self.body.up:
             self._lift(target)
@@ -336,7 +330,7 @@ class Multirotor:
     def _cruise(self, north: float, east: float, up: float) -> None:
         self._past, self._comes_back = None, False
         self._hardest = self.handling.acceleration
-        self._activity, self._velocity, self._waiting_s = _CRUISE, (north, east, up), _VELOCITY_S
+        self._activity, self._velocity, self._waiting_s = Activity.CRUISE, (north, east, up), _VELOCITY_S
         self.landed = Landed.IN_AIR
 
     def shift_east(self, metres: float) -> None:
@@ -349,7 +343,7 @@ class Multirotor:
         if self.flies:
             self.target, self._radius = centre, radius
             self._past = None
-            self._activity = _CIRCLE
+            self._activity = Activity.CIRCLE
             self.landed = Landed.IN_AIR
 
     # ------------------------------------------------------------------------------------------------- in time
@@ -367,8 +361,8 @@ class Multirotor:
             self._stand(dt)
             return battery.IDLE if self.armed else battery.REST
         if not powered:
-            self._activity = activity = _FALL
-        if activity is _FALL:
+            self._activity = activity = Activity.FALL
+        if activity is Activity.FALL:
             body.fall(dt)
         else:
             self._fly(dt, wind, error, sees)
@@ -383,7 +377,7 @@ class Multirotor:
         """A place as it takes it to be: it steers by its estimate, which may be off."""
         return Point(north + self._error[0], east + self._error[1], up)
 
-    def _hold(self, activity: Activity = _TRACK, up: float | None = None) -> None:
+    def _hold(self, activity: Activity = Activity.TRACK, up: float | None = None) -> None:
         """Stops where it can, at the height `up`, or where it can stop climbing as well."""
         body, agility = self.body, self.handling.agility
         stop = agility.brake if self.mode is FlightMode.BRAKE else agility.stop
@@ -415,12 +409,12 @@ class Multirotor:
 
     def _fly(self, dt: float, wind: tuple[float, float], error: tuple[float, float], sees: bool) -> None:
         body, agility = self.body, self.handling.agility
-        if self._activity is not _TRACK:
+        if self._activity is not Activity.TRACK:
             self._waiting_s -= dt
             if self._activity not in _STEADY:
                 self._advance(error)
         activity, target, past = self._activity, self.target, self._past
-        most = agility.takeoff_acceleration if activity is _CLIMB else agility.climb_acceleration
+        most = agility.takeoff_acceleration if activity is Activity.CLIMB else agility.climb_acceleration
         north, east = target.north - error[0], target.east - error[1]
         if self.blind or not sees:
             self.blind = True
@@ -433,9 +427,9 @@ class Multirotor:
             else:
                 north, east = north + past.north, east + past.east
         speed = self.speed
-        if activity is _CRUISE:
+        if activity is Activity.CRUISE:
             want = self._velocity[:2] if self._waiting_s > 0 else (0.0, 0.0)
-        elif activity is _CIRCLE:
+        elif activity is Activity.CIRCLE:
             want = guidance.around(body, north, east, self._radius, speed)
         else:
             if self._comes_back:
@@ -452,26 +446,26 @@ class Multirotor:
         """Goes on to the next part of a takeoff or a return when the present one is done."""
         activity, body = self._activity, self.body
         away = abs(self.target.up - body.up)
-        if activity is _CLIMB:
+        if activity is Activity.CLIMB:
             if away < self.handling.agility.takeoff_within:
-                self._activity = _TRACK
+                self._activity = Activity.TRACK
                 self.landed = Landed.IN_AIR
                 self.takeoff_up = None
                 if self.mode is FlightMode.TAKEOFF and self.handling.after_takeoff is not None:
                     self.mode = self.handling.after_takeoff
-        elif activity is _RETURN_CLIMB:
+        elif activity is Activity.RETURN_CLIMB:
             if away < guidance.ARRIVED_M and abs(body.v_up) < guidance.ARRIVED_M_S:
                 self.target = self.destination = Point(0.0, 0.0, self.target.up)
                 self._fly_past(self.target)
                 self._steer_to_target()
-                self._activity = _RETURN_CROSS
-        elif activity is _RETURN_CROSS:
+                self._activity = Activity.RETURN_CROSS
+        elif activity is Activity.RETURN_CROSS:
             within = self.handling.agility.home_within
             if guidance.is_above(body, self.target.north - error[0], self.target.east - error[1], within):
-                self._activity = _RETURN_WAIT
+                self._activity = Activity.RETURN_WAIT
                 self._waiting_s = self.handling.agility.return_wait_s
         elif self._waiting_s <= 0:
-            self._activity = _DESCEND
+            self._activity = Activity.DESCEND
             self.destination = Point(self.target.north, self.target.east, 0.0)
             self.landed = Landed.LANDING
             self.events.append(VehicleEvent.HOME)
@@ -482,26 +476,26 @@ class Multirotor:
 
     def _wanted_climb(self, north: float, east: float) -> float:
         activity, body = self._activity, self.body
-        if activity is _CRUISE:
+        if activity is Activity.CRUISE:
             return self._velocity[2] if self._waiting_s > 0 else 0.0
-        if activity is _DESCEND:
+        if activity is Activity.DESCEND:
             return 0.0 if self._waiting_s > 0 else guidance.landing_rate(body, self.handling)
         up = self.target.up
-        rate = guidance.climb_rate(body.up, up, self.handling, activity is _CLIMB)
-        return within(rate, guidance.steepest(body, north, east, up)) if activity is _TRACK else rate
+        rate = guidance.climb_rate(body.up, up, self.handling, activity is Activity.CLIMB)
+        return within(rate, guidance.steepest(body, north, east, up)) if activity is Activity.TRACK else rate
 
     # ---------------------------------------------------------------------------------------------- on the ground
 
     def _stand(self, dt: float) -> None:
         handling = self.handling
         self._stood_s += dt
-        if self._activity is _TOUCHED:
+        if self._activity is Activity.TOUCHED:
             if self._stood_s >= handling.agility.land_detect_s:
                 self._stood_s = 0.0
-                self._activity = _REST
+                self._activity = Activity.REST
                 self.landed = Landed.ON_GROUND
                 self.events.append(VehicleEvent.LANDED)
-        elif self._activity is _WRECK:
+        elif self._activity is Activity.WRECK:
             if self.armed and handling.crash_disarm_s is not None and self._stood_s >= handling.crash_disarm_s:
                 self.disarm(VehicleEvent.CRASHED)
         elif self._lifting_s is not None:
@@ -518,7 +512,7 @@ class Multirotor:
         self.events.append(VehicleEvent.TAKEOFF)
         self._steer_to_target()
         climbs = self.takeoff_up is not None
-        self._activity = _CLIMB if climbs else _TRACK
+        self._activity = Activity.CLIMB if climbs else Activity.TRACK
         self.landed = Landed.TAKEOFF if climbs else Landed.IN_AIR
 
     def _touch_down(self) -> None:
@@ -530,9 +524,9 @@ class Multirotor:
             [VehicleEvent.TOUCHED, VehicleEvent.TIPPED] if self.crashed and self.armed else [VehicleEvent.TOUCHED]
         )
         if not self.armed:
-            self._activity = _REST
+            self._activity = Activity.REST
         else:
-            self._activity = _WRECK if self.crashed else _TOUCHED
+            self._activity = Activity.WRECK if self.crashed else Activity.TOUCHED
         self.landed = self.landed if self.armed else Landed.ON_GROUND
         self._stood_s = 0.0
         self.blind = False

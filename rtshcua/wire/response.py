@@ -29,8 +29,6 @@ NO_TARGET: Final = -(1 << 15) - 1
 NO_CLAUSE: Final = -1
 
 _OUTCOMES: Final = tuple(Outcome)
-#: by slug: an enumeration's own hash is slow
-_REASONS: Final = {reason.value: number for reason, number in REASON_NUMBERS.items()}
 _HEAD: Final = Struct(">BBBBiiqB")
 
 
@@ -43,9 +41,6 @@ class Status(IntEnum):
     NOT_CURRENT = 3  # the bundle has it, but its turn has not come
     CLOCK_APART = 4  # the time of day that it names is not the boundary's own
     CLOCK_UNKNOWN = 5  # it names one, and the boundary knows of none
-
-
-_DECIDED: Final = Status.DECIDED  # an enumeration's attributes are slow to find
 
 
 def shared_clauses(policy: Policy) -> tuple[Rule | Airspace, ...]:
@@ -61,9 +56,9 @@ def own_clauses(contract: Contract) -> tuple[Clause, ...]:
 def encode(decision: Decision, clause: int, target: int, evidence: bytes) -> bytes:
     """The octets of a decision, with the numbers of its clause and its target, and the boundary's digest."""
     body = _HEAD.pack(
-        _DECIDED,
+        Status.DECIDED,
         decision.outcome,
-        _REASONS[decision.reason._value_],
+        REASON_NUMBERS[decision.reason],
         decision.step,
         clause,
         target,
@@ -87,7 +82,7 @@ def decode(data: bytes, policy: Policy, contract: Contract | None) -> Decision |
     if not data.startswith(prefix) or len(data) != end + DIGEST_BYTES:
         return Refusal("malformed", f"not a response of version {names.RESPONSE.version}")
     status, outcome, reason, step, clause, target, valid_until_us, consumed = _HEAD.unpack_from(data, head)
-    if status != _DECIDED:
+    if status != Status.DECIDED:
         refused = Status(status) if status < len(Status) else None
         if refused is None or data != encode_refusal(refused, data[end:]):
             return Refusal("malformed", "a refusal with more than its status")

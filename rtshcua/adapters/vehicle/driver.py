@@ -68,7 +68,6 @@ _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 #: how many kinds of others that speak under its ids are told of: whoever makes them up has 65,536
 _MOST_STRANGERS = 8
 _OF_PREFLIGHT = frozenset(preflight.HEEDED)
-_heard = tuple.__new__  # the constructor that a named tuple is given is a function more
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
 
 
@@ -292,8 +291,8 @@ class Driver:
                 if told or (manoeuvre is not None and now_us >= manoeuvre.due_us):
                     self._advance(now_us, send, events)
         if self.flavour is None:
-            return _heard(DatagramContents, (events, self._ask_who(received, now_us) if self.hurries else [], received))
-        return _heard(DatagramContents, (events, self._pack(send, now_us, events) if send else [], received))
+            return DatagramContents(events, self._ask_who(received, now_us) if self.hurries else [], received)
+        return DatagramContents(events, self._pack(send, now_us, events) if send else [], received)
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """What is due at a time: heartbeat, requests for streams, retries, a link that went down."""

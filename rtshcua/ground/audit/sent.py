@@ -23,7 +23,6 @@ _ASKS: Final = frozenset(
 )
 _AREAS: Final = 4  # a bit of FENCE_TYPE
 
-_head, _layout = HEAD.unpack_from, LAYOUTS.get  # bound once: every frame that was kept comes by here
 _number: Final = LAYOUTS[COMMAND_LONG].getter("command")
 _parameters: Final = {
     message: LAYOUTS[message].getter("param_id param_value param_type") for message in (PARAM_SET, layouts.PARAM_VALUE)
@@ -57,9 +56,9 @@ def read(octets: bytes) -> Frame | None:
     """What a frame says; None if the octets are no whole frame of MAVLink 2."""
     if len(octets) < HEADER or octets[0] != MARKER or len(octets) < HEADER + octets[1]:
         return None
-    _, length, _, _, _, system, component, low, high = _head(octets)
+    _, length, _, _, _, system, component, low, high = HEAD.unpack_from(octets)
     message = low | high << 16
-    layout = _layout(message)
+    layout = LAYOUTS.get(message)
     fields = () if layout is None or length > layout.fields.size else layout.read(octets)
     return Frame(system, component, message, fields)
 

@@ -73,11 +73,11 @@ def _repeat(first: int, *more: int) -> Make:
 
 
 def _call(kept: tuple[int | None, ...], reader: Reader, action: Action) -> Make:
-    new, file, act = tuple.__new__, reader.source.file, MethodType(action, reader)
+    file, act = reader.source.file, MethodType(action, reader)
 
     def make(values: list[Any], base: int, start: int, end: int) -> object:
         arguments = [None if at is None else values[base + at] for at in kept]
-        return act(new(Span, (file, start, end)), *arguments)
+        return act(Span(file, start, end), *arguments)
 
     def make_spreading(values: list[Any], base: int, start: int, end: int) -> object:
         arguments: list[Any] = []
@@ -88,7 +88,7 @@ def _call(kept: tuple[int | None, ...], reader: Reader, action: Action) -> Make:
                 arguments.append(values[base + at])
             else:
                 arguments += values[base + ~at]
-        return act(new(Span, (file, start, end)), *arguments)
+        return act(Span(file, start, end), *arguments)
 
     return make_spreading if any(at is not None and at < 0 for at in kept) else make
 

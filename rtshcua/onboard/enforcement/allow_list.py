@@ -37,8 +37,6 @@ class Frame(NamedTuple):
     target: tuple[int, int] | None
 
 
-_frame = tuple.__new__  # the constructor that a named tuple is given is a function more
-_head, _layout = HEAD.unpack_from, LAYOUTS.get  # bound once: every frame that is heard comes by here
 _TARGETS = {number: layout.at("target_system") for number, layout in LAYOUTS.items()}
 
 
@@ -50,15 +48,15 @@ def read_frame(octets: bytes) -> Frame | None:
     """
     if len(octets) < HEADER or octets[0] != MARKER:
         return None
-    _, length, incompatible, compatible, _, system, component, low, high = _head(octets)
+    _, length, incompatible, compatible, _, system, component, low, high = HEAD.unpack_from(octets)
     message = low | high << 16
-    layout = _layout(message)
+    layout = LAYOUTS.get(message)
     if layout is None or incompatible or compatible or len(octets) != HEADER + length + CHECKSUM:
         return None
     if length > layout.fields.size:
         return None
     fields, target = layout.read(octets), _TARGETS[message]
-    return _frame(Frame, (system, component, message, fields, None if target < 0 else fields[target : target + 2]))
+    return Frame(system, component, message, fields, None if target < 0 else fields[target : target + 2])
 
 
 # ---------------------------------------------------------------- housekeeping

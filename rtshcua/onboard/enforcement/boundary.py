@@ -35,9 +35,6 @@ from rtshcua.wire.untrusted import Untrusted
 #: how far UTC and monotonic time may part in a session, in us: more than a good clock is off, and less than matters
 CLOCKS_PART_US: Final = 3_000_000
 _Numbers = dict[Clause | Rule | Airspace, int]
-_ALLOW: Final = Outcome.ALLOW  # an enumeration's attributes are slow to find
-_tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
-_REASONS: Final = {reason.value: number for reason, number in REASON_NUMBERS.items()}  # by slug: its own hash is slow
 
 
 class PermitIssuer:
@@ -117,7 +114,7 @@ class SoftwareBoundary:
         if disowned is not None:
             return self._refuse(disowned, request)
         self._now_us = now_us
-        ref = _tuple(Ref, (asked.kind, asked.step, asked.link))
+        ref = Ref(asked.kind, asked.step, asked.link)
         refused = self._session.refusal(ref)
         if refused is not None:
             return self._refuse(refused, request)
@@ -138,7 +135,7 @@ class SoftwareBoundary:
 
     def _chained(self, request: bytes, asked: Request, decision: Decision, clause: int, target: int) -> bytes:
         """The digest of the boundary's own evidence, with this answer in it."""
-        reason = _REASONS[decision.reason._value_]
+        reason = REASON_NUMBERS[decision.reason]
         payload = boundary_chain.decided(
             request, decision.outcome, reason, decision.step, target, decision.valid_until_us, decision.consumed
         )
@@ -239,7 +236,7 @@ class SoftwareBoundary:
 
     def _permit(self, prepared: PreparedInvocation, decision: Decision, now_us: int) -> bytes:
         not_after_us = decision.valid_until_us
-        if decision.outcome is not _ALLOW:
+        if decision.outcome is not Outcome.ALLOW:
             if self._enforced:
                 return b""
             not_after_us = now_us + LINK_VALID_US

@@ -138,7 +138,7 @@ class Admission:
     ) -> Iterable[Action]:
         """An answer as it is shown, announced and recorded; `of` is the step asked about, or whose link it is."""
         now, clause, subject = asked.now, answer.clause, self._subject(ref, of)
-        outcome, reason = _OUTCOMES[answer.outcome], answer.reason._value_  # `value` is a property in Python, and slow
+        outcome, reason = _OUTCOMES[answer.outcome], answer.reason.value
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, "" if clause is None else clause.text))
         why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
         yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")

@@ -41,8 +41,6 @@ LATE: Final = "nothing was sent: this computer was too busy, or its disk too slo
 _LATE: Final = ("late", frames.LATE.slug)
 #: what ends a run matters more the further down it stands
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
-_UP = LinkState.UP  # an enumeration's attributes are slow to find
-_WAITING, _DECIDING, _RUNNING, _FALLING, _ENDED = RunStage
 
 
 class MissionController:
@@ -58,7 +56,7 @@ class MissionController:
         self._limits = limits
         self._resumed = resumed
         self._unfit = ""  # why it will never be ready, however long it is waited for
-        self.stage = _WAITING
+        self.stage = RunStage.WAITING
         self.ending: Ending | None = None
         #: that the vehicle may be flying when the run is over, and why it is not watched; empty where it does not
         self.may_fly = ""
@@ -94,25 +92,30 @@ class MissionController:
 
     # -------------------------------------------------------- turns: what is to be done now, by stage
 
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over."""
+        return self.stage is RunStage.ENDED
+
     def turn(self, now: Now) -> bool:
         """Do one thing that can be done now; False when there is none left."""
         if self._began_us is None:
             self._began_us = now.monotonic_us
         self.look_at_boundary(now)
-        if self.stage is _ENDED or (self.link.state is not _UP and not self._judges(now)):
+        if self.ended or (self.link.state is not LinkState.UP and not self._judges(now)):
             return False
         if self.link.mute and self._is_gone(now.monotonic_us):
             self._journal.effect(now, "link-lost", detail="it is heard, but answers nothing")
             self.stand_down(now, Ending.LINK_LOST)
             return False
         stage = self.stage
-        if stage is _RUNNING:
+        if stage is RunStage.RUNNING:
             return self._supervise(now)
-        if stage is _FALLING:
+        if stage is RunStage.FALLING:
             return self._fall(now)
-        if stage is _DECIDING:
+        if stage is RunStage.DECIDING:
             return self._decide(now)
-        return stage is _WAITING and self._wait(now, self._began_us)  # to judge may have ended the run
+        return stage is RunStage.WAITING and self._wait(now, self._began_us)  # to judge may have ended the run
 
     def _judges(self, now: Now) -> bool:
         """Whether the vehicle is heard again, and what is known of it may be judged."""
@@ -151,7 +154,7 @@ class MissionController:
         if policy.after_silence != AfterSilence.CONTINGENCY or silence.lasted_us <= policy.silence_us:
             return
         ends = self.dispatcher.homeward and self.queue.at_last  # then nothing is left to be given up
-        if self.aloft and self.stage in (_DECIDING, _RUNNING) and not ends:
+        if self.aloft and self.stage in (RunStage.DECIDING, RunStage.RUNNING) and not ends:
             text = f"{silence.lasted_us // 1_000} ms, more than {policy.silence_us // 1_000} ms"
             self._journal.effect(now, "long-silence", detail=text)
             self.break_off(now, Ending.ABORTED, CONTINGENCY_LINK)
@@ -179,7 +182,7 @@ class MissionController:
             self._journal.effect(now, "resumed" if self._resumed else "already-airborne")
             return self._come_down(now)
         self.queue.release(now.monotonic_us)
-        self.stage = _DECIDING
+        self.stage = RunStage.DECIDING
         return True
 
     def _decide(self, now: Now) -> bool:
@@ -242,7 +245,7 @@ class MissionController:
         self._supervisor = Supervisor(
             prepared, self._loaded.policy, now.monotonic_us, self.link.away_us(now.monotonic_us)
         )
-        self.stage = _RUNNING
+        self.stage = RunStage.RUNNING
         return False
 
     def _inadmissible(self, now: Now, invocation: Invocation) -> bool:
@@ -284,7 +287,7 @@ class MissionController:
     def prepare(self, now: Now) -> None:
         """Look ahead at what the running step's fallback would need where the vehicle is now, if it moved."""
         current = self.queue.current
-        if self.stage is _RUNNING and current is not None and self.monitor.moved():
+        if self.stage is RunStage.RUNNING and current is not None and self.monitor.moved():
             prepared = self._loaded.invocations[current.step]
             look_ahead(prepared, self.monitor.state(now.monotonic_us), self._loaded.policy, now)
 
@@ -295,13 +298,15 @@ class MissionController:
         self.link.air_reported()
         ours = self.dispatcher.dispatched
         came_down = self.vehicle.report(armed=event.armed, airborne=event.airborne, ours=ours)
-        if self.stage is _DECIDING:
+        if self.stage is RunStage.DECIDING:
             if ours and self.vehicle.at_rest:
                 self._rests(now)
             elif not ours and event.airborne:  # a flight that this run did not begin is the pilot's
                 self._journal.effect(now, "taken-over", detail="took off")
                 self.stand_down(now, Ending.STOOD_DOWN)
-        elif came_down and (self.stage is _FALLING or (self.stage is _RUNNING and not self.dispatcher.homeward)):
+        elif came_down and (
+            self.stage is RunStage.FALLING or (self.stage is RunStage.RUNNING and not self.dispatcher.homeward)
+        ):
             self.down(now)
 
     def unfit(self, why: str) -> None:
@@ -314,7 +319,7 @@ class MissionController:
         if active is None:
             return
         self.dispatcher.end(now, "succeeded")
-        if self.stage is _RUNNING:
+        if self.stage is RunStage.RUNNING:
             if active.homeward:
                 self._landed()
             self._advance(now)
@@ -326,17 +331,17 @@ class MissionController:
         if self.dispatcher.flying(event.token) is None:
             return
         self.dispatcher.end(now, "failed", self._why_failed(event))
-        if self.stage is _RUNNING and event.reason in _LATE and self.dispatcher.withdraw(now):
+        if self.stage is RunStage.RUNNING and event.reason in _LATE and self.dispatcher.withdraw(now):
             self._supervisor = None
             self.retry.renew(now.monotonic_us, at_once=True)
-            self.stage = _DECIDING
-        elif event.reason in _LATE and self.stage is _FALLING:
+            self.stage = RunStage.DECIDING
+        elif event.reason in _LATE and self.stage is RunStage.FALLING:
             self._fallback.late()
-        elif self.stage is _DECIDING and self.aloft:
+        elif self.stage is RunStage.DECIDING and self.aloft:
             # It was a hold: whatever the vehicle does, it does not wait where it should.
             if event.reason not in _LATE or not self.retry.hold_again():
                 self.fall_back(FALLBACK_LINK, holds=False)
-        elif self.stage is not _RUNNING:
+        elif self.stage is not RunStage.RUNNING:
             return
         elif event.reason == WITHHELD and not self._recording:
             self._come_down(now, cause=Ending.EVIDENCE_LOST)
@@ -405,12 +410,12 @@ class MissionController:
         self._blame(cause)
         if not self.aloft:
             self._end(now, cause)
-        elif self.stage is not _FALLING and not self.dispatcher.homeward:
-            self.fall_back(kind if self.stage is _RUNNING else CONTINGENCY_LINK, cause)
+        elif self.stage is not RunStage.FALLING and not self.dispatcher.homeward:
+            self.fall_back(kind if self.stage is RunStage.RUNNING else CONTINGENCY_LINK, cause)
 
     def look_at_boundary(self, now: Now) -> None:
         """Where the boundary is lost nothing more is decided: the mission is given up."""
-        if self._alone or self.stage is _ENDED or not self._journal.look_at_boundary(now):
+        if self._alone or self.stage is RunStage.ENDED or not self._journal.look_at_boundary(now):
             return
         self._alone = True
         if self.aloft:
@@ -449,14 +454,16 @@ class MissionController:
     def released(self) -> int:
         """How many steps do not change any more: those that were released, but for one that waits to be replaced."""
         current = self.queue.current
-        waits = current is not None and current.on_inadmissible == OnInadmissible.REPLAN and self.stage is _DECIDING
+        waits = (
+            current is not None and current.on_inadmissible == OnInadmissible.REPLAN and self.stage is RunStage.DECIDING
+        )
         return self.queue.released - (waits and self.queue.released > 0)
 
     def replaced(self, now: Now, first: int) -> None:
         """A replacement is in force: the steps from `first` on are others now."""
         mission, current = self._loaded.bundle.mission, self.queue.current
         self.queue.replace(mission, first, now.monotonic_us)
-        if current is not None and first <= current.step and self.stage is _DECIDING:
+        if current is not None and first <= current.step and self.stage is RunStage.DECIDING:
             self.retry.renew(now.monotonic_us, at_once=True)
         self._journal.add(Expect(mission.invocations))
 
@@ -474,14 +481,14 @@ class MissionController:
         else:
             step = current.step if current is not None and kind == FALLBACK_LINK else -1
             self._fallback.begin(kind, step, holds=holds)
-        self.stage = _FALLING
+        self.stage = RunStage.FALLING
 
     def leave(self) -> None:
         """Nobody will watch any more: unless it is on its way home or down already, the last link flies."""
-        if self.stage is not _ENDED and self.aloft and not self.dispatcher.homeward:
+        if self.stage is not RunStage.ENDED and self.aloft and not self.dispatcher.homeward:
             self._blame(Ending.INTERRUPTED)
             self._fallback.land()
-            self.stage = _FALLING
+            self.stage = RunStage.FALLING
 
     def stand_down(self, now: Now, ending: Ending, *, failsafe: bool = False, paused: bool = False) -> None:
         """Send nothing more, whatever flies, and end. `failsafe`: the autopilot's own flies it. `paused`: it stands."""
@@ -514,7 +521,7 @@ class MissionController:
         # Where no step begins without records, the disk first gets a moment to say what became of those so far.
         at_once = self._policy.without_evidence != WithoutEvidence.REFUSE
         self.retry.renew(now.monotonic_us, at_once=at_once)
-        self.stage = _DECIDING
+        self.stage = RunStage.DECIDING
 
     def _end(self, now: Now, ending: Ending) -> None:
         if not self.may_fly and ending is not Ending.CRASHED and (self.aloft or self.dispatcher.done):
@@ -522,7 +529,7 @@ class MissionController:
             self._journal.effect(now, MAY_FLY, detail=self.may_fly)
         self.admission.flush(now)
         self._journal.tell_counted(now, ended=True)
-        self.stage = _ENDED
+        self.stage = RunStage.ENDED
         self.ending = ending
         self._loaded.executor.release()
         self._journal.add(End(ending))
@@ -556,13 +563,13 @@ class MissionController:
 
     def _left_us(self, at_us: int) -> int | None:
         active, current, released_us = self.dispatcher.active, self.queue.current, self.queue.released_us
-        if self.stage is _DECIDING and current is not None and released_us is not None:
+        if self.stage is RunStage.DECIDING and current is not None and released_us is not None:
             return released_us + current.contract.deadline_us - at_us
         if active is None:
             return None
         if active.until_us is not None:
             return active.until_us - at_us
-        supervisor = self._supervisor if self.stage is _RUNNING else None
+        supervisor = self._supervisor if self.stage is RunStage.RUNNING else None
         if supervisor is not None and current is not None and current.contract.duration_us:
             return current.contract.duration_us - supervisor.lasted_us(at_us, self.link.away_us(at_us))
         return None

@@ -11,8 +11,6 @@ from rtshcua.onboard.runtime.dispatcher import Dispatcher
 from rtshcua.onboard.runtime.limits import Limits, link_us
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, Ref
 
-_tuple = tuple.__new__  # the constructor that a named tuple is given is a function more
-
 
 class _Chain(msgspec.Struct):
     """A chain that is being flown: its kind, the step it belongs to (-1: the contingency), and the last link used.
@@ -31,7 +29,7 @@ class _Chain(msgspec.Struct):
 
     def ref(self, index: int) -> Ref:
         """The link of this index."""
-        return _tuple(Ref, (self.kind, self.step, index))
+        return Ref(self.kind, self.step, index)
 
 
 class Fallback:

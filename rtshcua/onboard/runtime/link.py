@@ -48,9 +48,6 @@ class LinkState(Enum):
     AWAITING = auto()
 
 
-_DOWN = LinkState.DOWN  # an enumeration's attributes are slow to find
-
-
 class LinkSupervision:
     """Whether the vehicle is heard, and whether what is known of it may be judged. Times are monotonic, in us.
 
@@ -93,7 +90,7 @@ class LinkSupervision:
     @property
     def down(self) -> bool:
         """Whether the vehicle is not heard: nothing that is sent would arrive."""
-        return self.state is _DOWN
+        return self.state is LinkState.DOWN
 
     @property
     def mute(self) -> bool:

@@ -33,7 +33,6 @@ REFUSED_EVERY_US: Final = 1_000_000
 
 #: what is taken over before a crash or a takeover: it changes no stage, and tells how it came to that
 _TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.StatusText, ports.Noted, ports.Hindered)
-_RUNNING, _ENDED = RunStage.RUNNING, RunStage.ENDED  # an enumeration's attributes are slow to find
 
 
 class Runtime:
@@ -76,13 +75,13 @@ class Runtime:
         """
         controller, monitor = self._controller, self._controller.monitor
         before_us, self._stepped_us = self._stepped_us, now.monotonic_us
-        if before_us is not None and now.monotonic_us - before_us > self._stalled_us and controller.stage is not _ENDED:
+        if before_us is not None and now.monotonic_us - before_us > self._stalled_us and not controller.ended:
             controller.stalled(now, before_us)
         for event in last_words_first(events):
-            if isinstance(event, Readings) and controller.stage is _RUNNING and monitor.hides(event):
+            if isinstance(event, Readings) and controller.stage is RunStage.RUNNING and monitor.hides(event):
                 controller.turn(now)  # no state goes by unwatched, however many came at once
                 monitor.seen()
-            if controller.stage is not _ENDED:
+            if not controller.ended:
                 self._handler.take(now, event)
         monitor.observe(now)
         while controller.turn(now):
@@ -91,7 +90,7 @@ class Runtime:
 
     def actions(self, now: Now) -> list[Action]:
         """The second half of a step, at the same moment: all that is to be done, in its order."""
-        ended = self._controller.stage is _ENDED
+        ended = self._controller.ended
         if not ended:
             self._journal.tell_counted(now)
         return self._journal.take(now, ended=ended)

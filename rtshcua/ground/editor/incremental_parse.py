@@ -28,7 +28,7 @@ from rtshcua.model.ir.tests import Quoted
 
 N = TypeVar("N", bound=Node)
 
-_make = tuple.__new__
+_make = tuple.__new__  # a constructor is a function more: 9 % of moving a text of 2,000 lines (bench/editor.py)
 
 
 def moved(node: N, by: int) -> N:

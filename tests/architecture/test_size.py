@@ -12,14 +12,14 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
     "modules": 798,
-    "code lines": 84_417,
-    "shared class names": 58,
-    "of them across packages": 38,
+    "code lines": 84_264,
+    "shared class names": 57,
+    "of them across packages": 37,
     "shared file names": 95,
     "import cycles": 0,
     "modules below 80 lines with one importer": 35,
     "functions of more than 60 lines": 21,
-    "functions of a complexity over 15": 150,
+    "functions of a complexity over 15": 143,
     "functions of a complexity over 25": 9,
 }
 

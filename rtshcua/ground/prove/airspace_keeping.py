@@ -118,27 +118,27 @@ def breach_text(policy: Policy, airspace: PreparedAirspace, legs: Sequence[Leg],
     existed; to stand after "would".
     """
     error = policy.vehicle.position_error
-    box = (-error, -error, error, error)
+    box, within = (-error, -error, error, error), f"come within {_length(error)} of"
+    places = list(places_along(legs))
+
+    def near(what: str, zone: PreparedZone, place: Point) -> str:
+        return f"{what} `{policy.zones[zone.number].name}`, near {place_text(policy, place)}"
+
     for zone in airspace.inside:
         found = _vertical(policy, zone, low, high)
         if found is not None:
             return found
-        place = next((each for each in places_along(legs) if zone.along(each, box) != TRUE), None)
-        if place is not None:
-            exact = zone.along(place, _NO_BOX) == TRUE
-            return (f"come within {_length(error)} of the edge of" if exact else "leave") + _near_text(
-                policy, zone, place
-            )
+        for place in places:
+            if zone.along(place, box) != TRUE:
+                return near(f"{within} the edge of" if zone.along(place, _NO_BOX) == TRUE else "leave", zone, place)
     for zone in airspace.outside:
-        if zone.between(low, high) == FALSE:
-            continue
-        near = [each for each in places_along(legs) if zone.along(each, box) != FALSE]
-        if near:
-            entered = next((each for each in near if zone.along(each, _NO_BOX) != FALSE), None)
-            return (f"come within {_length(error)} of" if entered is None else "enter") + _near_text(
-                policy, zone, entered or near[0]
-            )
-    return f"come within {_length(error)} of the edge of the airspace" if error else "touch the edge of the airspace"
+        touched = [] if zone.between(low, high) == FALSE else [at for at in places if zone.along(at, box) != FALSE]
+        for place in touched:
+            if zone.along(place, _NO_BOX) != FALSE:
+                return near("enter", zone, place)
+        if touched:
+            return near(within, zone, touched[0])
+    return f"{within} the edge of the airspace" if error else "touch the edge of the airspace"
 
 
 def path_legs(points: Sequence[Point]) -> list[Leg]:
@@ -167,10 +167,6 @@ def places_along(legs: Sequence[Leg]) -> Iterator[Point]:
         count = min(isqrt((x1 - x0) ** 2 + (y1 - y0) ** 2) // _EVERY + 1, _MOST)
         for at in range(count + 1):
             yield x0 + (x1 - x0) * at // count, y0 + (y1 - y0) * at // count
-
-
-def _near_text(policy: Policy, zone: PreparedZone, place: Point) -> str:
-    return f" `{policy.zones[zone.number].name}`, near {place_text(policy, place)}"
 
 
 def _degrees(value: int, signs: str) -> str:

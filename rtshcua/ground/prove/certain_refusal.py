@@ -14,11 +14,12 @@ from rtshcua.decision import tree
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Span
 from rtshcua.decision.zones import NO_BOX
+from rtshcua.ground.analysis.condition_trees import ALWAYS, NEVER, replace_atoms
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.analysis.witness import Witness
 from rtshcua.ground.lower.zones import EVERYWHERE
-from rtshcua.ground.prove.proof_context import ALWAYS, NEVER, ProofContext, optimistic
+from rtshcua.ground.prove.proof_context import ProofContext, optimistic
 from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.zone import Zone
 
@@ -66,6 +67,11 @@ def refusing_rules(invocation: PreparedInvocation) -> tuple[Rule, ...]:
     return (*(each.rule for each in candidates.forbids), *(each.rule for each in candidates.degrades))
 
 
+def deciding_rules(invocation: PreparedInvocation) -> tuple[Rule, ...]:
+    """The permits of a step, and the rules that refuse it where they hold."""
+    return (*(each.rule for each in invocation.candidates.permits), *refusing_rules(invocation))
+
+
 class _Moment(NamedTuple):
     """A time in which no zone begins or ceases to exist on a date, where all is known of it; else the arguments of a
     step, for which what is not known goes its way.
@@ -91,38 +97,34 @@ def _between_dates(proof: ProofContext, utc: tuple[Span, ...]) -> Iterator[Span]
 
 
 def _optimistic_condition(proof: ProofContext, rule: Rule, hope: bool, time: _Moment) -> tree.Node | None:
-    key = (() if rule.when is None else rule.when.code, hope, time)
-    if key not in proof.hopes:
-        node = proof.prepared.compiler.when(rule)
-        proof.hopes[key] = None if node is None else optimistic(_at_time(proof, node, hope, time), hope)
-    return proof.hopes[key]
-
-
-def _at_time(proof: ProofContext, node: tree.Node, hope: bool, time: _Moment) -> tree.Node:
-    """A condition in which what dates decide is decided, and what is not known of the time is what brings it nearest to
-    `hope`: a place that is given is inside a zone, or not, while that exists.
+    """A rule's condition in the best case: what dates decide is decided, and what is not known of the time is what
+    brings it nearest to `hope`; a place that is given is inside a zone, or not, while that exists.
 
     What says that a zone exists, of a zone that is an argument, is to be in a place that is everywhere on those dates.
     """
-    policy = proof.policy
-    match node:
-        case tree.Both(left, right):
-            return tree.Both(_at_time(proof, left, hope, time), _at_time(proof, right, hope, time))
-        case tree.Either(left, right):
-            return tree.Either(_at_time(proof, left, hope, time), _at_time(proof, right, hope, time))
-        case tree.Negation(operand):
-            return tree.Negation(_at_time(proof, operand, not hope, time))
-        case tree.InWindow() | tree.InWeek() if time.known is TimeKnowledge.NOTHING:
-            return ALWAYS if hope else NEVER
-        case tree.InsideZone(number) if time.span is not None and _only_dates(policy.zones[number]):
-            zone = policy.zones[number]
-            return ALWAYS if zone.dates[0] <= time.span[0] <= zone.dates[1] else NEVER
-        case tree.PointInside(cell, number) if time.leaves_open(policy.zones[number]):
-            place = time.arguments[cell : cell + 2]
-            inside = proof.prepared.tables.zones[number].along(place, NO_BOX) == TRUE
-            return ALWAYS if inside and hope else NEVER
-        case _:
-            return node
+    key = (() if rule.when is None else rule.when.code, hope, time)
+    if key in proof.hopes:
+        return proof.hopes[key]
+    zones = proof.policy.zones
+
+    def best(atom: tree.Atom, hope: bool) -> tree.Node:
+        holds = hope
+        match atom:
+            case tree.InWindow() | tree.InWeek() if time.known is TimeKnowledge.NOTHING:
+                pass
+            case tree.InsideZone(number) if time.span is not None and _only_dates(zones[number]):
+                first, last = zones[number].dates
+                holds = first <= time.span[0] <= last
+            case tree.PointInside(cell, number) if time.leaves_open(zones[number]):
+                place = time.arguments[cell : cell + 2]
+                holds = hope and proof.prepared.tables.zones[number].along(place, NO_BOX) == TRUE
+            case _:
+                return atom
+        return ALWAYS if holds else NEVER
+
+    node = proof.prepared.compiler.when(rule)
+    proof.hopes[key] = None if node is None else optimistic(replace_atoms(node, best, hope), hope)
+    return proof.hopes[key]
 
 
 def _only_dates(zone: Zone) -> bool:

@@ -11,21 +11,22 @@ from functools import partial
 from typing import NamedTuple
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.analysis.condition_trees import minimal_conflict
 from rtshcua.ground.analysis.solve import Goal, No, Undecided, Yes, satisfiable
 from rtshcua.ground.analysis.space import SituationSpace
-from rtshcua.ground.prove.conjuncts import minimal_conflict
 from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import RuleKind
-from rtshcua.model.ir.missions import Step
+
+_AIRSPACE = "this is the airspace"
 
 
 class Conjunct(NamedTuple):
-    """Something that must hold: what it is, where it is written, its condition; of a clause, what that comes from."""
+    """Something that must hold: in words, where it is written, its condition; of a clause, what that comes from."""
 
     words: str
     span: Span
@@ -38,19 +39,17 @@ def prove_contracts(proof: ProofContext) -> None:
     permitted = {skill for rule in proof.policy.rules if rule.kind == RuleKind.PERMIT for skill in rule.skills}
     _nowhere(proof)
     for number, contract in enumerate(proof.policy.contracts):
-        space = proof.questions.space(number)
         parts = list(_clauses(proof, contract))
         _vacuous(proof, number, contract, parts)
-        name = proof.context.symbols.skills[contract.name].name.span
-        together = (
-            f"this part of `{contract.name}` can never hold",
-            f"these parts of `{contract.name}` never hold together",
-        )
-        airspace = list(_airspace(proof)) if number in permitted else []
-        before = len(proof.report.found)
-        _together(proof, [*airspace, *parts], space, ("skill", number), together, [(name, "the skill")], name)
-        if any(found.code is codes.CONTRADICTION for found in proof.report.found[before:]):
+        name = proof.skills[contract.name].name.span
+        parts = [*(_airspace(proof) if number in permitted else ()), *parts]
+        conflict = _conflict(proof, parts, proof.questions.space(number), ("skill", number), name)
+        if conflict:
             proof.impossible.add(number)
+            alone = f"this part of `{contract.name}` can never hold"
+            several = f"these parts of `{contract.name}` never hold together"
+            *others, main = conflict
+            _report(proof, main.span, several if others else alone, others, [(name, "the skill")])
 
 
 def _nowhere(proof: ProofContext) -> None:
@@ -58,68 +57,50 @@ def _nowhere(proof: ProofContext) -> None:
     declared, space = proof.lowered.declaration.airspace, proof.questions.space(0)
     if declared is None:
         return
-    zones = proof.lowered.zones
-    inside = [
-        (name, tree.InsideZone(zones.zone(name.text, 0, smaller=True, span=name.span))) for name in declared.inside
-    ]
-    outside = [
-        (name, tree.Negation(tree.InsideZone(zones.zone(name.text, 0, smaller=False, span=name.span))))
-        for name in declared.outside
-    ]
-    parts = [
-        Conjunct(words, name.span, node)
-        for words, every in (("inside", inside), ("outside", outside))
-        for name, node in every
-    ]
-
-    def goals() -> list[Goal]:
-        return [(part.node, TRUE) for part in parts]
-
-    def impossible(some: list[Conjunct]) -> bool:
-        return isinstance(satisfiable([(part.node, TRUE) for part in some], space), No)
-
-    if not isinstance(proof.questions.ask(("airspace",), goals, space), No):
+    parts: list[Conjunct] = []
+    for words, names in (("inside", declared.inside), ("outside", declared.outside)):
+        for name in names:
+            smaller = words == "inside"
+            inside = tree.InsideZone(proof.lowered.zones.zone(name.text, 0, smaller=smaller, span=name.span))
+            parts.append(Conjunct(words, name.span, inside if smaller else tree.Negation(inside)))
+    if not isinstance(proof.questions.ask(("airspace",), partial(_goals, parts), space), No):
         return
-    conflict = minimal_conflict(parts, impossible)
     proof.report.add(
         codes.CONTRADICTION,
         declared.span,
         "nothing is left of the airspace: the vehicle can be nowhere in it",
         help="it is inside of all zones after `inside`, and outside of all after `outside`: leave one out of those "
         "marked, or take their union",
-        labels=[(part.span, f"it must be {part.words} of this") for part in conflict],
+        labels=[(part.span, f"it must be {part.words} of this") for part in _minimal(parts, space)],
     )
 
 
-def prove_step_contract(proof: ProofContext, step: Step, invocation: PreparedInvocation) -> None:
+def prove_step_contract(proof: ProofContext, step: MissionStep) -> None:
     """Report a step whose contract contradicts itself, or the airspace, with the arguments that it has."""
-    flat = invocation.invocation
+    flat = step.flat
     if isinstance(proof.questions.known(("skill", flat.skill)), No):
         return  # said of the skill
-    clauses = (*flat.contract.require, *flat.contract.assume, *flat.contract.maintain)
-    key = ("step", flat.skill, invocation.arguments, tuple(clause.code for clause in clauses))
+    parts = list(_clauses(proof, flat.contract))
+    key = ("step", flat.skill, step.prepared.arguments, tuple(part.code for part in parts))
     if isinstance(proof.questions.known(key), Yes):
         return
     if step.overrides is not None:
-        skills = proof.policy.contracts[flat.skill]
-        known = {clause.span for clause in _clauses(proof, skills)}
-        own = [part for part in _clauses(proof, flat.contract) if part.span not in known]
-        _vacuous(proof, flat.skill, flat.contract, own)
-    space = proof.questions.space(flat.skill)._replace(arguments=invocation.arguments)
-    parts = [*_clauses(proof, flat.contract), *_airspace(proof)]
-    name = flat.contract.name
-    together = (
-        f"`{name}` can never begin with these arguments: this cannot hold",
-        f"`{name}` can never begin with these arguments: this never holds together",
-    )
-    _together(proof, parts, space, key, together, [], step.span)
+        known = {part.span for part in _clauses(proof, proof.policy.contracts[flat.skill])}
+        _vacuous(proof, flat.skill, flat.contract, [part for part in parts if part.span not in known])
+    space = proof.questions.space(flat.skill)._replace(arguments=step.prepared.arguments)
+    conflict = _conflict(proof, [*parts, *_airspace(proof)], space, key, step.span)
+    if conflict:
+        message = "this cannot hold" if len(conflict) == 1 else "this never holds together"
+        _report(
+            proof, step.span, f"`{flat.contract.name}` can never begin with these arguments: {message}", conflict, []
+        )
 
 
 def _clauses(proof: ProofContext, contract: Contract) -> Iterator[Conjunct]:
     for words, clauses in (
-        ("requires", contract.require),
-        ("assumes", contract.assume),
-        ("maintains", contract.maintain),
+        ("this is required", contract.require),
+        ("this is assumed", contract.assume),
+        ("this is maintained", contract.maintain),
     ):
         for clause in clauses:
             yield Conjunct(words, proof.span(clause), proof.prepared.compiler.node(clause, contract), clause.code)
@@ -130,46 +111,42 @@ def _airspace(proof: ProofContext) -> Iterator[Conjunct]:
     if airspace is None:
         return
     for zone in airspace.inside:
-        yield Conjunct("airspace", proof.span(airspace), tree.InsideZone(zone))
+        yield Conjunct(_AIRSPACE, proof.span(airspace), tree.InsideZone(zone))
     for zone in airspace.outside:
-        yield Conjunct("airspace", proof.span(airspace), tree.Negation(tree.InsideZone(zone)))
+        yield Conjunct(_AIRSPACE, proof.span(airspace), tree.Negation(tree.InsideZone(zone)))
 
 
-def _together(
-    proof: ProofContext,
-    parts: Sequence[Conjunct],
-    space: SituationSpace,
-    key: tuple[object, ...],
-    messages: tuple[str, str],
-    labels: list[tuple[Span, str]],
-    span: Span,
-) -> None:
-    def goals() -> list[Goal]:
-        return [(part.node, TRUE) for part in parts]
-
-    answer = proof.questions.ask(key, goals, space)
+def _conflict(
+    proof: ProofContext, parts: Sequence[Conjunct], space: SituationSpace, key: tuple[object, ...], span: Span
+) -> list[Conjunct]:
+    """Conjuncts that cannot hold together; none where all can, or where that is undecided, which is reported."""
+    answer = proof.questions.ask(key, partial(_goals, parts), space)
     if isinstance(answer, Undecided):
         proof.report.add(
             codes.UNDECIDED, span, "it could not be decided whether its conditions can hold together", help=answer.why
         )
-    if not isinstance(answer, No):
-        return
+    found = _minimal(parts, space) if isinstance(answer, No) else []
+    # the airspace alone is empty: no fault of what flies in it
+    return [] if all(part.words == _AIRSPACE for part in found) else found
 
-    def impossible(some: list[Conjunct]) -> bool:
-        return isinstance(satisfiable([(part.node, TRUE) for part in some], space), No)
 
-    conflict = minimal_conflict(parts, impossible)
-    if conflict[0].words == "airspace" and len({part.words for part in conflict}) == 1:
-        return  # the airspace alone is empty: no fault of what flies in it
-    words = {"requires": "this is required", "assumes": "this is assumed", "maintains": "this is maintained"}
-    marked = [(part.span, words.get(part.words, "this is the airspace")) for part in conflict]
-    main = span if not labels else marked.pop()[0]
+def _goals(parts: Sequence[Conjunct]) -> list[Goal]:
+    return [(part.node, TRUE) for part in parts]
+
+
+def _minimal(parts: Sequence[Conjunct], space: SituationSpace) -> list[Conjunct]:
+    return minimal_conflict(parts, lambda some: isinstance(satisfiable(_goals(some), space), No))
+
+
+def _report(
+    proof: ProofContext, span: Span, message: str, conflict: Sequence[Conjunct], labels: list[tuple[Span, str]]
+) -> None:
     proof.report.add(
         codes.CONTRADICTION,
-        main,
-        messages[len(conflict) > 1],
+        span,
+        message,
         help="no state of the vehicle meets it; change one of the conditions",
-        labels=list(dict.fromkeys([*marked, *labels])),
+        labels=dict.fromkeys([*((part.span, part.words) for part in conflict), *labels]),
     )
 
 

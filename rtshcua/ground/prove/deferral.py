@@ -11,22 +11,25 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.prepare import PreparedInvocation
-from rtshcua.decision.rates import awaited, signal_of
-from rtshcua.decision.tree import slots_read
+from rtshcua.decision.rates import awaited
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.certain_refusal import refusing_rules
-from rtshcua.ground.prove.observability import arrives, most_frequent, report_interval, report_intervals
+from rtshcua.ground.prove.observability import (
+    arrives,
+    duration,
+    most_frequent,
+    report_interval,
+    report_intervals,
+    signals_read,
+)
 from rtshcua.ground.prove.proof_context import ProofContext
-from rtshcua.ground.prove.step_times import approval
+from rtshcua.ground.prove.step_times import MissionStep, approval
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
 from rtshcua.model.flat.signal import Signal
-from rtshcua.model.ir.missions import Step
-from rtshcua.model.quantity import Dimension, display
 
 #: no person sees what is asked, judges it and answers in less, us
 PERSON_US = 2_000_000
@@ -43,7 +46,7 @@ def prove_deferrals(proof: ProofContext) -> None:
         if contract.timing_class == TimingClass.REFLEX:
             _report_reflex_approval(proof, number, contract)
             continue
-        watched = {signal.name for signal in _signals(proof, (*contract.assume, *contract.maintain))}
+        watched = {signal.name for signal in signals_read(proof, *contract.assume, *contract.maintain)}
         for clause, signal in _awaited(proof, number, contract):
             if not arrives(signal):
                 if signal.name not in watched | reported:  # else it is E1201
@@ -55,9 +58,9 @@ def prove_deferrals(proof: ProofContext) -> None:
     _prove_approval_times(proof)
 
 
-def prove_step_deferral(proof: ProofContext, step: Step, invocation: PreparedInvocation) -> None:
+def prove_step_deferral(proof: ProofContext, step: MissionStep) -> None:
     """Report a step whose own deadline or clauses leave its contract no time for a report, as the skill's do not."""
-    flat = invocation.invocation
+    flat = step.flat
     if step.overrides is None or flat.contract.timing_class == TimingClass.REFLEX:
         return
     policy = proof.policy
@@ -74,7 +77,7 @@ def prove_step_deferral(proof: ProofContext, step: Step, invocation: PreparedInv
 def _awaited(proof: ProofContext, number: int, contract: Contract) -> Iterator[tuple[Clause, Signal]]:
     """The signals that a decision on a contract may wait for, and what reads them."""
     for clause in awaited(proof.policy, number, contract):
-        for signal in _signals(proof, (clause,)):
+        for signal in signals_read(proof, clause):
             yield clause, signal
 
 
@@ -86,14 +89,13 @@ def _prove_approval_times(proof: ProofContext) -> None:
             proof.report.add(
                 codes.NO_RESOLVER,
                 proof.span(rule) if written is None else written.span,
-                f"an approval is awaited for {_time(rule.within_us)}, and a person takes {_time(PERSON_US)} at least",
-                help=f"wait for `{_time(PERSON_US)}` or longer: 30 s leave time to look",
+                f"an approval is awaited for {duration(rule.within_us)}, and a person takes {duration(PERSON_US)} "
+                "at least",
+                help=f"wait for `{duration(PERSON_US)}` or longer: 30 s leave time to look",
             )
 
 
-def prove_observation_time(
-    proof: ProofContext, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]
-) -> None:
+def prove_observation_time(proof: ProofContext, steps: Sequence[MissionStep]) -> None:
     """Report the first step that needs to have observed something for longer than the whole flight up to it.
 
     Observation begins with the run, with which the first step begins to wait: the time since the issue does not count.
@@ -101,41 +103,41 @@ def prove_observation_time(
     if not proof.policy.monitors:
         return
     latest = 0
-    for step, invocation in zip(steps, invocations, strict=True):
-        contract = invocation.invocation.contract
-        if _unpermitted(proof, step, invocation, latest):
+    for step in steps:
+        contract = step.contract
+        if _unpermitted(proof, step, latest):
             return
-        latest += approval(proof, invocation) + contract.deadline_us
+        latest += approval(proof, step.prepared) + contract.deadline_us
         for clause in (*contract.require, *contract.assume):
-            at = proof.around(invocation)
+            at = proof.around(step.prepared)
             window = _needed(proof, at, proof.prepared.compiler.node(clause, contract), True)
             if latest < window < NEVER:
                 proof.report.add(
                     codes.NO_RESOLVER,
                     step.span,
-                    f"`{clause.text}` is unknown until {_time(window)} were observed, and this step waits no longer "
-                    f"than {_time(latest)} after the run began, with which observation begins",
+                    f"`{clause.text}` is unknown until {duration(window)} were observed, and this step waits no longer "
+                    f"than {duration(latest)} after the run began, with which observation begins",
                     help="take a shorter window, or ask for it in a later step",
                     labels=[(proof.span(clause), "the contract asks for this")],
                 )
                 return
-        if _forbidden(proof, step, invocation, latest):
+        if _forbidden(proof, step, latest):
             return
         latest += contract.duration_us
 
 
-def _forbidden(proof: ProofContext, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
+def _forbidden(proof: ProofContext, step: MissionStep, latest: int) -> bool:
     """Whether a rule that defers while it is unknown must observe longer than the flight up to a step; reports it."""
-    at, compiler = proof.around(invocation), proof.prepared.compiler
-    for rule in refusing_rules(invocation):
+    at, compiler = proof.around(step.prepared), proof.prepared.compiler
+    for rule in refusing_rules(step.prepared):
         node = compiler.when(rule)
         window = 0 if node is None else _needed(proof, at, node, False)
         if latest < window < NEVER:
             proof.report.add(
                 codes.NO_RESOLVER,
                 step.span,
-                f"a rule defers this step until {_time(window)} were observed, and it waits no longer than "
-                f"{_time(latest)} after the run began, with which observation begins",
+                f"a rule defers this step until {duration(window)} were observed, and it waits no longer than "
+                f"{duration(latest)} after the run began, with which observation begins",
                 help="take a shorter window, let the step wait for longer, or ask for it in a later step",
                 labels=[(proof.span(rule), "this is unknown until then")],
             )
@@ -143,12 +145,12 @@ def _forbidden(proof: ProofContext, step: Step, invocation: PreparedInvocation, 
     return False
 
 
-def _unpermitted(proof: ProofContext, step: Step, invocation: PreparedInvocation, latest: int) -> bool:
+def _unpermitted(proof: ProofContext, step: MissionStep, latest: int) -> bool:
     """Whether each permit that may cover a step must observe for longer than the flight up to its release; reports it.
     A step does not wait for a permit: it is denied.
     """
-    at, compiler = proof.around(invocation), proof.prepared.compiler
-    permits = [permit.rule for permit in invocation.candidates.permits if permit.condition(at) & TRUE]
+    at, compiler = proof.around(step.prepared), proof.prepared.compiler
+    permits = [permit.rule for permit in step.prepared.candidates.permits if permit.condition(at) & TRUE]
     nodes = [(rule, compiler.when(rule)) for rule in permits]
     needed = [(rule, 0 if node is None else _needed(proof, at, node, True)) for rule, node in nodes]
     least = min((window for _, window in needed), default=0)
@@ -157,11 +159,11 @@ def _unpermitted(proof: ProofContext, step: Step, invocation: PreparedInvocation
     proof.report.add(
         codes.NO_RESOLVER,
         step.span,
-        f"nothing permits this step before {_time(least)} were observed, and it is released "
-        + (f"no later than {_time(latest)} after the run began" if latest else "when the run begins")
+        f"nothing permits this step before {duration(least)} were observed, and it is released "
+        + (f"no later than {duration(latest)} after the run began" if latest else "when the run begins")
         + ", with which observation begins: it is denied then",
         help="ask for it in a later step, or write a `forbid` of the opposite `within the last`: a step waits for that",
-        labels=[(proof.span(rule), f"this permits it after {_time(window)}") for rule, window in needed],
+        labels=[(proof.span(rule), f"this permits it after {duration(window)}") for rule, window in needed],
     )
     return True
 
@@ -183,12 +185,6 @@ def _needed(proof: ProofContext, at: Environment, node: tree.Node, wanted: bool)
             return 0 if possible else NEVER
 
 
-def _signals(proof: ProofContext, clauses: Sequence[Clause]) -> Iterator[Signal]:
-    policy = proof.policy
-    for slot in slots_read(clauses, policy.vehicle, policy.monitors):
-        yield signal_of(policy, slot)
-
-
 def _report_never(proof: ProofContext, signal: Signal, clause: Clause) -> None:
     message = proof.context.symbols.signals[signal.name].sources[0].message
     proof.report.add(
@@ -208,14 +204,14 @@ def _report_late(
     often: Mapping[str, int],
     span: Span | None = None,
 ) -> None:
-    deadline = proof.context.symbols.skills[contract.name].deadline
+    deadline = proof.skills[contract.name].deadline
     assert deadline is not None
-    every = _time(report_interval(signal, often))
+    every = duration(report_interval(signal, often))
     proof.report.add(
         codes.NO_RESOLVER,
         span or deadline.span,
-        f"`{contract.name}` waits {_time(contract.deadline_us)} at most, and while `{signal.name}` is unknown its next "
-        f"report may take {every}: `{most_frequent(signal, often).message}` comes every {every} at best",
+        f"`{contract.name}` waits {duration(contract.deadline_us)} at most, and while `{signal.name}` is unknown its "
+        f"next report may take {every}: `{most_frequent(signal, often).message}` comes every {every} at best",
         help=f"let the deadline be {every} or more, or read `{signal.name}` from a message that comes more often",
         labels=[(proof.span(clause), "this waits for it")],
     )
@@ -228,17 +224,13 @@ def _report_reflex_approval(proof: ProofContext, number: int, contract: Contract
             proof.report.add(
                 codes.NO_RESOLVER,
                 proof.span(rule),
-                f"`{contract.name}` is a reflex, and no person approves within its {_time(contract.deadline_us)}",
+                f"`{contract.name}` is a reflex, and no person approves within its {duration(contract.deadline_us)}",
                 help="leave the reflex out of the rule",
                 labels=[(_class(proof, contract), "its class")],
             )
 
 
 def _class(proof: ProofContext, contract: Contract) -> Span:
-    written = proof.context.symbols.skills[contract.name].timing_class
+    written = proof.skills[contract.name].timing_class
     assert written is not None
     return written.span
-
-
-def _time(us: int) -> str:
-    return display(us, Dimension.DURATION)

@@ -14,15 +14,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from rtshcua.decision.evaluate import NO_PHASE, Environment
 from rtshcua.decision.flying import BEGINS, SETTLES, charge, landing_us
-from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, MISSING, TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import Contract, Link, MotionKind, SourceKind
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
-from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
 #: a role and a source that may ask for a skill; the role after the last one stands for any that no rule names
@@ -174,7 +173,7 @@ def _last_link_lacks(proof: ProofContext, link: Link) -> Iterator[tuple[str, str
     """What a last link lacks, what would help, and where that is written."""
     policy = proof.policy
     contract, reserve = policy.contracts[link.skill], policy.vehicle.reserve
-    skill = proof.context.symbols.skills[contract.name]
+    skill = proof.skills[contract.name]
     if contract.energy > reserve:
         assert skill.energy is not None
         yield (
@@ -198,22 +197,21 @@ def _last_link_lacks(proof: ProofContext, link: Link) -> Iterator[tuple[str, str
             )
 
 
-def prove_landing_height(proof: ProofContext, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
+def prove_landing_height(proof: ProofContext, steps: Sequence[MissionStep]) -> None:
     """Report the last links that may not be down from the highest step in the time, or with the charge, that they have.
 
     A return climbs before it can be broken off, so its height counts too.
     """
     policy = proof.policy
-    vehicle, speeds = policy.vehicle, policy.vehicle.speeds
-    assert speeds is not None  # the compiler writes them
-    heights = [one.invocation.plan.altitude for one in invocations]
-    chains = [policy.contingency, *(one.invocation.contract.fallback for one in invocations)]
+    vehicle, speeds = policy.vehicle, proof.speeds
+    heights = [step.flat.plan.altitude for step in steps]
+    chains = [policy.contingency, *(step.contract.fallback for step in steps)]
     returns = any(policy.contracts[link.skill].motion.kind == MotionKind.HOME for chain in chains for link in chain)
     highest = max(*heights, vehicle.return_altitude if returns else 0)
     needed = BEGINS + SETTLES + landing_us(speeds, highest)
     for skill, link in {chain[-1].skill: chain[-1] for chain in chains if chain}.items():
         contract = policy.contracts[skill]
-        declared = proof.context.symbols.skills[contract.name]
+        declared = proof.skills[contract.name]
         takes = f"from {display(highest, Dimension.ALTITUDE)} the last link `{contract.name}` takes up to "
         if 0 < contract.duration_us < needed:
             assert declared.duration is not None

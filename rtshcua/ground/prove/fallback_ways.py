@@ -24,11 +24,10 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.prove.airspace_keeping import HullSweep, Landmarks, Leg, Point, breach_text, disc, keeps, path_legs
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.step_starts import StartPlace, from_home, planned
-from rtshcua.ground.prove.step_times import StepTime, zone_span
+from rtshcua.ground.prove.step_times import MissionStep, StepTime, zone_span
 from rtshcua.model.flat.contract import PLACE, MotionKind
 from rtshcua.model.flat.policy import Vehicle
 from rtshcua.model.flat.zone import HIGHEST
-from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
 _HOME = (0, 0)
@@ -92,29 +91,29 @@ class FallbackWays:
         self._told: set[Point] = set()
         self._nowhere: set[PreparedLink] = set()
 
-    def prove(self, step: Step, invocation: PreparedInvocation, period: StepTime, starts: Sequence[StartPlace]) -> None:
+    def prove(self, step: MissionStep, starts: Sequence[StartPlace]) -> None:
         """Report the first way from a step that leaves the airspace; the step itself was found to keep it, if home is
         where it is declared.
         """
         airspace = self._proof.prepared.airspace
-        if airspace is None or invocation.invocation.plan.kind == MotionKind.LAND:
+        if airspace is None or step.flat.plan.kind == MotionKind.LAND:
             return  # it leads nowhere
-        if invocation.invocation.plan.kind == MotionKind.HOME:
-            there = _LinkTime(period, invocation.lasts_us, airspace)
+        if step.flat.plan.kind == MotionKind.HOME:
+            there = _LinkTime(step.time, step.prepared.lasts_us, airspace)
             for start in starts:
                 if not self._link(step, None, FlownPath(((start.x, start.y),), start.height, start.height), there):
                     return
             return
-        links = list(self._links(invocation))
+        links = list(self._links(step.prepared))
         for start in starts:
-            _, volume = planned(self._proof, invocation, start)
-            path = invocation.invocation.plan.path
+            _, volume = planned(self._proof, step.prepared, start)
+            path = step.flat.plan.path
             points = ((start.x, start.y), *zip(path[::2], path[1::2], strict=True))
             flown = FlownPath(points, *volume.height[:2])
             for link, lasts in links:
                 if link in self._nowhere:
                     continue
-                there = _LinkTime(period, invocation.lasts_us + lasts, airspace)
+                there = _LinkTime(step.time, step.prepared.lasts_us + lasts, airspace)
                 if not self._link(step, link, flown, there):
                     return
                 if link.motion == MotionKind.FLY:
@@ -138,7 +137,7 @@ class FallbackWays:
         policy = self._proof.policy
         return longest(policy.contracts[link.link.skill], policy.vehicle, link.link.limit_us)
 
-    def _link(self, step: Step, link: PreparedLink | None, flown: FlownPath, then: _LinkTime) -> bool:
+    def _link(self, step: MissionStep, link: PreparedLink | None, flown: FlownPath, then: _LinkTime) -> bool:
         """Whether a link, or a step that is the way home (None), keeps the airspace; reports the place from where it
         does not.
         """
@@ -240,7 +239,7 @@ class FallbackWays:
         x, y = link.link.arguments[cell : cell + 2]
         return x, y
 
-    def _missing(self, step: Step, link: PreparedLink | None, zone: PreparedZone, then: _LinkTime) -> None:
+    def _missing(self, step: MissionStep, link: PreparedLink | None, zone: PreparedZone, then: _LinkTime) -> None:
         if link is None:
             return  # of a step that is found where its own path is looked at
         proof, policy = self._proof, self._proof.policy
@@ -260,7 +259,7 @@ class FallbackWays:
 
     def _report(
         self,
-        step: Step,
+        step: MissionStep,
         link: PreparedLink | None,
         flown: FlownPath,
         leaves: Departure,
@@ -270,35 +269,33 @@ class FallbackWays:
         airspace, (place, stretch) = then.present, leaves
         proof, policy = self._proof, self._proof.policy
         home = link is None or link.motion == MotionKind.HOME
-        name = "" if link is None else policy.contracts[link.link.skill].name
         if stretch.what == _ACROSS:
             legs = [(place, each) for each in ([_HOME, *to] if home else to or [place])]
         else:
             legs = path_legs(stretch.points)
-        from_ = "this step"
-        if flown.after and place == flown.points[-1]:
-            from_ = f"where the link `{flown.after}` ends"
-        subject = f"{stretch.what} {'home' if home else f'of the link `{name}`'} from {from_}, which begins "
-        subject += f"{from_home(*place)},"
-        if link is not None and place in to:
-            subject = f"`{name}`, a link of this step's chains,"
+        from_ = f"where the link `{flown.after}` ends" if flown.after and place == flown.points[-1] else "this step"
+        begins = f"from {from_}, which begins {from_home(*place)},"
         labels = [(proof.span(airspace.airspace), "the airspace")]
-        if link is not None:
-            labels.append((proof.span(link.link), "this link would fly there"))
-        labels += then.period.labels(airspace, self._space(stretch), then.further)
-        within = self._vehicle.home_within
-        if home and within and self._keeps(stretch._replace(points=_of_home(stretch, to)), airspace):
-            labels.append((proof.lowered.vehicle.within.span, "home may lie so far from where it is declared"))
         help = "move the step, or lead the mission around by further steps"
-        raised = self._raised(flown, to, stretch, airspace) if home else None
-        if raised is not None:
-            help = f"{_above(raised)}; or {help}"
-            declared = proof.lowered.vehicle.return_altitude
-            if declared is not None:
-                labels.append((declared.span, "the vehicle returns at this height"))
+        code, subject = codes.PATH_OUTSIDE, f"{stretch.what} home {begins}"
+        if link is not None:
+            name = policy.contracts[link.link.skill].name
+            labels.append((proof.span(link.link), "this link would fly there"))
+            code = codes.RETURN_OUTSIDE if home else codes.LOITER_OUTSIDE
+            subject = subject if home else f"{stretch.what} of the link `{name}` {begins}"
+            subject = f"`{name}`, a link of this step's chains," if place in to else subject
+        labels += then.period.labels(airspace, self._space(stretch), then.further)
+        if home:
+            vehicle = proof.lowered.vehicle
+            if self._vehicle.home_within and self._keeps(stretch._replace(points=_of_home(stretch, to)), airspace):
+                labels.append((vehicle.within.span, "home may lie so far from where it is declared"))
+            raised = self._raised(flown, to, stretch, airspace)
+            if raised is not None:
+                help = f"{_above(raised)}; or {help}"
+                if vehicle.return_altitude is not None:
+                    labels.append((vehicle.return_altitude.span, "the vehicle returns at this height"))
         if link is not None:
             help = f"on board the link would not be flown then, but the one after it; {help}"
-        code = codes.PATH_OUTSIDE if link is None else codes.RETURN_OUTSIDE if home else codes.LOITER_OUTSIDE
         proof.report.add(
             code,
             step.span,

@@ -18,18 +18,18 @@ from typing import NamedTuple
 from rtshcua.decision.contracts import longest
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.flying import charge, home_us
-from rtshcua.decision.prepare import PreparedInvocation, prepare_invocation
+from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.step_bounds import StepBound
-from rtshcua.ground.prove.step_starts import StartPlace, planned
-from rtshcua.ground.prove.step_times import START_WINDOW_US
+from rtshcua.ground.prove.step_starts import StartPlace, may_be_skipped, planned
+from rtshcua.ground.prove.step_times import START_WINDOW_US, MissionStep, approval
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
 from rtshcua.model.flat.limits import FULL
-from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
+from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.quantity import Dimension, display
@@ -38,24 +38,18 @@ from rtshcua.model.quantity import Dimension, display
 _SHOWN_STEPS = 6
 
 
-def prove_charge(
-    proof: ProofContext,
-    steps: Sequence[Step],
-    invocations: Sequence[PreparedInvocation],
-    starts: Sequence[Sequence[StartPlace]],
-) -> None:
+def prove_charge(proof: ProofContext, steps: Sequence[MissionStep], starts: Sequence[Sequence[StartPlace]]) -> None:
     """Report the first step that may find too little; `starts` are the places where each may begin."""
     left = FULL
     spent: list[tuple[str, int]] = []
-    for step, invocation, places in zip(steps, invocations, starts, strict=True):
-        flat = invocation.invocation
-        if flat.on_inadmissible != OnInadmissible.SKIP:
-            why = next(_wants(proof, invocation, places, left), None)
+    for step, places in zip(steps, starts, strict=True):
+        if not may_be_skipped(step.prepared):
+            why = next(_wants(proof, step.prepared, places, left), None)
             if why is not None:
                 _report_short(proof, step, left, why, spent)
                 return
-        left = max(left - flat.contract.energy, 0)
-        spent.append((flat.contract.name, left))
+        left = max(left - step.contract.energy, 0)
+        spent.append((step.contract.name, left))
 
 
 _Why = tuple[str, tuple[tuple[Span, str], ...]]
@@ -107,7 +101,9 @@ def _refusals(
         yield "no rule then permits it", tuple((proof.span(permit.rule), "this rule does not") for permit in permits)
 
 
-def _report_short(proof: ProofContext, step: Step, left: int, why: _Why, spent: Sequence[tuple[str, int]]) -> None:
+def _report_short(
+    proof: ProofContext, step: MissionStep, left: int, why: _Why, spent: Sequence[tuple[str, int]]
+) -> None:
     told = [f"{_percent_text(charge)} after `{name}`" for name, charge in spent[-_SHOWN_STEPS:]]
     from_ = ["..."] if len(spent) > _SHOWN_STEPS else ["full at the start"]
     proof.report.add(
@@ -188,14 +184,8 @@ def _step_time(proof: ProofContext, mission: Mission, invocation: Invocation) ->
 
 def _approval(proof: ProofContext, mission: Mission, invocation: Invocation) -> int:
     """How long a step may wait for an approval."""
-    rules = proof.prepared.rules.candidates(invocation.skill, invocation.role, invocation.source)
-    if not rules.confirms:
-        return 0
-    prepared = prepare_invocation(invocation, proof.prepared, mission.phases)
-    if isinstance(prepared, Refusal):
-        return 0  # reported by the proofs
-    at = proof.around(prepared)
-    return max((each.rule.within_us for each in rules.confirms if each.condition(at) & TRUE), default=0)
+    prepared = proof.prepare(invocation, mission.phases)
+    return 0 if isinstance(prepared, Refusal) else approval(proof, prepared)  # the proofs report a refusal
 
 
 def _chain_time(chain: Iterable[Link], policy: Policy) -> int:
@@ -229,8 +219,7 @@ def _mission_energy(proof: ProofContext, mission: Mission) -> int:
 def _way_home(proof: ProofContext, mission: Mission) -> int:
     """The energy of the way home from the farthest and highest planned place, rounded up; low it is only near home."""
     vehicle, plans = proof.policy.vehicle, [invocation.plan for invocation in mission.invocations]
-    speeds = vehicle.speeds
-    assert speeds is not None  # the compiler writes them
+    speeds = proof.speeds
     squares = (x * x + y * y for plan in plans for x, y in zip(plan.path[::2], plan.path[1::2], strict=True))
     distance = isqrt(max(squares, default=0)) + 1 + vehicle.position_error
     slowest = min((plan.speed for plan in plans if plan.speed), default=0)
@@ -279,27 +268,21 @@ def _within(
     over = found.energy > FULL and not _short_already(proof, steps)
     if not over and (limit is None or found.energy <= limit.value):
         return
-    needs = f"the mission may need {rounded_energy(found.energy)} of a full charge"
-    rest = found.energy - sum(energies)
-    split = f"{rounded_energy(sum(energies))} for all steps, as their contracts allow"
-    if over:
-        report.add(
-            codes.OVER_CHARGE,
-            declared.name.span,
-            f"{needs}, and a battery has 100 %",
-            help=f"{split}, and {rounded_energy(rest)} more where one of them is given up and a chain flies; "
-            "leave steps out, or make two missions of it",
-            labels=_largest(steps, energies, rounded_energy),
-        )
+    spent, advice = sum(energies), ""
+    if limit is not None and not over:
+        code, span = codes.MISSION_ENERGY, limit.span
+        against = f"says that it needs at most {display(limit.value, Dimension.RATIO)}"
     else:
-        assert limit is not None
-        report.add(
-            codes.MISSION_ENERGY,
-            limit.span,
-            f"{needs}, and says that it needs at most {display(limit.value, Dimension.RATIO)}",
-            help=f"{split}, and {rounded_energy(rest)} more where one of them is given up and a chain flies",
-            labels=_largest(steps, energies, rounded_energy),
-        )
+        code, span, against = codes.OVER_CHARGE, declared.name.span, "a battery has 100 %"
+        advice = "; leave steps out, or make two missions of it"
+    report.add(
+        code,
+        span,
+        f"the mission may need {rounded_energy(found.energy)} of a full charge, and {against}",
+        help=f"{rounded_energy(spent)} for all steps, as their contracts allow, and "
+        f"{rounded_energy(found.energy - spent)} more where one of them is given up and a chain flies{advice}",
+        labels=_largest(steps, energies, rounded_energy),
+    )
 
 
 def _short_already(proof: ProofContext, steps: Sequence[Step]) -> bool:

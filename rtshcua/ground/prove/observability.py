@@ -13,18 +13,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from rtshcua.decision import rates
-from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.rates import signal_of
 from rtshcua.decision.tree import slots_read
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind
 from rtshcua.model.flat.signal import Signal, SignalSource
-from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
 #: messages that a vehicle is sent and never sends itself as telemetry
@@ -97,12 +96,12 @@ def prove_observability(proof: ProofContext) -> None:
     intervals = report_intervals(policy)
     found: dict[str, WatchedSignal] = {}
     for clause in _watched(proof):
-        for signal in _signals(proof, clause):
+        for signal in signals_read(proof, clause):
             found.setdefault(signal.name, WatchedSignal(signal, proof.span(clause)))
     for watched in found.values():
         _observable(proof, watched, intervals)
     for clause in _asked(policy):
-        for signal in _signals(proof, clause):
+        for signal in signals_read(proof, clause):
             if signal.name not in found and arrives(signal):
                 found[signal.name] = WatchedSignal(signal, proof.span(clause))
                 _stays_known(proof, found[signal.name], intervals, "this asks for it")
@@ -111,25 +110,25 @@ def prove_observability(proof: ProofContext) -> None:
         for clause in (*contract.assume, *contract.maintain):
             if _CHANGING.isdisjoint(clause.code[::3]):
                 _unwatched(proof, clause)
-        skill = proof.context.symbols.skills[contract.name]
+        skill = proof.skills[contract.name]
         if skill.duration is not None:
             _reaction(proof, contract, intervals, skill.duration.span)
 
 
-def prove_step_observability(proof: ProofContext, step: Step, invocation: PreparedInvocation) -> None:
+def prove_step_observability(proof: ProofContext, step: MissionStep) -> None:
     """Report what a step's own block makes of its contract, where the skill's alone was found good."""
     own = step.overrides
     if own is None:
         return
-    flat = invocation.invocation
+    flat = step.flat
     intervals = report_intervals(proof.policy, (flat.contract,))
     contract, skills = flat.contract, proof.policy.contracts[flat.skill]
     watched = (*contract.assume[len(skills.assume) :], *contract.maintain[len(skills.maintain) :])
-    before = {signal.name for clause in _watched(proof) for signal in _signals(proof, clause)}
+    before = {signal.name for clause in _watched(proof) for signal in signals_read(proof, clause)}
     for clause in watched:
         if _CHANGING.isdisjoint(clause.code[::3]):
             _unwatched(proof, clause)
-        for signal in _signals(proof, clause):
+        for signal in signals_read(proof, clause):
             if signal.name not in before:
                 before.add(signal.name)
                 _observable(proof, WatchedSignal(signal, proof.span(clause)), intervals)
@@ -159,7 +158,8 @@ def _asked(policy: Policy) -> Iterator[Clause]:
             yield rule.when
 
 
-def _signals(proof: ProofContext, *clauses: Clause) -> Iterator[Signal]:
+def signals_read(proof: ProofContext, *clauses: Clause) -> Iterator[Signal]:
+    """The signals that some clauses read, each once."""
     policy = proof.policy
     slots = slots_read(clauses, policy.vehicle, policy.monitors)
     yield from {signal.name: signal for slot in slots for signal in (signal_of(policy, slot),)}.values()
@@ -187,13 +187,13 @@ def _stays_known(proof: ProofContext, watched: WatchedSignal, intervals: Mapping
     older = older_by(message, proof.context.dialect)
     if signal.stale_us >= often + older:
         return
-    why = f", and what it says may be {_time(older)} old then" if older else ""
+    why = f", and what it says may be {duration(older)} old then" if older else ""
     proof.report.add(
         codes.UNOBSERVABLE,
         proof.context.symbols.signals[signal.name].stale_after.span,
-        f"`{signal.name}` is stale after {_time(signal.stale_us)}, and `{message}` comes every {_time(often)} at best"
-        f"{why}: it is unknown again and again",
-        help=f"let it be stale after {_time(2 * often + older)} or more",
+        f"`{signal.name}` is stale after {duration(signal.stale_us)}, and `{message}` comes every {duration(often)} at "
+        f"best{why}: it is unknown again and again",
+        help=f"let it be stale after {duration(2 * often + older)} or more",
         labels=[(span, reads)],
     )
 
@@ -201,7 +201,7 @@ def _stays_known(proof: ProofContext, watched: WatchedSignal, intervals: Mapping
 def _windows(proof: ProofContext, intervals: Mapping[str, int]) -> None:
     """A window that no two reports fit into says nothing that the last report does not say."""
     for monitor in proof.policy.monitors:
-        signals = [signal for signal in _signals(proof, monitor.when) if arrives(signal)]
+        signals = [signal for signal in signals_read(proof, monitor.when) if arrives(signal)]
         if monitor.kind not in (MonitorKind.FOR_LAST, MonitorKind.WITHIN_LAST) or not signals:
             continue
         often = min(report_interval(signal, intervals) for signal in signals)
@@ -210,7 +210,8 @@ def _windows(proof: ProofContext, intervals: Mapping[str, int]) -> None:
             proof.report.add(
                 codes.UNOBSERVABLE,
                 proof.span(monitor.when),
-                f"this is looked at over {_time(monitor.window_us)}, and {names} comes every {_time(often)} at best",
+                f"this is looked at over {duration(monitor.window_us)}, and {names} comes every {duration(often)} "
+                "at best",
                 help="take a longer window, or ask for the present value alone",
             )
 
@@ -234,7 +235,7 @@ class _LateReaction(NamedTuple):
 
 def _late_reaction(proof: ProofContext, contract: Contract, intervals: Mapping[str, int]) -> _LateReaction | None:
     """What cannot be answered while a skill runs: a breach, or the loss of a signal."""
-    signals = [signal for signal in _signals(proof, *contract.assume, *contract.maintain) if arrives(signal)]
+    signals = [signal for signal in signals_read(proof, *contract.assume, *contract.maintain) if arrives(signal)]
     lasts = contract.duration_us
     if not signals or not lasts:
         return None
@@ -243,9 +244,11 @@ def _late_reaction(proof: ProofContext, contract: Contract, intervals: Mapping[s
     breach = report_interval(seldom, intervals) + DECIDE_US + ACTUATE_US
     lost = late.stale_us + contract.grace_us + DECIDE_US + ACTUATE_US
     if breach > lasts:
-        return _LateReaction(seldom, breach, f"{_time(report_interval(seldom, intervals))} until `{seldom.name}` tells")
+        return _LateReaction(
+            seldom, breach, f"{duration(report_interval(seldom, intervals))} until `{seldom.name}` tells"
+        )
     if lost > max(lasts, BLIND_US):
-        what = f"{_time(late.stale_us)} until `{late.name}` is stale, {_time(contract.grace_us)} of grace"
+        what = f"{duration(late.stale_us)} until `{late.name}` is stale, {duration(contract.grace_us)} of grace"
         return _LateReaction(late, lost, what)
     return None
 
@@ -261,13 +264,14 @@ def _reaction(proof: ProofContext, contract: Contract, intervals: Mapping[str, i
     proof.report.add(
         codes.SLOW_REACTION,
         span,
-        f"`{contract.name}` lasts at most {_time(contract.duration_us)}, and a fallback may begin only "
-        f"{_time(late.takes)} after its cause",
-        help=f"that is {late.what}, {_time(DECIDE_US)} to decide and {_time(ACTUATE_US)} for the command; at top speed "
-        f"`{vehicle.name}` flies {metres} meanwhile",
+        f"`{contract.name}` lasts at most {duration(contract.duration_us)}, and a fallback may begin only "
+        f"{duration(late.takes)} after its cause",
+        help=f"that is {late.what}, {duration(DECIDE_US)} to decide and {duration(ACTUATE_US)} for the command; at top "
+        f"speed `{vehicle.name}` flies {metres} meanwhile",
         labels=[(stale, "this signal is the last to tell")],
     )
 
 
-def _time(us: int) -> str:
+def duration(us: int) -> str:
+    """A duration as sources write it."""
     return display(us, Dimension.DURATION)

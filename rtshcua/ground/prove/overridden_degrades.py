@@ -13,11 +13,10 @@ from collections.abc import Set as AbstractSet
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.extent import FAR
-from rtshcua.ground.analysis.solve import No, Yes
+from rtshcua.ground.analysis.solve import Yes
 from rtshcua.ground.analysis.witness import witness_text
 from rtshcua.ground.prove.rule_index import RuleQuery
 from rtshcua.ground.prove.ruleset import Ruleset, WrittenRule
-from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import RuleKind
 
 
@@ -25,7 +24,7 @@ def report_overridden(rules: Ruleset, alive: list[WrittenRule]) -> None:
     """Report each degrade rule that comes after one to another target that is wider, or has the same condition."""
     degrades = [group for group in alive if group.kind == RuleKind.DEGRADE]
     place = {rules.group_of(group.rules[0]): at for at, group in enumerate(degrades)}
-    flown = {_target(rules, number) for group in degrades for number in group.rules}
+    flown = {rules.flown(number) for group in degrades for number in group.rules}
     last = -1  # of the rules of those before
     for at, later in enumerate(degrades):
         looked_at: set[int] = set()
@@ -40,41 +39,20 @@ def report_overridden(rules: Ruleset, alive: list[WrittenRule]) -> None:
         last = max(last, *later.rules)
 
 
-def _candidates(rules: Ruleset, later: WrittenRule, flown: AbstractSet[int]) -> Iterator[int]:
+def _candidates(rules: Ruleset, later: WrittenRule, flown: AbstractSet[int | None]) -> Iterator[int]:
     """The rules, in order, that may match wherever one does, and fly something else; each is to be asked about."""
-    pairs = [
-        (number, skill) for number in later.rules for skill in rules.skills(number) if skill != _target(rules, number)
-    ]
-    if not pairs:
-        return  # it is about nothing but what it flies itself
+    pairs = [(number, skill) for number in later.rules for skill in rules.skills_decided(number)]
     # an earlier rule that flies the very skill says nothing of it; so one is taken that none flies, if there is any
-    number, skill = next((pair for pair in pairs if pair[1] not in flown), pairs[0])
+    number, skill = next((pair for pair in pairs if pair[1] not in flown), pairs[0] if pairs else (-1, -1))
+    if number < 0:
+        return iter(())  # it is about nothing but what it flies itself
     if skill in flown:
-        yield from (each for each, rule in enumerate(rules.policy.rules) if rule.kind == RuleKind.DEGRADE)
-        return
+        return (each for each, rule in enumerate(rules.policy.rules) if rule.kind == RuleKind.DEGRADE)
     rule, effect = rules.rule(number), rules.effect(number)
-    points = list(rules.situations(number, skill))
-    after = -1
-    while not rules.exhausted:
-        candidate = min(
-            (
-                found
-                for effects in ((-FAR, effect - 1), (effect + 1, FAR))
-                for about in [RuleQuery(skill, rule.roles, rule.sources, effects)]
-                for found in [next(rules.overlaps(RuleKind.DEGRADE).meeting(about, points, sure=True, after=after), -1)]
-                if found >= 0
-            ),
-            default=-1,
-        )
-        if candidate < 0:
-            return
-        after = candidate
-        if any(rules.holds(candidate, at) != TRUE for at in points):
-            continue
-        yield candidate
-        answer = rules.known([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill)
-        if isinstance(answer, Yes):  # nor does any other come before it that does not match there
-            points.append(answer.witness.at)
+    queries = [
+        RuleQuery(skill, rule.roles, rule.sources, effects) for effects in ((-FAR, effect - 1), (effect + 1, FAR))
+    ]
+    return rules.candidates(RuleKind.DEGRADE, number, queries, frozenset(), sure=True)
 
 
 def _after_wider(rules: Ruleset, earlier: WrittenRule, later: WrittenRule) -> bool:
@@ -85,10 +63,8 @@ def _after_wider(rules: Ruleset, earlier: WrittenRule, later: WrittenRule) -> bo
     assert target is not None
     always = not rules.policy.contracts[target.skill].require
     for number in later.rules:
-        for skill in rules.skills(number):
-            if skill == _target(rules, number):
-                continue  # a rule is not about what it flies itself
-            if any(skill == _target(rules, candidate) for candidate in earlier.rules):
+        for skill in rules.skills_decided(number):
+            if any(rules.flown(candidate) == skill for candidate in earlier.rules):
                 always = False
                 continue
             before = _before(rules, earlier, number, skill)
@@ -116,35 +92,14 @@ def _after_wider(rules: Ruleset, earlier: WrittenRule, later: WrittenRule) -> bo
     return True
 
 
-def _target(rules: Ruleset, number: int) -> int:
-    target = rules.rule(number).target
-    assert target is not None
-    return target.skill
-
-
 def _before(rules: Ruleset, earlier: WrittenRule, number: int, skill: int) -> int | None:
     """The flat rule of an earlier one that matches wherever another does, for a skill, and flies something else."""
-    later, matching = rules.rule(number), rules.ask([(number, TRUE)], skill)
+    matching = rules.ask([(number, TRUE)], skill)
     for candidate in earlier.rules:
-        rule = rules.rule(candidate)
-        if rule.target is None or later.target is None or same_link(rule.target, later.target):
-            continue
-        if skill not in rules.skills(candidate):
-            continue
-        if not covers_all(rule.roles, later.roles) or not covers_all(rule.sources, later.sources):
+        if rules.effect(candidate) == rules.effect(number) or not rules.wider(candidate, number, skill):
             continue
         if isinstance(matching, Yes) and rules.holds(candidate, matching.witness.at) != TRUE:
             continue
-        if isinstance(rules.ask([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill), No):
+        if rules.never([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill):
             return candidate
     return None
-
-
-def same_link(one: Link, other: Link) -> bool:
-    """Whether two links fly the same."""
-    return (one.skill, one.arguments) == (other.skill, other.arguments)
-
-
-def covers_all(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
-    """Whether a list of roles or sources, where none means any, has all of another."""
-    return not wider or (bool(narrower) and set(narrower) <= set(wider))

@@ -14,16 +14,16 @@ from itertools import pairwise
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.decision import tree
-from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import TRUE, Span, Value, interval
 from rtshcua.diagnostics import codes
 from rtshcua.ground.analysis.solve import Goal, StepInstance
+from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.analysis.witness import witness_text
 from rtshcua.ground.prove.certain_refusal import TimeKnowledge, certain_refusals
 from rtshcua.ground.prove.proof_context import ProofContext
-from rtshcua.ground.prove.step_times import StepTime
+from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import QUANTITY, Contract
-from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.quantity import Dimension, display
 
 #: a line is cut at whole parts of it, so many
@@ -99,17 +99,21 @@ class ArgumentLine(NamedTuple):
         return " and ".join(told)
 
 
-def unmoved_lines(invocations: Sequence[PreparedInvocation]) -> list[ArgumentLine]:
+def unmoved_lines(steps: Sequence[MissionStep]) -> list[ArgumentLine]:
     """The lines of a single instance."""
-    return [ArgumentLine(each.invocation.arguments, each.invocation.arguments) for each in invocations]
+    return [ArgumentLine(each.flat.arguments, each.flat.arguments) for each in steps]
 
 
-def lines_from(
-    before: Sequence[StepInstance], invocations: Sequence[PreparedInvocation]
-) -> Iterator[ArgumentLine | None]:
+def space_along(proof: ProofContext, step: MissionStep, line: ArgumentLine) -> SituationSpace:
+    """Any situation in which a step may be asked for with the arguments on a line."""
+    space = proof.questions.space(step.flat.skill)
+    return space._replace(arguments=line.values, phases=frozenset((step.prepared.phase,)))
+
+
+def lines_from(before: Sequence[StepInstance], steps: Sequence[MissionStep]) -> Iterator[ArgumentLine | None]:
     """For each step the line from an earlier instance; None where the two differ in more than numbers."""
-    for earlier, each in zip(before, invocations, strict=True):
-        now = each.invocation
+    for earlier, step in zip(before, steps, strict=True):
+        now = step.flat
         line = ArgumentLine(earlier.arguments, now.arguments) if earlier.skill == now.skill else None
         numbers = {parameter.cell for parameter in now.contract.parameters if parameter.kind == QUANTITY}
         yield line if line is not None and numbers.issuperset(line.moving) else None
@@ -119,48 +123,36 @@ def lines_from(
 _COMPARED: Final = 8
 
 #: the proof about the time: whether the steps may come at a time at which they are refused, which it then reports
-Timely: TypeAlias = Callable[
-    [ProofContext, Sequence[Step], Sequence[PreparedInvocation], Sequence[StepTime], Sequence[ArgumentLine | None]],
-    bool,
-]
+Timely: TypeAlias = Callable[[ProofContext, Sequence[MissionStep], Sequence[ArgumentLine | None]], bool]
 
 
-def prove_between(
-    proof: ProofContext,
-    mission: MissionDecl,
-    steps: Sequence[Step],
-    invocations: Sequence[PreparedInvocation],
-    comes: Sequence[StepTime],
-    timely: Timely,
-) -> None:
+def prove_between(proof: ProofContext, mission: MissionDecl, steps: Sequence[MissionStep], timely: Timely) -> None:
     """Report the first value between this instance and an earlier one with which a step is refused."""
-    now = tuple(
-        StepInstance(one.invocation.skill, one.invocation.arguments, tuple(period.asked))
-        for one, period in zip(invocations, comes, strict=True)
-    )
+    now = tuple(StepInstance(step.flat.skill, step.flat.arguments, tuple(step.time.asked)) for step in steps)
     earlier = proof.questions.instances.setdefault(mission.name.text, [])
     for before in earlier[:_COMPARED]:
         if len(before) != len(now):
             continue
-        between = list(lines_from(before, invocations))
-        for step, invocation, line in zip(steps, invocations, between, strict=True):
-            if line is not None and line.moving and _report_refused(proof, step, invocation, line):
+        between = list(lines_from(before, steps))
+        for step, line in zip(steps, between, strict=True):
+            if line is not None and line.moving and _report_refused(proof, step, line):
                 return
         if any(line is not None and line.moving for line in between):
-            both = [replace(one, asked=[*one.asked, *two.asked]) for one, two in zip(comes, before, strict=True)]
-            if timely(proof, steps, invocations, both, between):
+            both = [
+                step._replace(time=replace(step.time, asked=[*step.time.asked, *other.asked]))
+                for step, other in zip(steps, before, strict=True)
+            ]
+            if timely(proof, both, between):
                 return
     earlier.append(now)
 
 
-def _report_refused(proof: ProofContext, step: Step, invocation: PreparedInvocation, line: ArgumentLine) -> bool:
-    space = proof.questions.space(invocation.invocation.skill)._replace(
-        arguments=line.values, phases=frozenset((invocation.phase,))
-    )
-    for witness, rule in certain_refusals(proof, invocation, space, TimeKnowledge.NOTHING, line.given):
+def _report_refused(proof: ProofContext, step: MissionStep, line: ArgumentLine) -> bool:
+    space = space_along(proof, step, line)
+    for witness, rule in certain_refusals(proof, step.prepared, space, TimeKnowledge.NOTHING, line.given):
         policy = proof.policy
-        situation = witness_text(witness, policy, invocation.invocation.contract)
-        rules = [each.rule for each in invocation.candidates.permits] if rule is None else [rule]
+        situation = witness_text(witness, policy, step.flat.contract)
+        rules = [each.rule for each in step.prepared.candidates.permits] if rule is None else [rule]
         label = "this does not permit it" if rule is None else "by this rule"
         code, said = codes.OUT_OF_SCOPE, f"outside of what `{policy.name}` permits"
         if rule is not None and rule.target is None:

@@ -1,8 +1,7 @@
 """What all proofs ask: a policy as on board, with all arguments of a step and nothing of the vehicle's state known."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Condition, Environment, build
@@ -12,6 +11,7 @@ from rtshcua.decision.tree import Node, where
 from rtshcua.decision.values import MISSING, Sets, Value
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span as Where
+from rtshcua.ground.analysis.condition_trees import ALWAYS, NEVER, replace_atoms
 from rtshcua.ground.analysis.solve import Questions
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.report import Report
@@ -20,11 +20,8 @@ from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.limits import WEEK
 from rtshcua.model.flat.mission import Invocation
-from rtshcua.model.flat.policy import Airspace, Policy, Rule
-
-#: the condition of a rule without one
-ALWAYS: Final = tree.AtMost((), 0)
-NEVER: Final = tree.AtMost((), -1)
+from rtshcua.model.flat.policy import Airspace, Policy, Rule, Speeds
+from rtshcua.model.ir.skills import SkillDecl
 
 
 def optimistic(node: tree.Node, hope: bool, fixed: frozenset[int] | None = None) -> tree.Node:
@@ -33,24 +30,23 @@ def optimistic(node: tree.Node, hope: bool, fixed: frozenset[int] | None = None)
     Arguments, the time and the phase are known. `fixed` are slots of the state that are known too, and with them the
     place: None where nothing of the state is.
     """
-    match node:
-        case tree.Both(left, right):
-            return tree.Both(optimistic(left, hope, fixed), optimistic(right, hope, fixed))
-        case tree.Either(left, right):
-            return tree.Either(optimistic(left, hope, fixed), optimistic(right, hope, fixed))
-        case tree.Negation(operand):
-            return tree.Negation(optimistic(operand, not hope, fixed))
-        case tree.AtMost(terms, _) | tree.Equal(terms, _):
-            known = all(term.argument or term.at in (fixed or ()) for term in terms)
-        case tree.Member(argument, index, _):
-            known = argument or index in (fixed or ())
-        case tree.SlotKnown(index):
-            known = index in (fixed or ())
-        case tree.InsideZone() | tree.InsideArgument():
-            known = fixed is not None
-        case _:
-            known = isinstance(node, tree.PointInside | tree.InWindow | tree.InWeek | tree.PhaseIn)
-    return node if known else ALWAYS if hope else NEVER
+    slots = fixed or frozenset()
+
+    def best(atom: tree.Atom, hope: bool) -> tree.Node:
+        match atom:
+            case tree.AtMost(terms, _) | tree.Equal(terms, _):
+                known = all(term.argument or term.at in slots for term in terms)
+            case tree.Member(argument, index, _):
+                known = argument or index in slots
+            case tree.SlotKnown(index):
+                known = index in slots
+            case tree.InsideZone() | tree.InsideArgument():
+                known = fixed is not None
+            case _:
+                known = not isinstance(atom, tree.MonitorSays)
+        return atom if known else ALWAYS if hope else NEVER
+
+    return replace_atoms(node, best, hope)
 
 
 #: us since the epoch: later than any flight
@@ -91,6 +87,18 @@ class ProofContext:
     def policy(self) -> Policy:
         """The lowered policy."""
         return self.prepared.policy
+
+    @property
+    def speeds(self) -> Speeds:
+        """How fast the vehicle flies; the compiler writes them."""
+        speeds = self.policy.vehicle.speeds
+        assert speeds is not None
+        return speeds
+
+    @property
+    def skills(self) -> Mapping[str, SkillDecl]:
+        """The skills as they are declared, by name."""
+        return self.context.symbols.skills
 
     def node(self, rule: Rule) -> Node:
         """The condition of a rule as a tree; rules share those that are alike."""

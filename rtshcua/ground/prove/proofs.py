@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import compress
 
 from rtshcua.decision.flying import slower
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, at_slowest, paths_fit, prepare
@@ -34,10 +35,10 @@ from rtshcua.ground.prove.step_starts import (
     prove_start,
     warn_not_landed,
 )
-from rtshcua.ground.prove.step_times import StepTime, prove_validity, step_times
+from rtshcua.ground.prove.step_times import MissionStep, mission_steps, prove_validity
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.ir.missions import MissionDecl
 
 #: the proofs of a policy, in their order
 _POLICY_PROOFS = (
@@ -84,24 +85,23 @@ def prove_mission(proof: ProofContext, declared: MissionDecl, mission: Mission) 
             return ()
         prepared.append(at_slowest(found, slowest))
         slowest = slower(slowest, invocation.plan.speed)
-    steps = [step for phase in declared.phases for step in phase.steps]
-    permitted = [prove_authority(proof, declared, step, one) for step, one in zip(steps, prepared, strict=True)]
+    declared_steps = [step for phase in declared.phases for step in phase.steps]
+    steps = list(mission_steps(proof, declared_steps, prepared))
+    permitted = [prove_authority(proof, declared, step) for step in steps]
     before = len(proof.report.found)
-    comes = step_times(proof, prepared)
-    flown = prove_flight(proof, declared, steps, prepared, comes, permitted)
+    flown = prove_flight(proof, declared, steps, permitted)
     if len(proof.report.found) == before:
-        for step, one, good in zip(steps, prepared, permitted, strict=True):
-            if good:
-                prove_step_contract(proof, step, one)
+        for step in compress(steps, permitted):
+            prove_step_contract(proof, step)
     if all(permitted):
         timely = prove_known_issue if mission.issued_at_us else prove_some_issue
-        if not timely(proof, steps, prepared, comes, unmoved_lines(prepared)):
-            prove_between(proof, declared, steps, prepared, comes, timely)
-    for step, one in zip(steps, prepared, strict=True):
-        prove_step_deferral(proof, step, one)
-        prove_step_observability(proof, step, one)
-    prove_validity(proof, steps, prepared)
-    prove_observation_time(proof, steps, prepared)
+        if not timely(proof, steps, unmoved_lines(steps)):
+            prove_between(proof, declared, steps, timely)
+    for step in steps:
+        prove_step_deferral(proof, step)
+        prove_step_observability(proof, step)
+    prove_validity(proof, steps)
+    prove_observation_time(proof, steps)
     return flown
 
 
@@ -116,12 +116,7 @@ def report_refused(context: Context, lowered: LoweredPolicy, malformed: Refusal)
 
 
 def prove_flight(
-    proof: ProofContext,
-    mission: MissionDecl,
-    steps: Sequence[Step],
-    invocations: Sequence[PreparedInvocation],
-    comes: Sequence[StepTime],
-    permitted: Sequence[bool],
+    proof: ProofContext, mission: MissionDecl, steps: Sequence[MissionStep], permitted: Sequence[bool]
 ) -> tuple[StepBound, ...]:
     """Report what is wrong with the way of a mission, up to the first step that cannot be flown; what each step takes
     at most, where all are proved.
@@ -131,36 +126,37 @@ def prove_flight(
     ways = FallbackWays(proof)
     starts: list[tuple[StartPlace, ...]] = []
     places: tuple[StartPlace, ...] = (AT_HOME,)
-    decided, slowest = True, 0
+    slowest, skipped = 0, list[MissionStep]()
     bounds: list[StepBound] = []
-    for number, (step, one, period) in enumerate(zip(steps, invocations, comes, strict=True)):
-        able = places if permitted[number] and one.invocation.skill not in proof.impossible else ()
-        if (able and not may_be_skipped(one)) or not any(place.aloft for place in places):
-            able = prove_aloft(proof, step, one, able, steps[:number])
-        able = prove_path(proof, step, one, period, able, steps[:number]) if able else ()
-        able = prove_aloft(proof, step, one, able, steps[:number])
-        slowest = slower(slowest, one.invocation.plan.speed)
-        bound = prove_step_bounds(proof, step, one, able, slowest) if able else None
-        able = prove_start(proof, step, one, able, steps[:number]) if able else ()
-        if not able or not (number or prove_home(proof, step, comes)):
+    followed = True
+    for step, permits in zip(steps, permitted, strict=True):
+        may_skip = may_be_skipped(step.prepared)
+        able = places if permits and step.flat.skill not in proof.impossible else ()
+        if (able and not may_skip) or not any(place.aloft for place in places):
+            able = prove_aloft(proof, step, able, skipped)
+        able = prove_path(proof, step, able, skipped) if able else ()
+        able = prove_aloft(proof, step, able, skipped)
+        slowest = slower(slowest, step.flat.plan.speed)
+        bound = prove_step_bounds(proof, step, able, slowest) if able else None
+        able = prove_start(proof, step, able, skipped) if able else ()
+        if not able or not (starts or prove_home(proof, steps)):
             return ()
-        if bound is not None:
-            bounds.append(bound)
-        ways.prove(step, one, period, able)
+        bounds += [] if bound is None else [bound]
+        ways.prove(step, able)
         starts.append(able)
-        places = places_after(one, places, able)
-        if len(places) > MOST_PLACES:
-            places = places[:MOST_PLACES]
-            if decided:
-                decided = False
-                _too_many_places(proof, step)
+        skipped += [step] if may_skip else []
+        places = places_after(step.prepared, places, able)
+        if followed and len(places) > MOST_PLACES:
+            followed = False
+            _too_many_places(proof, step)
+        places = places[:MOST_PLACES]
     warn_not_landed(proof, mission, steps[-1], places)
-    prove_charge(proof, steps, invocations, starts)
-    prove_landing_height(proof, steps, invocations)
+    prove_charge(proof, steps, starts)
+    prove_landing_height(proof, steps)
     return tuple(bounds) if len(bounds) == len(steps) else ()
 
 
-def _too_many_places(proof: ProofContext, step: Step) -> None:
+def _too_many_places(proof: ProofContext, step: MissionStep) -> None:
     proof.report.add(
         codes.UNDECIDED,
         step.span,

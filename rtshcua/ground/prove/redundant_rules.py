@@ -19,12 +19,10 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.removal import whole_line
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.extent import FAR
-from rtshcua.ground.analysis.solve import No, Undecided, Yes
-from rtshcua.ground.prove.overridden_degrades import covers_all, same_link
+from rtshcua.ground.analysis.solve import Undecided
 from rtshcua.ground.prove.rule_index import RuleQuery
 from rtshcua.ground.prove.ruleset import Ruleset, WrittenRule
-from rtshcua.model.flat.contract import Link
-from rtshcua.model.flat.policy import Rule, RuleKind
+from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.policies import Use
 
@@ -39,78 +37,41 @@ def covering_rule(rules: Ruleset, group: WrittenRule, but: AbstractSet[int]) -> 
         looked_at.add(at)
         other = rules.groups[at]
         other = other._replace(rules=tuple(each for each in other.rules if each not in but))
-        if all(_says_all(rules, number, other) for number in group.rules):
+        if all(
+            any(_covers_rule(rules, number, each, skill) for each in other.rules)
+            for number in group.rules
+            for skill in rules.skills_decided(number)
+        ):
             return other.span
     return None
 
 
 def _covering_candidates(rules: Ruleset, group: WrittenRule, but: AbstractSet[int]) -> Iterator[int]:
     """The rules, in order, that may say all that a rule says; each is to be asked about."""
-    pair = next(((number, skill) for number in group.rules for skill in _skills_about(rules, number)), None)
+    pair = next(((number, skill) for number in group.rules for skill in rules.skills_decided(number)), None)
+    kind = RuleKind(group.kind)
     if pair is None:
-        yield from (each for each, rule in enumerate(rules.policy.rules) if rule.kind == group.kind and each not in but)
-        return
+        return (each for each, rule in enumerate(rules.policy.rules) if rule.kind == kind and each not in but)
     number, skill = pair
     rule, effect = rules.rule(number), rules.effect(number)
-    sure = group.kind == RuleKind.DEGRADE
-    within_us = rule.within_us if group.kind == RuleKind.CONFIRM else FAR
-    about = RuleQuery(skill, rule.roles, rule.sources, (effect, effect), within_us)
-    points = list(rules.situations(number, skill))
-    met = rules.overlaps(group.kind).meeting(about, points, sure=sure)
-    while not rules.exhausted:
-        candidate = next(met, None)
-        if candidate is None:
-            return
-        if candidate in but or any(_differs(rules.holds(candidate, at), sure=sure) for at in points):
-            continue
-        yield candidate
-        answer = rules.known([(number, TRUE if sure else TRUE | UNKNOWN), (candidate, _escapes(sure=sure))], skill)
-        if isinstance(answer, Yes):  # nor does any other that is not there what it should be
-            points.append(answer.witness.at)
-            met = rules.overlaps(group.kind).meeting(about, points, sure=sure, after=candidate)
-
-
-def _escapes(*, sure: bool) -> Truth:
-    return FALSE | UNKNOWN if sure else FALSE
-
-
-def _differs(truth: Truth, *, sure: bool) -> bool:
-    return bool(truth & _escapes(sure=sure))
-
-
-def _skills_about(rules: Ruleset, number: int) -> list[int]:
-    """The skills that a rule is about; not the one that it flies itself."""
-    target = rules.rule(number).target
-    return [skill for skill in rules.skills(number) if target is None or skill != target.skill]
-
-
-def _says_all(rules: Ruleset, number: int, other: WrittenRule) -> bool:
-    return all(
-        any(_covers_rule(rules, number, candidate, skill) for candidate in other.rules)
-        for skill in _skills_about(rules, number)
-    )
+    within_us = rule.within_us if kind is RuleKind.CONFIRM else FAR
+    query = RuleQuery(skill, rule.roles, rule.sources, (effect, effect), within_us)
+    return rules.candidates(kind, number, [query], but, sure=kind is RuleKind.DEGRADE)
 
 
 def _covers_rule(rules: Ruleset, number: int, candidate: int, skill: int) -> bool:
     """Whether a rule, for a skill, does nothing that a candidate does not do."""
-    rule, wider = rules.rule(number), rules.rule(candidate)
-    if skill not in rules.skills(candidate):
-        return False
-    if not covers_all(wider.roles, rule.roles) or not covers_all(wider.sources, rule.sources):
+    rule = rules.rule(number)
+    if not rules.wider(candidate, number, skill) or rules.effect(candidate) != rules.effect(number):
         return False
     if rule.kind == RuleKind.CONFIRM:
-        if (rule.approver, rule.second) != (wider.approver, wider.second) or rule.within_us < wider.within_us:
-            return False
-        return isinstance(rules.ask([(number, TRUE | UNKNOWN), (candidate, FALSE)], skill), No)
-    if not _same_target(rule, wider) or (candidate > number and rules.other_effect_after(number) < candidate):
+        longer = rule.within_us >= rules.rule(candidate).within_us
+        return longer and rules.never([(number, TRUE | UNKNOWN), (candidate, FALSE)], skill)
+    if candidate > number and rules.other_effect_after(number) < candidate:
         return False
-    return isinstance(rules.ask([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill), No) and isinstance(
-        rules.ask([(number, UNKNOWN), (candidate, FALSE)], skill), No
+    return rules.never([(number, TRUE), (candidate, FALSE | UNKNOWN)], skill) and rules.never(
+        [(number, UNKNOWN), (candidate, FALSE)], skill
     )
-
-
-def _same_target(one: Rule, other: Rule) -> bool:
-    return isinstance(one.target, Link) and isinstance(other.target, Link) and same_link(one.target, other.target)
 
 
 def report_redundant(rules: Ruleset, alive: list[WrittenRule]) -> set[int]:

@@ -11,10 +11,10 @@ from rtshcua.decision import tree
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.analysis.condition_trees import conjuncts, minimal_conflict
 from rtshcua.ground.analysis.solve import No, Undecided, Yes, satisfiable
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.prove import overridden_degrades, redundant_rules
-from rtshcua.ground.prove.conjuncts import conjuncts, minimal_conflict
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import MOST_EFFORT, Ruleset, WrittenRule
 from rtshcua.model.flat.policy import Rule, RuleKind
@@ -111,7 +111,7 @@ def report_always(rules: Ruleset, group: WrittenRule) -> None:
         return
     for number in group.rules:
         for skill in rules.skills(number):
-            if rules.exhausted or not isinstance(rules.ask([(number, FALSE)], skill), No):
+            if rules.exhausted or not rules.never([(number, FALSE)], skill):
                 return
     rules.proof.report.add(
         codes.ALWAYS_HOLDS,
@@ -124,9 +124,7 @@ def report_always(rules: Ruleset, group: WrittenRule) -> None:
 def _defers(rules: Ruleset, group: WrittenRule) -> bool:
     """Whether a rule whose condition is never true may still defer, for it may be unknown."""
     return group.kind in (RuleKind.FORBID, RuleKind.CONFIRM) and any(
-        not isinstance(rules.ask([(number, UNKNOWN)], skill), No)
-        for number in group.rules
-        for skill in rules.skills(number)
+        not rules.never([(number, UNKNOWN)], skill) for number in group.rules for skill in rules.skills(number)
     )
 
 

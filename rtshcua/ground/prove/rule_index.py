@@ -47,7 +47,7 @@ class RuleQuery(NamedTuple):
     within_us: int = FAR
 
 
-class RuleIndex:
+class RuleBoundsIndex:
     """Some rules, by what their conditions can hold in. `implies` says of two conditions besides bounds whether one is
     true wherever the other is, and not false where that is unknown.
     """

@@ -14,16 +14,16 @@ from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment
 from rtshcua.decision.prepare import ANY
 from rtshcua.decision.times import timed as at_times
-from rtshcua.decision.values import TRUE, UNKNOWN, Truth, point
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.analysis.box import Cell, clipped
 from rtshcua.ground.analysis.extent import PHASE, Conjunction, Extents, alternatives
-from rtshcua.ground.analysis.solve import Answer, Goal, Undecided, Yes
+from rtshcua.ground.analysis.solve import Answer, Goal, No, Undecided, Yes
 from rtshcua.ground.analysis.space import SituationSpace
 from rtshcua.ground.analysis.witness import plain
 from rtshcua.ground.prove.proof_context import ProofContext
-from rtshcua.ground.prove.rule_index import IndexedRule, RuleIndex, RuleQuery
+from rtshcua.ground.prove.rule_index import IndexedRule, RuleBoundsIndex, RuleQuery
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import Rule, RuleKind
@@ -74,7 +74,7 @@ class Ruleset:
         self._extents = Extents(self.proof.prepared.tables, self.policy.zones)
         self._plain: dict[int, Environment] = {}
         self._situations: dict[tuple[int, int], tuple[Environment, ...]] = {}
-        self._overlaps: dict[int, RuleIndex] = {}
+        self._overlaps: dict[int, RuleBoundsIndex] = {}
         self._left_out: set[int] = set()
         self._alike: dict[tuple[int, Code, int], list[int]] = {}
         self._effects: dict[Hashable, int] = {}
@@ -106,6 +106,15 @@ class Ruleset:
     def skills(self, number: int) -> Sequence[int]:
         """The skills that a flat rule is about."""
         return self.rule(number).skills or range(len(self.policy.contracts))
+
+    def skills_decided(self, number: int) -> list[int]:
+        """The skills that a flat rule decides on: not the one that it flies itself."""
+        return [skill for skill in self.skills(number) if skill != self.flown(number)]
+
+    def flown(self, number: int) -> int | None:
+        """The skill that a `degrade` flies."""
+        target = self.rule(number).target
+        return None if target is None else target.skill
 
     def space(self, skill: int) -> SituationSpace:
         """Any situation in which a skill may be asked for."""
@@ -141,6 +150,10 @@ class Ruleset:
         answer = self.proof.questions.ask(key, conditions, self.space(skill))
         self._effort += self.proof.questions.effort(key) * _EVALUATIONS
         return answer
+
+    def never(self, goals: Sequence[tuple[int, Truth]], skill: int) -> bool:
+        """Whether it is proved that the conditions of flat rules never have such truths at once."""
+        return isinstance(self.ask(goals, skill), No)
 
     def known(self, goals: Sequence[tuple[int, Truth]], skill: int) -> Answer | None:
         """The answer to a question, if it was asked."""
@@ -239,14 +252,14 @@ class Ruleset:
             found = self._within[pair] = not sometimes and self.space(0).plane.within(*pair)
         return found
 
-    def overlaps(self, kind: int) -> RuleIndex:
+    def overlaps(self, kind: int) -> RuleBoundsIndex:
         """The rules of a kind, by what their conditions can hold in; without those that were dropped."""
         found = self._overlaps.get(kind)
         if found is None:
             numbers = (
                 each for each, rule in enumerate(self.policy.rules) if rule.kind == kind and each not in self._left_out
             )
-            found = self._overlaps[kind] = RuleIndex(
+            found = self._overlaps[kind] = RuleBoundsIndex(
                 (
                     IndexedRule(
                         each,
@@ -261,6 +274,36 @@ class Ruleset:
             )
         return found
 
+    def candidates(
+        self, kind: RuleKind, number: int, queries: Sequence[RuleQuery], but: AbstractSet[int], *, sure: bool
+    ) -> Iterator[int]:
+        """The rules of a kind, in order and but for some, that queries for one skill find and that may be true wherever
+        a rule is (with `sure` unset: true or unknown, wherever it is either); each is to be asked about.
+        """
+        wanted, escape = (TRUE, FALSE | UNKNOWN) if sure else (TRUE | UNKNOWN, FALSE)
+        skill, index = queries[0].skill, self.overlaps(kind)
+        points = list(self.situations(number, skill))
+        found = merge(*(index.meeting(each, points, sure=sure) for each in queries))
+        while not self.exhausted:
+            candidate = next(found, None)
+            if candidate is None:
+                return
+            if candidate in but or any(self.holds(candidate, at) & escape for at in points):
+                continue
+            yield candidate
+            answer = self.known([(number, wanted), (candidate, escape)], skill)
+            if isinstance(answer, Yes):  # nor does any other that is not there what it should be
+                points.append(answer.witness.at)
+                found = merge(*(index.meeting(each, points, sure=sure, after=candidate) for each in queries))
+
+    def wider(self, candidate: int, number: int, skill: int) -> bool:
+        """Whether a rule is about a skill, and about all roles and sources of another rule."""
+        one, other = self.rule(candidate), self.rule(number)
+        return skill in self.skills(candidate) and all(
+            not wide or (bool(narrow) and set(narrow) <= set(wide))
+            for wide, narrow in ((one.roles, other.roles), (one.sources, other.sources))
+        )
+
     def covered(
         self, number: int, wanted: Truth, kind: RuleKind, but: AbstractSet[int], escape: Truth, key: RuleSubject
     ) -> tuple[int, ...] | Undecided | None:
@@ -269,19 +312,16 @@ class Ruleset:
 
         Only those rules are asked of that a situation found so far was not an escape from.
         """
-        for code in dict.fromkeys((self.code(number), ())):
-            alike = merge(*(self._alike.get((kind, code, skill), ()) for skill in (key.skill, ANY)))
-            one = next((each for each in alike if each not in but and self._about(each, key)), None)
-            if one is not None:
-                return (one,)
+        for one in self._alike_rules(number, kind, but, key):
+            return (one,)
         about = RuleQuery(key.skill, (key.role,), (key.source,))
         holding = [self._holding(about, key, kind, exact, but) for exact in self._alternatives(number)]
-        if all(one is not None for one in holding):
-            return tuple(dict.fromkeys(one for one in holding if one is not None))
-        if wanted == TRUE:
-            for at in self.situations(number, key.skill):
-                if self._met(about, key, kind, at, escape, but) is None:
-                    return None
+        found = tuple(dict.fromkeys(one for one in holding if one is not None))
+        if None not in holding:
+            return found
+        situations = self.situations(number, key.skill) if wanted == TRUE else ()
+        if any(self._met(about, key, kind, at, escape, but) is None for at in situations):
+            return None
         used: list[int] = []
         while not self.exhausted:
             answer = self.ask([(number, wanted), *((other, escape) for other in used)], key.skill)
@@ -294,6 +334,12 @@ class Ruleset:
                 return Undecided("too many rules overlap with it")
             used.append(met)
         return None
+
+    def _alike_rules(self, number: int, kind: RuleKind, but: AbstractSet[int], key: RuleSubject) -> Iterator[int]:
+        """The rules about a key, but for some, of the same condition as a rule, or of none."""
+        for code in dict.fromkeys((self.code(number), ())):
+            alike = merge(*(self._alike.get((kind, code, skill), ()) for skill in (key.skill, ANY)))
+            yield from (each for each in alike if each not in but and self._about(each, key))
 
     def _holding(
         self, about: RuleQuery, key: RuleSubject, kind: int, exact: Conjunction, but: AbstractSet[int]
@@ -322,7 +368,7 @@ class Ruleset:
         """Whether a rule is about a key; none is about the skill that it flies itself."""
         rule = self.rule(number)
         return (
-            (rule.target is None or rule.target.skill != key.skill)
+            self.flown(number) != key.skill
             and (not rule.skills or key.skill in rule.skills)
             and (not rule.roles or key.role in rule.roles)
             and (not rule.sources or key.source in rule.sources)

@@ -14,14 +14,15 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedRule
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.analysis.condition_trees import conjuncts
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.lower.mission import argument_span
-from rtshcua.ground.prove.conjuncts import conjuncts
 from rtshcua.ground.prove.proof_context import ProofContext, optimistic
+from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import SourceKind, TimingClass
 from rtshcua.model.flat.policy import Rule, RuleKind
 from rtshcua.model.ir.expression import Condition
-from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.outcome import Reason
 from rtshcua.model.quantity import Dimension, display
 
@@ -34,37 +35,37 @@ class _FailedClause(NamedTuple):
     accepted: tuple[Offer, ...]
 
 
-def prove_authority(proof: ProofContext, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> bool:
+def prove_authority(proof: ProofContext, mission: MissionDecl, step: MissionStep) -> bool:
     """Whether in some state of the vehicle a step is permitted and flown; reports it where in none it is."""
-    at = proof.around(invocation)
-    found = authority(invocation, at)
+    at = proof.around(step.prepared)
+    found = authority(step.prepared, at)
     if PASS in found or not found:
-        return not _degraded(proof, step, invocation, at)
+        return not _degraded(proof, step, at)
     # a forbid that some state makes false does not decide in the best case; what permits, or does not, comes last
-    forbids = (each.rule for each in invocation.candidates.forbids if not each.condition(at) & FALSE)
+    forbids = (each.rule for each in step.prepared.candidates.forbids if not each.condition(at) & FALSE)
     forbid = None if found[0].reason is Reason.CLASS_NOT_PERMITTED else next(forbids, None)
     if forbid is not None:
         proof.report.add(
             codes.FORBIDDEN,
             step.span,
             f"the policy `{proof.policy.name}` forbids this step",
-            help=_help_against(proof, invocation, at, forbid),
+            help=_help_against(proof, step.prepared, at, forbid),
             labels=[(proof.span(forbid), "by this rule")],
         )
         return False
     match found[-1].reason:
         case Reason.CLASS_NOT_PERMITTED:
-            _class(proof, mission, step, invocation)
+            _class(proof, mission, step)
         case Reason.NOT_PERMITTED:
-            _not_permitted(proof, mission, step, invocation)
+            _not_permitted(proof, mission, step)
         case _:
-            _out_of_scope(proof, step, invocation, at)
+            _out_of_scope(proof, step, at)
     return False
 
 
-def _degraded(proof: ProofContext, step: Step, invocation: PreparedInvocation, at: Environment) -> bool:
+def _degraded(proof: ProofContext, step: MissionStep, at: Environment) -> bool:
     """Whether a degrade holds, or is unknown, in every state; reports it."""
-    always = (each.rule for each in invocation.candidates.degrades if not each.condition(at) & FALSE)
+    always = (each.rule for each in step.prepared.candidates.degrades if not each.condition(at) & FALSE)
     rule = next(always, None)
     if rule is None or rule.target is None:
         return False
@@ -74,7 +75,7 @@ def _degraded(proof: ProofContext, step: Step, invocation: PreparedInvocation, a
         step.span,
         f"the policy `{policy.name}` flies `{policy.contracts[rule.target.skill].name}` in place of this step, "
         "whatever the state",
-        help=_help_against(proof, invocation, at, rule),
+        help=_help_against(proof, step.prepared, at, rule),
         labels=[(proof.span(rule), "by this rule")],
     )
     return True
@@ -96,14 +97,14 @@ def _accepted(values: Mapping[str, str]) -> str:
     return "nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in values.items())
 
 
-def _class(proof: ProofContext, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
-    skill = proof.context.symbols.skills[step.skill.text]
+def _class(proof: ProofContext, mission: MissionDecl, step: MissionStep) -> None:
+    skill = proof.skills[step.declared.skill.text]
     assert mission.source is not None
     assert skill.timing_class is not None
-    timing = TimingClass(invocation.invocation.contract.timing_class).name.lower()
+    timing = TimingClass(step.contract.timing_class).name.lower()
     proof.report.add(
         codes.SOURCE_CLASS,
-        step.skill.span,
+        step.declared.skill.span,
         f"`{mission.source.text}` may not ask for a skill of the class `{timing}`",
         help="an agent and an operator may ask for `semantic` and `tactical` skills",
         labels=[
@@ -113,8 +114,8 @@ def _class(proof: ProofContext, mission: MissionDecl, step: Step, invocation: Pr
     )
 
 
-def _not_permitted(proof: ProofContext, mission: MissionDecl, step: Step, invocation: PreparedInvocation) -> None:
-    policy, flat = proof.policy, invocation.invocation
+def _not_permitted(proof: ProofContext, mission: MissionDecl, step: MissionStep) -> None:
+    policy, flat = proof.policy, step.flat
     assert mission.role is not None
     may: list[str] = []
     for rule in policy.rules:
@@ -125,46 +126,44 @@ def _not_permitted(proof: ProofContext, mission: MissionDecl, step: Step, invoca
     source = SourceKind(flat.source).name.lower()
     proof.report.add(
         codes.NOT_PERMITTED,
-        step.skill.span,
-        f"no rule permits `{step.skill.text}` to the role `{mission.role.text}` through `{source}`",
+        step.declared.skill.span,
+        f"no rule permits `{step.declared.skill.text}` to the role `{mission.role.text}` through `{source}`",
         help="it is permitted to " + "; to ".join(dict.fromkeys(may)) if may else "it is permitted to nobody",
         labels=[(proof.lowered.declaration.name.span, "the policy is declared here")],
     )
 
 
-def _out_of_scope(proof: ProofContext, step: Step, invocation: PreparedInvocation, at: Environment) -> None:
+def _out_of_scope(proof: ProofContext, step: MissionStep, at: Environment) -> None:
     """Explain by the permit that is nearest to permitting."""
-    permits = [_failed_clauses(proof, permit, invocation, at) for permit in invocation.candidates.permits]
+    permits = [_failed_clauses(proof, permit, step.prepared, at) for permit in step.prepared.candidates.permits]
     nearest = min(permits, key=len)
-    report, flat = proof.report, invocation.invocation
-    names = list(dict.fromkeys(name for unmet in nearest for name in unmet.parameters))
-    span = argument_span(proof.context, step, names[0]) if names else step.span
-    default = _default(proof, step, names[0]) if names and span == step.span else None
-    written = (
-        f" = {report.text(span if default is None else default)}" if names and (default or span != step.span) else ""
-    )
-    subject = f"`{names[0]}{written}`" if names else f"`{flat.contract.name}`"
+    name = next((each for unmet in nearest for each in unmet.parameters), None)
     accepted = {each.subject: "` or `".join(_values_text(each)) for unmet in nearest for each in unmet.accepted}
-    fix = None
-    if names and len(nearest) == 1 and names[0] in accepted and span != step.span:
-        replacement = _values_text(nearest[0].accepted[0])[0]
-        fix = (span, replacement, f"write `{replacement}`")
-    report.add(
+    labels = [(unmet.span, "this does not hold") for unmet in nearest]
+    span, subject, fix = step.span, name or step.contract.name, None
+    if name is not None:
+        span = argument_span(proof.context, step.declared, name)
+        written = _default(proof, step, name) if span == step.span else span
+        if written is not None:
+            subject += f" = {proof.report.text(written)}"
+        if span == step.span:
+            labels += [(written, "the step says nothing, so this default holds")] if written is not None else []
+        elif len(nearest) == 1 and name in accepted:
+            replacement = _values_text(nearest[0].accepted[0])[0]
+            fix = (span, replacement, f"write `{replacement}`")
+    proof.report.add(
         codes.OUT_OF_SCOPE,
         span,
-        f"{subject} is outside of what `{proof.policy.name}` permits for `{flat.contract.name}`",
+        f"`{subject}` is outside of what `{proof.policy.name}` permits for `{step.contract.name}`",
         help=_accepted(accepted) if accepted else None,
-        labels=[
-            *((unmet.span, "this does not hold") for unmet in nearest),
-            *(() if default is None else ((default, "the step says nothing, so this default holds"),)),
-        ],
+        labels=labels,
         fix=fix,
     )
 
 
-def _default(proof: ProofContext, step: Step, parameter: str) -> Span | None:
+def _default(proof: ProofContext, step: MissionStep, parameter: str) -> Span | None:
     """Where the default of a parameter is written."""
-    skill = proof.context.symbols.skills[step.skill.text]
+    skill = proof.skills[step.declared.skill.text]
     return next((p.default.span for p in skill.parameters if p.name.text == parameter and p.default is not None), None)
 
 

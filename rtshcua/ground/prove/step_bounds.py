@@ -35,10 +35,10 @@ from rtshcua.ground.geometry.polygons import Point, length
 from rtshcua.ground.lower.mission import argument_span
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.step_starts import StartPlace, planned
+from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind
 from rtshcua.model.flat.limits import FULL, MAX_SPEED
 from rtshcua.model.flat.policy import Speeds
-from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
 SECOND_US: Final = 1_000_000
@@ -59,37 +59,36 @@ class StepBound(NamedTuple):
 
 
 def prove_step_bounds(
-    proof: ProofContext, step: Step, invocation: PreparedInvocation, starts: Sequence[StartPlace], slowest: int
+    proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], slowest: int
 ) -> StepBound | None:
     """What a step takes at most that may begin at `starts`; None after a finding. `slowest` is the slowest speed that
     it and those before it ask for, mm/s, 0 if none does.
     """
     before = len(proof.report.found)
-    speeds, contract = _speeds(proof), invocation.invocation.contract
-    wind = _wind(proof, invocation)
+    speeds, contract = proof.speeds, step.contract
+    wind = _wind(proof, step.prepared)
 
     def takes(height: int) -> int:
         """What it takes if it leads to a height."""
-        return max(_step_us(proof, invocation, start, height, slowest, wind) for start in starts)
+        return max(_step_us(proof, step.prepared, start, height, slowest, wind) for start in starts)
 
-    time_us, fits = takes(invocation.invocation.plan.altitude), _energy_us(speeds, contract.energy)
+    time_us, fits = takes(step.flat.plan.altitude), _energy_us(speeds, contract.energy)
     if 0 < contract.duration_us < time_us:
-        skill = proof.context.symbols.skills[step.skill.text]
-        own = None if step.overrides is None else step.overrides.duration
-        limit = own or skill.duration
+        skill = proof.skills[contract.name]
+        limit = (step.overrides and step.overrides.duration) or skill.duration
         assert limit is not None
-        nearer = _nearer(proof, step, invocation, starts[0].height, takes, min(fits, contract.duration_us))
+        nearer = _nearer(proof, step, starts[0].height, takes, min(fits, contract.duration_us))
         _too_long(proof, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest)
     energy = charge(speeds, time_us)
     # a return is never refused for want of charge, and the mission's bound counts the way home, if that is more
-    home = invocation.invocation.plan.kind == MotionKind.HOME
+    home = step.flat.plan.kind == MotionKind.HOME
     if len(proof.report.found) == before and energy > contract.energy and not home:
         fits = min(fits, contract.duration_us or fits)
-        nearer = _nearer(proof, step, invocation, starts[0].height, takes, fits)
+        nearer = _nearer(proof, step, starts[0].height, takes, fits)
         _too_much(proof, step, "the step", contract, energy, nearer)
     returns: list[tuple[Contract, int]] = []
     if len(proof.report.found) == before:
-        returns = _prove_links(proof, step, invocation, starts, slowest)
+        returns = _prove_links(proof, step, starts, slowest)
     if len(proof.report.found) > before:
         return None
     for link, needed in returns:
@@ -105,16 +104,14 @@ def _energy_us(speeds: Speeds, energy: int) -> int:
     return energy * speeds.flight_us // FULL
 
 
-def _nearer(
-    proof: ProofContext, step: Step, invocation: PreparedInvocation, here: int, takes: Callable[[int], int], fits: int
-) -> _Fix | None:
+def _nearer(proof: ProofContext, step: MissionStep, here: int, takes: Callable[[int], int], fits: int) -> _Fix | None:
     """The height nearest to what the step asks for, towards where it begins, to which it takes no longer than `fits`;
     None where its height is no argument, or none does.
     """
-    contract, asked = invocation.invocation.contract, invocation.invocation.plan.altitude
+    contract, asked = step.contract, step.flat.plan.altitude
     cell = contract.motion.altitude
     parameter = next((each for each in contract.parameters if 0 <= each.cell == cell), None)
-    span = None if parameter is None else argument_span(proof.context, step, parameter.name)
+    span = None if parameter is None else argument_span(proof.context, step.declared, parameter.name)
     if parameter is None or span is None or span == step.span or not parameter.low <= here <= parameter.high:
         return None
     sign = 1 if here > asked else -1
@@ -128,15 +125,9 @@ def _nearer(
     return span, height, f"write `{height}`"
 
 
-def _speeds(proof: ProofContext) -> Speeds:
-    speeds = proof.policy.vehicle.speeds
-    assert speeds is not None  # the compiler writes them
-    return speeds
-
-
 def _wind(proof: ProofContext, invocation: PreparedInvocation) -> int:
     """The most wind in which a step goes on: what the vehicle is flown in, and what `assume` and `degrade` leave."""
-    policy, most = proof.policy, _speeds(proof).wind
+    policy, most = proof.policy, proof.speeds.wind
     slots = [
         signal.slot
         for signal in policy.signals
@@ -165,7 +156,7 @@ def _step_us(
     proof: ProofContext, invocation: PreparedInvocation, start: StartPlace, altitude: int, slowest: int, wind: int
 ) -> int:
     """How long a step takes at most from where it begins to where it is done, which is at a height."""
-    flat, vehicle, speeds = invocation.invocation, proof.policy.vehicle, _speeds(proof)
+    flat, vehicle, speeds = invocation.invocation, proof.policy.vehicle, proof.speeds
     plan = flat.plan
     height = sinking_us(speeds, start.height - altitude) + rising_us(speeds, altitude - start.height)
     match plan.kind:
@@ -191,20 +182,20 @@ def _is_told(proof: ProofContext, contract: Contract) -> bool:
 
 
 def _prove_links(
-    proof: ProofContext, step: Step, invocation: PreparedInvocation, starts: Sequence[StartPlace], slowest: int
+    proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], slowest: int
 ) -> list[tuple[Contract, int]]:
     """Report the first link that may take longer than it may, wherever in the step it begins. Given are the returns
     that may take more charge than their skill says, and how much; none is refused for that.
     """
     returns: list[tuple[Contract, int]] = []
-    if invocation.invocation.plan.kind in (MotionKind.HOME, MotionKind.LAND):
+    if step.flat.plan.kind in (MotionKind.HOME, MotionKind.LAND):
         return returns  # what follows it lands
-    volumes = [planned(proof, invocation, start)[1] for start in starts]
+    volumes = [planned(proof, step.prepared, start)[1] for start in starts]
     distance = max(volume.farthest[1] for volume in volumes)
     low = min(volume.height[0] for volume in volumes)
     high = max(volume.height[1] for volume in volumes)
-    degrades = [rule.target for rule in invocation.candidates.degrades]
-    for chain in (degrades, invocation.chain, proof.prepared.contingency):
+    degrades = [rule.target for rule in step.prepared.candidates.degrades]
+    for chain in (degrades, step.prepared.chain, proof.prepared.contingency):
         reach, so_far = (distance, low, high), slowest
         for link in chain:
             reach, time_us = _link_us(proof, link, *reach, so_far)
@@ -214,11 +205,11 @@ def _prove_links(
             allowed = link.link.limit_us or contract.duration_us
             name = f"`{contract.name}`, a link of this step's chains,"
             if link is not chain[-1] and 0 < allowed < time_us:
-                declared = proof.context.symbols.skills[contract.name].duration
+                declared = proof.skills[contract.name].duration
                 limit = proof.span(link.link) if link.link.limit_us or declared is None else declared.span
                 _too_long(proof, step, name, contract, time_us, allowed, limit, slowest=slowest)
                 return []
-            needed = charge(_speeds(proof), time_us)
+            needed = charge(proof.speeds, time_us)
             if link.motion == MotionKind.HOME and needed > contract.energy:
                 returns.append((contract, needed))
     return returns
@@ -228,7 +219,7 @@ def _link_us(
     proof: ProofContext, link: PreparedLink, distance: int, low: int, high: int, slowest: int
 ) -> tuple[tuple[int, int, int], int]:
     """From how far and between which heights later links begin, and how long a link takes at most; 0: it is cut."""
-    vehicle, speeds = proof.policy.vehicle, _speeds(proof)
+    vehicle, speeds = proof.policy.vehicle, proof.speeds
     contract, arguments = proof.policy.contracts[link.link.skill], link.link.arguments
     reach = (distance, low, high)
     match link.motion:
@@ -254,7 +245,7 @@ def _link_us(
 
 def _too_long(
     proof: ProofContext,
-    step: Step,
+    step: MissionStep,
     what: str,
     contract: Contract,
     time_us: int,
@@ -263,11 +254,11 @@ def _too_long(
     nearer: _Fix | None = None,
     slowest: int = 0,
 ) -> None:
-    speeds = _speeds(proof)
+    speeds = proof.speeds
     goes_on = ""
     if contract.motion.kind == MotionKind.HOME and 0 < slowest < speeds.homeward:
         goes_on = f", at {display(slowest, Dimension.SPEED)}, the slowest that a step asks for"
-    size = named_at(proof.report, proof.context.symbols.skills[contract.name], limit)
+    size = named_at(proof.report, proof.skills[contract.name], limit)
     enough = display(-(-time_us // SECOND_US) * SECOND_US, Dimension.DURATION)
     longer = "let it last longer" if size is None else f"write `sizes {contract.name}({size} = {enough})`"
     lasts = f"`{contract.name}` lasts at most {display(allowed, Dimension.DURATION)}"
@@ -288,15 +279,15 @@ def _too_long(
 
 def _too_much(
     proof: ProofContext,
-    step: Step,
+    step: MissionStep,
     what: str,
     contract: Contract,
     energy: int,
     nearer: _Fix | None = None,
     code: Code = codes.STEP_ENERGY,
 ) -> None:
-    skill = proof.context.symbols.skills[contract.name]
-    own = None if step.overrides is None or contract.name != step.skill.text else step.overrides.energy
+    skill = proof.skills[contract.name]
+    own = None if step.overrides is None or contract.name != step.declared.skill.text else step.overrides.energy
     declared = own or skill.energy
     assert declared is not None
     needed = -(-energy // 10) * 10  # to a tenth of a percent
@@ -325,7 +316,7 @@ def _speeds_span(proof: ProofContext) -> Iterator[tuple[Span, str]]:
 
 def _counted_with(proof: ProofContext) -> str:
     """By which speeds it was counted, in words."""
-    speeds, vehicle = _speeds(proof), proof.policy.vehicle
+    speeds, vehicle = proof.speeds, proof.policy.vehicle
     names = {"cruise": speeds.cruise, "climb": speeds.climb, "descent": speeds.descent, "landing": speeds.landing}
     told = ", ".join(f"{name} {display(value, Dimension.SPEED)}" for name, value in names.items())
     against = f"against {display(speeds.wind, Dimension.SPEED)} of wind" if speeds.wind else "without wind"

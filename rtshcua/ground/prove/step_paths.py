@@ -39,28 +39,28 @@ from rtshcua.ground.prove.airspace_keeping import (
 from rtshcua.ground.prove.fallback_ways import FallbackWays
 from rtshcua.ground.prove.proof_context import EVER, ProofContext
 from rtshcua.ground.prove.step_starts import StartPlace, from_home, from_where, planned
-from rtshcua.ground.prove.step_times import StepTime, at_moment, zone_span
+from rtshcua.ground.prove.step_times import MissionStep, at_moment, zone_span
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.limits import FULL
-from rtshcua.model.ir.missions import Step
 from rtshcua.model.quantity import Dimension, display
 
 
-def prove_home(proof: ProofContext, first: Step, comes: Sequence[StepTime]) -> bool:
+def prove_home(proof: ProofContext, steps: Sequence[MissionStep]) -> bool:
     """Whether a vehicle on the ground is in the airspace wherever its home is; reports at the first step where not."""
     airspace, policy = proof.prepared.airspace, proof.policy
     if airspace is None:
         return True
-    whole = replace(comes[0], high=comes[-1].high, asked=comes[0].asked)
-    present = whole.present(airspace, comes[-1].lasts_us)
+    first, last = steps[0], steps[-1].time
+    whole = replace(first.time, high=last.high)
+    present = whole.present(airspace, last.lasts_us)
     error, within = policy.vehicle.position_error, policy.vehicle.home_within
     homes = disc(within)
     space = Places(((HullSweep(homes, (-error, -error, error, error), Landmarks(policy)), 0, 0),), 0)
     if keeps(space, present) == TRUE:
-        for zone in whole.avoidable(airspace, comes[-1].lasts_us):
+        for zone in whole.avoidable(airspace, last.lasts_us):
             if space.inside(zone) != FALSE:
-                whole.avoid(zone, comes[-1].lasts_us)
+                whole.avoid(zone, last.lasts_us)
         return True
     edge = hull(homes)
     legs = [*((corner, corner) for corner in edge), *(((0, 0), corner) for corner in edge)]
@@ -74,45 +74,37 @@ def prove_home(proof: ProofContext, first: Step, comes: Sequence[StepTime]) -> b
         labels=[
             (written.span, "how far the real home may lie"),
             (proof.span(airspace.airspace), "the airspace"),
-            *whole.labels(present, space, comes[-1].lasts_us),
+            *whole.labels(present, space, last.lasts_us),
         ],
     )
     return False
 
 
 def prove_path(
-    proof: ProofContext,
-    step: Step,
-    invocation: PreparedInvocation,
-    period: StepTime,
-    starts: Sequence[StartPlace],
-    before: Sequence[Step],
+    proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], skipped: Sequence[MissionStep]
 ) -> tuple[StartPlace, ...]:
     """Report what no state makes possible about a step that may come at any of `starts`; where of these it may begin,
     nowhere after a finding.
 
-    The first of `starts` is where it begins when no step `before` was skipped.
+    The first of `starts` is where it begins when none of the steps that may be `skipped` was.
     """
-    report = proof.report
-    already = len(report.found)
-    _speed(proof, step, invocation)
-    if len(report.found) > already:
+    if _too_fast(proof, step):
         return ()
 
     def flies(start: StartPlace) -> None:
-        skipped = [] if start is starts[0] else [each for each in before if each.on_inadmissible == "skip"]
-        _volume(proof, step, invocation, period, start, skipped)
+        _volume(proof, step, start, () if start is starts[0] else skipped)
 
-    return from_where(proof, invocation, starts, flies)
+    return from_where(proof, step.prepared, starts, flies)
 
 
-def _speed(proof: ProofContext, step: Step, invocation: PreparedInvocation) -> None:
-    flat, vehicle = invocation.invocation, proof.policy.vehicle
+def _too_fast(proof: ProofContext, step: MissionStep) -> bool:
+    """Whether a step asks for more speed than the vehicle has; reports it."""
+    flat, vehicle = step.flat, proof.policy.vehicle
     if flat.plan.speed <= vehicle.speed:
-        return
+        return False
     cell = flat.contract.motion.speed
     name = next(parameter.name for parameter in flat.contract.parameters if parameter.cell == cell)
-    span = argument_span(proof.context, step, name)
+    span = argument_span(proof.context, step.declared, name)
     most = display(vehicle.speed, Dimension.SPEED)
     proof.report.add(
         codes.BEYOND_VEHICLE,
@@ -122,28 +114,22 @@ def _speed(proof: ProofContext, step: Step, invocation: PreparedInvocation) -> N
         labels=[(proof.lowered.vehicle.speed.span, "declared here")],
         fix=None if span == step.span else (span, most, f"write `{most}`"),
     )
+    return True
 
 
-def _volume(
-    proof: ProofContext,
-    step: Step,
-    invocation: PreparedInvocation,
-    period: StepTime,
-    start: StartPlace,
-    skipped: Sequence[Step],
-) -> None:
+def _volume(proof: ProofContext, step: MissionStep, start: StartPlace, skipped: Sequence[MissionStep]) -> None:
     """The planned volume keeps the airspace and what the contract maintains; charge and clauses can suffice."""
-    at, volume = planned(proof, invocation, start)
+    at, volume = planned(proof, step.prepared, start)
     labels = [(each.span, "this step may be skipped") for each in skipped[-1:]]
-    if not _airspace(proof, step, invocation, period, start, volume, labels):
+    if not _airspace(proof, step, start, volume, labels):
         return
-    path = invocation.invocation.plan.path
+    path = step.flat.plan.path
     legs = path_legs([(start.x, start.y), *zip(path[::2], path[1::2], strict=True)])
-    broken = _broken(proof, invocation, period, at, volume, legs)
+    broken = _broken(proof, step, at, volume, legs)
     if broken is not None:
         _report_broken(proof, step, broken, labels)
         return
-    needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
+    needed = step.prepared.energy.needed(volume.farthest[1], volume.height[:2])
     if needed > FULL:
         proof.report.add(
             codes.BEYOND_VEHICLE,
@@ -154,23 +140,17 @@ def _volume(
 
 
 def _airspace(
-    proof: ProofContext,
-    step: Step,
-    invocation: PreparedInvocation,
-    period: StepTime,
-    start: StartPlace,
-    volume: Volume,
-    labels: list[tuple[Span, str]],
+    proof: ProofContext, step: MissionStep, start: StartPlace, volume: Volume, labels: list[tuple[Span, str]]
 ) -> bool:
     """Whether the planned volume keeps the airspace whenever the step may come."""
-    airspace, policy, lasts = proof.prepared.airspace, proof.policy, invocation.lasts_us
+    airspace, policy, lasts = proof.prepared.airspace, proof.policy, step.prepared.lasts_us
     if airspace is None:
         return True
-    present = period.present(airspace, lasts)
+    present = step.time.present(airspace, lasts)
     begins = f"on its way, which {'may begin' if labels else 'begins'} {from_home(start.x, start.y)}, the vehicle would"
     written = (proof.span(airspace.airspace), "the airspace")
     if EVERYWHERE[keeps(volume.place, present)] == FALSE:
-        home = invocation.invocation.plan.kind == MotionKind.HOME
+        home = step.flat.plan.kind == MotionKind.HOME
         higher = FallbackWays(proof).raised(start, present) if home else ""
         proof.report.add(
             codes.PATH_OUTSIDE,
@@ -180,25 +160,25 @@ def _airspace(
             if higher
             else "the leg to where the step begins counts, widened by the vehicle's position error; "
             "go around by further steps",
-            labels=[written, *period.labels(present, volume.place, lasts), *labels],
+            labels=[written, *step.time.labels(present, volume.place, lasts), *labels],
         )
         return False
-    missing = period.missing(airspace, lasts)
+    missing = step.time.missing(airspace, lasts)
     if missing is not None:
         name = policy.zones[missing.number].name
         proof.report.add(
             codes.PATH_OUTSIDE,
             step.span,
-            f"{begins} be in `{name}`, which does not always exist {period.from_to(lasts)}, when this step may fly",
+            f"{begins} be in `{name}`, which does not always exist {step.time.from_to(lasts)}, when this step may fly",
             help="issue the mission at another time, or let the steps before this one take less",
             labels=[written, (zone_span(proof, missing), "declared here")],
         )
         return False
-    for zone in period.avoidable(airspace, lasts):
+    for zone in step.time.avoidable(airspace, lasts):
         if volume.place.inside(zone) != FALSE:
-            period.avoid(zone, lasts)
+            step.time.avoid(zone, lasts)
     for zone in airspace.inside:
-        period.stay(zone, lasts)
+        step.time.stay(zone, lasts)
     return True
 
 
@@ -222,16 +202,11 @@ class _BrokenClause(NamedTuple):
 
 
 def _broken(
-    proof: ProofContext,
-    invocation: PreparedInvocation,
-    period: StepTime,
-    at: Environment,
-    volume: Volume,
-    legs: Sequence[Leg],
+    proof: ProofContext, step: MissionStep, at: Environment, volume: Volume, legs: Sequence[Leg]
 ) -> _BrokenClause | None:
     """A clause of the contract that cannot hold over the planned volume, which leads along `legs`, or at the start."""
+    invocation, period, arguments = step.prepared, step.time, step.flat.arguments
     over = ranging(at, volume, proof.prepared.tables.known.height, invocation.lasts_us)
-    arguments, contract = invocation.invocation.arguments, invocation.invocation.contract
     anywhere = proof.around(invocation)
 
     def can(condition: Condition, best: Condition | None, there: Environment, utc: Utc) -> bool:
@@ -240,7 +215,7 @@ def _broken(
         return bool(condition(then) & TRUE) and (best is None or EVERYWHERE[best(then)] != FALSE)
 
     for clause, condition in invocation.maintain:
-        maintained = partial(can, condition, proof.best(clause, contract), over)
+        maintained = partial(can, condition, proof.best(clause, step.contract), over)
         fails, moment = period.fails(clause, arguments, invocation.lasts_us, maintained)
         if fails:
             then = (0, EVER) if moment is None else (moment, moment)
@@ -248,7 +223,7 @@ def _broken(
             def holds(
                 there: Environment, condition: Condition = condition, clause: Clause = clause, then: Utc = then
             ) -> bool:
-                return can(condition, proof.best(clause, contract), there, then)
+                return can(condition, proof.best(clause, step.contract), there, then)
 
             near = _near(proof, invocation, at, volume, legs, holds)
             (low, high), vehicle = volume.height[:2], proof.policy.vehicle
@@ -287,7 +262,9 @@ def _near(
     return None
 
 
-def _report_broken(proof: ProofContext, step: Step, broken: _BrokenClause, labels: list[tuple[Span, str]]) -> None:
+def _report_broken(
+    proof: ProofContext, step: MissionStep, broken: _BrokenClause, labels: list[tuple[Span, str]]
+) -> None:
     clause, policy = broken.clause, proof.policy
     at = where = ""
     if broken.moment is not None:

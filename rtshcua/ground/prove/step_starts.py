@@ -19,12 +19,13 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.proof_context import ProofContext
+from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.mavlink.enums import MAV_LANDED_STATE_IN_AIR, MAV_LANDED_STATE_ON_GROUND
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.signal import ENUMERATION
-from rtshcua.model.ir.missions import MissionDecl, Step
+from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.quantity import Dimension, display
 
 #: so many places are followed; where steps that may be skipped leave more, the rest is left for on board
@@ -126,61 +127,52 @@ _ALOFT = {MotionKind.FLY: "flies somewhere", MotionKind.COVER: "flies a survey",
 
 
 def prove_aloft(
-    proof: ProofContext,
-    step: Step,
-    invocation: PreparedInvocation,
-    starts: Sequence[StartPlace],
-    before: Sequence[Step],
+    proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], skipped: Sequence[MissionStep]
 ) -> tuple[StartPlace, ...]:
     """All of `starts` if the vehicle can do there what a step does, nowhere after a finding: that it is on the ground.
 
     That it cannot hold or fly there is not asked when the step is admitted, so `skip` does not help against that.
     """
-    flat = invocation.invocation
+    flat = step.flat
     for start in starts:
         if not start.aloft and flat.plan.kind in _ALOFT:
-            motion = proof.context.symbols.skills[step.skill.text].motion
+            motion = proof.skills[flat.contract.name].motion
             assert motion is not None
             words = f"`{flat.contract.name}` {_ALOFT[MotionKind(flat.plan.kind)]}"
-            skipped = [] if start is starts[0] else before
             help = "let a step before it climb, as `takeoff` does"
-            _report_unchained(proof, step, start, words, (motion.span, "its motion"), skipped, help)
+            before = () if start is starts[0] else skipped
+            _report_unchained(proof, step, start, words, (motion.span, "its motion"), before, help)
             return ()
     return tuple(starts)
 
 
 def prove_start(
-    proof: ProofContext,
-    step: Step,
-    invocation: PreparedInvocation,
-    starts: Sequence[StartPlace],
-    before: Sequence[Step],
+    proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], skipped: Sequence[MissionStep]
 ) -> tuple[StartPlace, ...]:
     """Where of `starts` a step finds what it needs, nowhere after a finding: the first thing that it lacks.
 
-    The first of `starts` is where it begins when no step `before` was skipped.
+    The first of `starts` is where it begins when none of the steps that may be `skipped` was.
     """
 
     def finds(start: StartPlace) -> None:
-        clause = _lacking(proof, invocation, start)
+        clause = _lacking(proof, step.prepared, start)
         if clause is not None:
             words, label = f"it needs `{clause.text}`", (proof.span(clause), "the contract asks for this")
-            skipped = [] if start is starts[0] else before
-            _report_unchained(proof, step, start, words, label, skipped, "add a step before it that brings this about")
+            help, before = "add a step before it that brings this about", () if start is starts[0] else skipped
+            _report_unchained(proof, step, start, words, label, before, help)
 
-    return from_where(proof, invocation, starts, finds)
+    return from_where(proof, step.prepared, starts, finds)
 
 
 def _report_unchained(
     proof: ProofContext,
-    step: Step,
+    step: MissionStep,
     start: StartPlace,
     words: str,
     label: tuple[Span, str],
-    before: Sequence[Step],
+    skipped: Sequence[MissionStep],
     help: str,
 ) -> None:
-    skipped = [each for each in before if each.on_inadmissible == "skip"]
     proof.report.add(
         codes.NOT_CHAINED,
         step.span,
@@ -190,7 +182,7 @@ def _report_unchained(
     )
 
 
-def warn_not_landed(proof: ProofContext, mission: MissionDecl, step: Step, ends: Sequence[StartPlace]) -> None:
+def warn_not_landed(proof: ProofContext, mission: MissionDecl, step: MissionStep, ends: Sequence[StartPlace]) -> None:
     """Warn of a mission that leaves the vehicle in the air: only its contingency then brings it down."""
     for place in ends:
         if place.aloft:

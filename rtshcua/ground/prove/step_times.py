@@ -23,58 +23,27 @@ from rtshcua.ground.analysis.space import reads_days
 from rtshcua.ground.analysis.witness import local_time_text
 from rtshcua.ground.prove.proof_context import EVER, ProofContext
 from rtshcua.model.flat.code import Clause, Op
+from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.limits import DAY
-from rtshcua.model.ir.missions import Step
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.ir.missions import Overrides, Step
 from rtshcua.model.quantity import Dimension, display
 
 #: how long after its issue a mission may begin
 START_WINDOW_US = 300 * 1_000_000
 
 
-def prove_validity(proof: ProofContext, steps: Sequence[Step], invocations: Sequence[PreparedInvocation]) -> None:
-    """Report every step whose decision may mean nothing any more when its turn comes."""
-    latest = START_WINDOW_US
-    for step, invocation in zip(steps, invocations, strict=True):
-        contract = invocation.invocation.contract
-        skill = proof.context.symbols.skills[step.skill.text]
-        if not contract.duration_us:
-            proof.report.add(
-                codes.ENDLESS_STEP,
-                step.span,
-                f"`{contract.name}` does not end, so nothing after this step would ever begin",
-                help="add `lasts at most` to the skill",
-                labels=[(skill.name.span, "declared here, without `lasts at most`")],
-            )
-            return
-        latest += approval(proof, invocation) + contract.deadline_us
-        if latest > contract.validity_us:
-            own = None if step.overrides is None else step.overrides.validity
-            validity = own or skill.validity
-            assert validity is not None
-            proof.report.add(
-                codes.VALIDITY_TOO_SHORT,
-                step.span,
-                f"this step may begin {display(latest, Dimension.DURATION)} after the mission was issued, and "
-                f"`{contract.name}` is valid for {display(contract.validity_us, Dimension.DURATION)}",
-                help=f"{display(START_WINDOW_US, Dimension.DURATION)} to the start, then all deadlines, approvals and "
-                "durations before it count; move the step forward, or shorten those before it",
-                labels=[(validity.span, "declared here")],
-            )
-            return
-        latest += contract.duration_us
-
-
 def approval(proof: ProofContext, invocation: PreparedInvocation) -> int:
     """How long a step may wait for approvals."""
-    at = proof.around(invocation)
-    waits = [rule.rule.within_us for rule in invocation.candidates.confirms if rule.condition(at) & TRUE]
-    return max(waits, default=0)
+    confirms = invocation.candidates.confirms
+    at = proof.around(invocation) if confirms else None
+    return max((each.rule.within_us for each in confirms if at and each.condition(at) & TRUE), default=0)
 
 
 _EXACT = (0, 0)
 
 
-class Failure(NamedTuple):
+class ClauseFailure(NamedTuple):
     """Whether a condition fails, and at which moment of UTC, where one is known."""
 
     fails: bool
@@ -161,12 +130,8 @@ class StepTime:
         return f"from {local_time_text(low, local, day=day)} to {local_time_text(high, local, day=day)}, local time"
 
     def fails(
-        self,
-        clause: Clause,
-        arguments: Sequence[int],
-        through: int,
-        holds: Callable[[Span], bool],
-    ) -> Failure:
+        self, clause: Clause, arguments: Sequence[int], through: int, holds: Callable[[Span], bool]
+    ) -> ClauseFailure:
         """Whether a condition fails at some moment at which the step may begin, or whatever the time of issue: what
         `holds` says of a moment. `through` is how far after it the zones count. What it asks of a time of issue that
         is not known is collected.
@@ -176,10 +141,10 @@ class StepTime:
             ((low, high),) = self.utc(0)
             for moment in sorted({low, high, *_moments(windows, dates, low, high, through)}):
                 if not holds((moment, moment)):
-                    return Failure(True, moment)
-            return Failure(False)
+                    return ClauseFailure(True, moment)
+            return ClauseFailure(False)
         if not windows and not dates:
-            return Failure(not holds((0, EVER)))
+            return ClauseFailure(not holds((0, EVER)))
         if dates:  # on some date it must hold, at some time of the day
             period = max((window.period for window in windows), default=DAY)
             starts = {self.proof.prepared.tables.local.steady(), *(date - period for date in dates)}
@@ -188,14 +153,14 @@ class StepTime:
                 for start in starts
                 for moment in (start, *_moments(windows, dates, start, start + 2 * period + DAY, through))
             }
-            return Failure(not any(holds((moment, moment)) for moment in sorted({0, EVER, *dates, *moments})))
+            return ClauseFailure(not any(holds((moment, moment)) for moment in sorted({0, EVER, *dates, *moments})))
         cycle = IssueCycle.of(self.proof, windows)
         edges = {each - back for each in cycle.edges(windows) for back in (0, through)}
         arcs = arcs_where(edges, lambda at: holds(cycle.at(at)), cycle.period)
         if arcs and arcs[0].length < cycle.period:
             label = (self.proof.span(clause), "the contract asks for this")
             self._ask(IssueRequirement(arcs, self.low, self.high, cycle.period, (label,)))
-        return Failure(not arcs)
+        return ClauseFailure(not arcs)
 
     def timed(self, clause: Clause, arguments: Sequence[int]) -> bool:
         """Whether what a condition says depends on the time."""
@@ -211,18 +176,46 @@ def zone_span(proof: ProofContext, zone: PreparedZone) -> Where:
     return proof.context.symbols.zones[proof.policy.zones[zone.number].name].name.span
 
 
-def step_times(proof: ProofContext, invocations: Sequence[PreparedInvocation]) -> list[StepTime]:
-    """When each step of a mission may begin."""
+class MissionStep(NamedTuple):
+    """A step of a mission as it is declared, as it is prepared on board, and when it may begin."""
+
+    declared: Step
+    prepared: PreparedInvocation
+    time: StepTime
+
+    @property
+    def span(self) -> Where:
+        """Where it is written."""
+        return self.declared.span
+
+    @property
+    def overrides(self) -> Overrides | None:
+        """Its own block, which changes the contract of its skill."""
+        return self.declared.overrides
+
+    @property
+    def flat(self) -> Invocation:
+        """What the bundle carries of it."""
+        return self.prepared.invocation
+
+    @property
+    def contract(self) -> Contract:
+        """The contract under which it flies."""
+        return self.prepared.invocation.contract
+
+
+def mission_steps(
+    proof: ProofContext, declared: Sequence[Step], invocations: Sequence[PreparedInvocation]
+) -> Iterator[MissionStep]:
+    """The steps of a mission, each with the time at which it may begin."""
     earliest, latest = 0, START_WINDOW_US
-    found: list[StepTime] = []
-    for invocation in invocations:
+    for step, invocation in zip(declared, invocations, strict=True):
         flat = invocation.invocation
         latest += approval(proof, invocation) + flat.contract.deadline_us
-        found.append(StepTime(proof, flat.issued_at_us, earliest, latest, invocation.lasts_us))
+        yield MissionStep(step, invocation, StepTime(proof, flat.issued_at_us, earliest, latest, invocation.lasts_us))
         latest += flat.contract.duration_us
         time = flat.contract.motion.time
         earliest += flat.arguments[time] if time >= 0 else 0
-    return found
 
 
 def at_moment(at: Environment, utc: Span) -> Environment:
@@ -285,3 +278,35 @@ def _moments(windows: Sequence[Window], dates: Sequence[int], low: int, high: in
         for window in windows:
             yield from (moment - back for moment in window.changes(low + back - 1, high + back))
         yield from (date - back for date in dates if low <= date - back <= high)
+
+
+def prove_validity(proof: ProofContext, steps: Sequence[MissionStep]) -> None:
+    """Report every step whose decision may mean nothing any more when its turn comes."""
+    latest = START_WINDOW_US
+    for step in steps:
+        contract = step.contract
+        skill = proof.skills[contract.name]
+        if not contract.duration_us:
+            proof.report.add(
+                codes.ENDLESS_STEP,
+                step.span,
+                f"`{contract.name}` does not end, so nothing after this step would ever begin",
+                help="add `lasts at most` to the skill",
+                labels=[(skill.name.span, "declared here, without `lasts at most`")],
+            )
+            return
+        latest += approval(proof, step.prepared) + contract.deadline_us
+        if latest > contract.validity_us:
+            validity = (step.overrides and step.overrides.validity) or skill.validity
+            assert validity is not None
+            proof.report.add(
+                codes.VALIDITY_TOO_SHORT,
+                step.span,
+                f"this step may begin {display(latest, Dimension.DURATION)} after the mission was issued, and "
+                f"`{contract.name}` is valid for {display(contract.validity_us, Dimension.DURATION)}",
+                help=f"{display(START_WINDOW_US, Dimension.DURATION)} to the start, then all deadlines, approvals and "
+                "durations before it count; move the step forward, or shorten those before it",
+                labels=[(validity.span, "declared here")],
+            )
+            return
+        latest += contract.duration_us

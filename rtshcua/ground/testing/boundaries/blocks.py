@@ -16,7 +16,7 @@ from rtshcua.ground.testing.boundaries.case_values import (
 )
 from rtshcua.ground.testing.boundaries.clause_limits import ClauseLimit
 from rtshcua.ground.testing.boundaries.draft import Block, CaseRow
-from rtshcua.ground.testing.boundaries.scene import TIME, PolicyPart, Scene, SceneChanges, SceneVariable, Value, atoms
+from rtshcua.ground.testing.boundaries.scene import TIME, PolicyPart, Scene, SceneChanges, SceneVariable, Value
 from rtshcua.model.flat.contract import PLACE, SourceKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
@@ -134,9 +134,7 @@ def phases(frame: CaseFrame) -> Iterator[Block]:
 
 def over_time(frame: CaseFrame, parts: Sequence[PolicyPart]) -> Iterator[Block]:
     """A table for each condition over time that some part reads: each truth, whatever the signals are."""
-    read = {
-        atom.monitor for part in parts if part.node for atom in atoms(part.node) if isinstance(atom, tree.MonitorSays)
-    }
+    read = {atom.monitor for part in parts for atom in part.atoms if isinstance(atom, tree.MonitorSays)}
     for number in sorted(read):
         column = f"({case_values.monitor_text(frame.policy.monitors[number])})"
         rows = [CaseRow((truth,)) for truth in case_values.TRUTHS.values()]

@@ -11,7 +11,7 @@ from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.situation import SINGLE
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.ground.testing.boundaries.clause_limits import ClauseLimit
-from rtshcua.ground.testing.boundaries.scene import PolicyPart, SceneVariable, Value, atoms
+from rtshcua.ground.testing.boundaries.scene import PolicyPart, SceneVariable, Value
 from rtshcua.ground.testing.coverage_goals import AIRSPACE, ENERGY
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Parameter
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
@@ -77,26 +77,28 @@ def reported(signal: Signal) -> Iterator[int]:
 def variables(parts: Iterable[PolicyPart], invocation: PreparedInvocation) -> Sequence[SceneVariable]:
     """Everything that some conditions read, and all parameters: arguments first, each in the order of its cells."""
     vehicle = invocation.policy.policy.vehicle
-    found = {SceneVariable(True, parameter.cell) for parameter in invocation.invocation.contract.parameters}
+    where = {vehicle.position, vehicle.height}
+    slots: set[int] = set()
     for part in parts:
         if part.role == ENERGY:
-            found.add(SceneVariable(False, vehicle.battery))
+            slots.add(vehicle.battery)
         if part.role == AIRSPACE:
-            found |= {SceneVariable(False, vehicle.position), SceneVariable(False, vehicle.height)}
-        for atom in () if part.node is None else atoms(part.node):
+            slots |= where
+        for atom in part.atoms:
             match atom:
                 case tree.AtMost(terms, _) | tree.Equal(terms, _):
-                    found |= {SceneVariable(False, term.at) for term in terms if not term.argument}
+                    slots |= {term.at for term in terms if not term.argument}
                 case tree.Member(False, at, _):
-                    found.add(SceneVariable(False, at))
+                    slots.add(at)
                 case tree.SlotKnown(at):
-                    found.add(SceneVariable(False, vehicle.position if at == vehicle.position + 1 else at))
+                    slots.add(vehicle.position if at == vehicle.position + 1 else at)
                 case tree.InsideZone() | tree.InsideArgument():
-                    found |= {SceneVariable(False, vehicle.position), SceneVariable(False, vehicle.height)}
-                case _:
-                    pass
-    known = [variable for variable in found if variable.at != -1]
-    return sorted(known, key=lambda one: (not one.argument, one.at or 0))
+                    slots |= where
+    cells = sorted(parameter.cell for parameter in invocation.invocation.contract.parameters)
+    return [
+        *(SceneVariable(True, cell) for cell in cells),
+        *(SceneVariable(False, slot) for slot in sorted(slots - {-1})),
+    ]
 
 
 def ordered(values: Iterable[Value]) -> list[Value]:

@@ -26,7 +26,6 @@ from rtshcua.ground.testing.boundaries.scene import (
     SceneChanges,
     SceneVariable,
     Value,
-    atoms,
     part_truth,
 )
 from rtshcua.ground.testing.boundaries.zone_edges import Place, ring_edges, zone_edge
@@ -105,7 +104,7 @@ def zones_of(part: PolicyPart, invocation: PreparedInvocation) -> tuple[Zone, ..
     numbers: list[int] = []
     if part.airspace is not None:
         numbers += (zone.number for zone in (*part.airspace.inside, *part.airspace.outside))
-    for atom in () if part.node is None else atoms(part.node):
+    for atom in part.atoms:
         match atom:
             case tree.InsideZone(zone) | tree.PointInside(_, zone):
                 numbers.append(zone)
@@ -261,7 +260,7 @@ def _change_times(part: PolicyPart, scene: Scene) -> Iterator[int]:
     midnight, monday = scene.now.utc_us - local % DAY, scene.now.utc_us - time_of_week(local)
     daily: list[int] = []
     weekly: list[int] = []
-    for atom in () if part.node is None else atoms(part.node):
+    for atom in part.atoms:
         if isinstance(atom, tree.InWindow):
             daily += (atom.start, atom.end)
         elif isinstance(atom, tree.InWeek):

@@ -51,9 +51,10 @@ from rtshcua.ground.testing.boundaries.starting_scene import (
 from rtshcua.ground.testing.case import PolicyCase, PolicyUnderTest
 from rtshcua.ground.testing.case_result import run_case
 from rtshcua.ground.testing.coverage_goals import clauses_of
+from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.limits import DAY, FULL
-from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import Now, State
 
@@ -348,12 +349,9 @@ def _never_asked(tested: PolicyUnderTest, plan: GenerationPlan, seen: set[object
         asked = not plan.skills or contract.name in plan.skills
         if not asked or all(rule.kind != RuleKind.PERMIT for rule in rules):
             continue
-        for rule in rules:
-            role = RuleKind(rule.kind).name.lower()
-            itself = rule.target is not None and rule.target.skill == skill
-            if rule.when is not None and not itself and (skill, role, rule) not in seen:
-                yield UnreachedLimit(contract.name, role, " ".join(rule.text.split()), "")
-        for role, clause in clauses_of(contract):
+        bearing = (rule for rule in rules if rule.when and not (rule.target and rule.target.skill == skill))
+        clauses: list[tuple[str, Rule | Clause]] = [(RuleKind(rule.kind).name.lower(), rule) for rule in bearing]
+        for role, clause in (*clauses, *clauses_of(contract)):
             if (skill, role, clause) not in seen:
                 yield UnreachedLimit(contract.name, role, " ".join(clause.text.split()), "")
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import build
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
+from rtshcua.ground.analysis.condition_trees import ALWAYS, NEVER, replace_atoms, signed_atoms
 from rtshcua.ground.analysis.solve import Goal, Yes, satisfiable
 from rtshcua.ground.analysis.space import SituationSpace, reads_days
 from rtshcua.ground.analysis.witness import Witness
@@ -19,8 +20,6 @@ from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.signal import Signal
 from rtshcua.model.quantity import Dimension
 
-#: conditions that are always, and never, true
-ALWAYS, NEVER = tree.AtMost((), 0), tree.AtMost((), -1)
 #: boxes that are looked at for one answer
 _BUDGET = 400
 #: 100 m, 100 m/s: the largest number of a signal that is written without need
@@ -31,46 +30,19 @@ _MOST_RAW = 60_000
 _PASSED = {"forbid": FALSE, "permit": TRUE, "confirm": FALSE, "degrade": FALSE}
 
 
-def put(node: tree.Node, atom: tree.Atom, value: tree.Node) -> tree.Node:
-    """The condition with another in the place of an atom of it (that very one, not what is equal to it)."""
-    match node:
-        case tree.Both(left, right):
-            return tree.Both(put(left, atom, value), put(right, atom, value))
-        case tree.Either(left, right):
-            return tree.Either(put(left, atom, value), put(right, atom, value))
-        case tree.Negation(operand):
-            return tree.Negation(put(operand, atom, value))
-        case _:
-            return value if node is atom else node
-
-
 def matters(part: PolicyPart, atom: tree.Atom) -> list[Goal]:
-    """What makes an atom decide its condition: true when it is taken as true (false under a `not`), and the reverse."""
-    assert part.node is not None
-    up, down = put(part.node, atom, ALWAYS), put(part.node, atom, NEVER)
-    return [(up, FALSE), (down, TRUE)] if _denied(part.node, atom) else [(up, TRUE), (down, FALSE)]
+    """What makes an atom decide its condition: true when it is taken as true (false under a `not`), and the reverse.
 
+    The atom is that very one, not what is equal to it.
+    """
+    node = part.node
+    assert node is not None
 
-def _denied(node: tree.Node, atom: tree.Atom) -> bool:
-    """Whether an odd number of `not` stands before an atom."""
-    match node:
-        case tree.Both(left, right) | tree.Either(left, right):
-            return _denied(left, atom) or _denied(right, atom)
-        case tree.Negation(operand):
-            inner = _denied(operand, atom)
-            return not inner if _holds(operand, atom) else inner
-        case _:
-            return False
+    def taken(value: tree.Node) -> tree.Node:
+        return replace_atoms(node, lambda each, _: value if each is atom else each)
 
-
-def _holds(node: tree.Node, atom: tree.Atom) -> bool:
-    match node:
-        case tree.Both(left, right) | tree.Either(left, right):
-            return _holds(left, atom) or _holds(right, atom)
-        case tree.Negation(operand):
-            return _holds(operand, atom)
-        case _:
-            return node is atom
+    positive = all(sign for each, sign in signed_atoms(node) if each is atom)
+    return [(taken(ALWAYS), TRUE if positive else FALSE), (taken(NEVER), FALSE if positive else TRUE)]
 
 
 def before(part: PolicyPart, parts: Sequence[PolicyPart], scene: Scene) -> list[Goal]:

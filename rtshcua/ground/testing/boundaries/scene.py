@@ -13,6 +13,7 @@ from rtshcua.decision.prepare import PreparedAirspace, PreparedInvocation
 from rtshcua.decision.situation import environment, ranging, situation
 from rtshcua.decision.values import EVERYWHERE, Truth, point
 from rtshcua.decision.volume import Planner, flown_at, near_home
+from rtshcua.ground.analysis.condition_trees import signed_atoms
 from rtshcua.ground.testing.coverage_goals import AIRSPACE, ENERGY, ENERGY_TEXT, clauses_of
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import PLACE, MotionKind
@@ -133,6 +134,11 @@ class PolicyPart(NamedTuple):
         """As it is written."""
         return ENERGY_TEXT if self.clause is None else " ".join(self.clause.text.split())
 
+    @property
+    def atoms(self) -> list[tree.Atom]:
+        """The atoms of its condition, from left to right."""
+        return [] if self.node is None else [atom for atom, _ in signed_atoms(self.node)]
+
 
 def parts_of(invocation: PreparedInvocation) -> Iterator[PolicyPart]:
     """Everything that may decide on an invocation, in the order of design 4.1; rules without a condition have no limit
@@ -167,7 +173,7 @@ def questions(part: PolicyPart, invocation: PreparedInvocation) -> Iterator[tupl
     charge there is but one.
     """
     if part.node is not None:
-        for atom in atoms(part.node):
+        for atom in part.atoms:
             yield atom, part._replace(node=atom, condition=build(atom, invocation.policy.tables))
     elif part.airspace is not None:
         for zone in part.airspace.inside:
@@ -188,18 +194,6 @@ def airspace_tree(part: PolicyPart) -> tuple[PolicyPart, tuple[tree.Atom, ...]]:
     for node in nodes[1:]:
         whole = tree.Both(whole, node)
     return part._replace(node=whole), (*inside, *outside)
-
-
-def atoms(node: tree.Node) -> Iterator[tree.Atom]:
-    """The atoms of a condition, from left to right."""
-    match node:
-        case tree.Both(left, right) | tree.Either(left, right):
-            yield from atoms(left)
-            yield from atoms(right)
-        case tree.Negation(operand):
-            yield from atoms(operand)
-        case _:
-            yield node
 
 
 def part_truth(part: PolicyPart, scene: Scene) -> Truth:

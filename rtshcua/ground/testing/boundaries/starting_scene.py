@@ -5,6 +5,7 @@ and every clause of the contract is content; from where the planned path is cont
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 from rtshcua.decision import tree
@@ -31,12 +32,11 @@ _LOW = 10_000
 
 
 class Requester(NamedTuple):
-    """A skill, and the role and the source that ask for it, by their numbers; `rule` is the permit that names them."""
+    """A skill, and the role and the source that ask for it, by their numbers."""
 
     skill: int
     role: int
     source: int
-    rule: Rule
 
 
 class SceneCandidate(NamedTuple):
@@ -51,38 +51,28 @@ def requesters(policy: Policy) -> Iterator[Requester]:
     """For each permit and skill someone whom it names, and for each other rule someone permitted on whom it bears where
     it bears on none of these; nobody twice for one skill.
     """
+    every = range(len(policy.contracts))
     permits = [rule for rule in policy.rules if rule.kind == RuleKind.PERMIT]
-    seen: dict[tuple[int, int, int], Requester] = {}
+    seen: dict[Requester, None] = {}
     for rule in permits:
-        for skill in rule.skills or range(len(policy.contracts)):
-            found = next(_requesters(policy, rule, skill), None)
-            if found is not None:
-                seen.setdefault(found[:3], found)
+        for skill in rule.skills or every:
+            seen |= dict.fromkeys(islice(_requesters(policy, [rule], skill), 1))
     for rule in policy.rules:
-        for skill in rule.skills or range(len(policy.contracts)):
-            if rule.kind == RuleKind.PERMIT or any(
-                each.skill == skill and _bears(rule, each) for each in seen.values()
-            ):
-                continue
-            able = (
-                each
-                for permit in permits
-                if skill in (permit.skills or (skill,))
-                for each in _requesters(policy, permit, skill)
-            )
-            found = next((each for each in able if _bears(rule, each)), None)
-            if found is not None:
-                seen.setdefault(found[:3], found)
-    yield from seen.values()
+        for skill in () if rule.kind == RuleKind.PERMIT else rule.skills or every:
+            if not any(each.skill == skill and _bears(rule, each) for each in seen):
+                able = (each for each in _requesters(policy, permits, skill) if _bears(rule, each))
+                seen |= dict.fromkeys(islice(able, 1))
+    yield from seen
 
 
-def _requesters(policy: Policy, rule: Rule, skill: int) -> Iterator[Requester]:
-    """Everybody who may ask for a skill by a permit, the likeliest first."""
+def _requesters(policy: Policy, permits: Sequence[Rule], skill: int) -> Iterator[Requester]:
+    """Everybody who may ask for a skill by some permits, for each permit the likeliest first."""
     timing_class = policy.contracts[skill].timing_class
-    for role in rule.roles or _roles(policy):
-        for source in rule.sources or tuple(SourceKind):
-            if timing_class in CLASSES[source]:
-                yield Requester(skill, role, source, rule)
+    for rule in permits:
+        for role in rule.roles or _roles(policy):
+            for source in rule.sources or tuple(SourceKind):
+                if skill in (rule.skills or (skill,)) and timing_class in CLASSES[source]:
+                    yield Requester(skill, role, source)
 
 
 def _roles(policy: Policy) -> tuple[int, ...]:

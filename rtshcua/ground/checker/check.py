@@ -1,48 +1,46 @@
 """All checks of declarations, in the order in which a reader wants to hear of them."""
 
-from rtshcua.ground.checker.checks import (
-    contracts,
-    durability,
-    fallbacks,
-    missions,
-    names,
-    nominals,
-    parameters,
-    policies,
-    records,
-    roles,
-    scenarios,
-    signals,
-    sizes,
-    tests,
-    times,
-    vehicles,
-    zones,
-)
+from rtshcua.ground.checker.checks.contracts import check_contracts
+from rtshcua.ground.checker.checks.durability import check_durability
+from rtshcua.ground.checker.checks.fallbacks import check_fallbacks
+from rtshcua.ground.checker.checks.missions import check_missions
+from rtshcua.ground.checker.checks.names import check_names
+from rtshcua.ground.checker.checks.nominals import check_nominals
+from rtshcua.ground.checker.checks.parameters import check_parameters
+from rtshcua.ground.checker.checks.policies import check_policies
+from rtshcua.ground.checker.checks.records import check_records
+from rtshcua.ground.checker.checks.roles import check_roles
+from rtshcua.ground.checker.checks.scenarios import check_scenarios
+from rtshcua.ground.checker.checks.signals import check_signals
+from rtshcua.ground.checker.checks.sizes import check_sizes
+from rtshcua.ground.checker.checks.tests import check_tests
+from rtshcua.ground.checker.checks.times import check_times
+from rtshcua.ground.checker.checks.vehicles import check_vehicles
+from rtshcua.ground.checker.checks.zones import check_zones
 from rtshcua.ground.checker.context import Context
 
 CHECKS = (
-    names,
-    signals,
-    zones,
-    vehicles,
-    parameters,
-    sizes,
-    contracts,
-    fallbacks,
-    roles,
-    policies,
-    missions,
-    times,
-    records,
-    durability,
-    nominals,
-    tests,
-    scenarios,
+    check_names,
+    check_signals,
+    check_zones,
+    check_vehicles,
+    check_parameters,
+    check_sizes,
+    check_contracts,
+    check_fallbacks,
+    check_roles,
+    check_policies,
+    check_missions,
+    check_times,
+    check_records,
+    check_durability,
+    check_nominals,
+    check_tests,
+    check_scenarios,
 )
 
 
 def check_declarations(context: Context) -> None:
     """Report everything that is wrong with the declarations of a program."""
-    for each in CHECKS:
-        each.check(context)
+    for check in CHECKS:
+        check(context)

@@ -1,1 +1,1 @@
-"""One file a check; the first line of each says which codes it reports. Each has `check(context)`."""
+"""One file a subject; the first line of each says which codes it reports. `check.py` calls their checks in order."""

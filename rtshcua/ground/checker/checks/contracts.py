@@ -23,7 +23,7 @@ RECORDS = (*KINDS, *DURABILITIES)
 PATTERNS = ("grid", "perimeter", "orbit")
 
 
-def check(context: Context) -> None:
+def check_contracts(context: Context) -> None:
     """Report every contract that leaves open what the decision needs."""
     for skill in context.symbols.skills.values():
         _complete(context, skill)

@@ -13,7 +13,7 @@ from rtshcua.model.durability import BUFFERED, WORDS, WRITTEN
 from rtshcua.model.ir.node import Name
 
 
-def check(context: Context) -> None:
+def check_durability(context: Context) -> None:
     """Report every skill whose `record` asks for two durabilities, or for less than its class may have."""
     for skill in context.symbols.skills.values():
         words = durability(context, skill.record)

@@ -4,7 +4,7 @@ from rtshcua.ground.checker.chains import check_chain
 from rtshcua.ground.checker.context import Context
 
 
-def check(context: Context) -> None:
+def check_fallbacks(context: Context) -> None:
     """Report every fallback chain that might not end on the ground."""
     for skill in context.symbols.skills.values():
         if skill.fallback:

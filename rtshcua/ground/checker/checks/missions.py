@@ -13,7 +13,7 @@ from rtshcua.model.quantity import Dimension
 PROPOSERS = ("agent", "operator")
 
 
-def check(context: Context) -> None:
+def check_missions(context: Context) -> None:
     """Report every mission whose parts do not exist."""
     for mission in context.symbols.missions.values():
         _header(context, mission)

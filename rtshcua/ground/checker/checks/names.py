@@ -12,7 +12,7 @@ from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.skills import SkillDecl
 
 
-def check(context: Context) -> None:
+def check_names(context: Context) -> None:
     """Report every name that is declared twice, or that hides another."""
     symbols, report = context.symbols, context.report
     for first, again in symbols.duplicates:

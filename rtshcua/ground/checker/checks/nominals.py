@@ -5,7 +5,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.lookup import find_policy, find_vehicle
 
 
-def check(context: Context) -> None:
+def check_nominals(context: Context) -> None:
     """Report every nominal whose parts do not exist or do not fit."""
     for nominal in context.symbols.nominals.values():
         find_policy(context, nominal.policy)

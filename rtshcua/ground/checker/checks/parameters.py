@@ -18,7 +18,7 @@ from rtshcua.model.ir.skills import Parameter
 ROLE = "role"
 
 
-def check(context: Context) -> None:
+def check_parameters(context: Context) -> None:
     """Report every parameter whose arguments could not be checked before the flight."""
     symbols = context.symbols
     owners: list[Parametric] = [*symbols.skills.values(), *symbols.templates.values(), *symbols.missions.values()]

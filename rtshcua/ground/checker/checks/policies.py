@@ -19,7 +19,7 @@ from rtshcua.model.quantity import Dimension
 SOURCES = tuple(each.name.lower() for each in SourceKind)
 
 
-def check(context: Context) -> None:
+def check_policies(context: Context) -> None:
     """Report every rule that could not be decided, and every policy that leaves the vehicle in the air."""
     for policy in context.symbols.policies.values():
         if policy.version > MAX_VALUE:

@@ -20,7 +20,7 @@ _ASKED = ("decision", "state", "authorization")
 NEEDED = {"semantic": _ASKED, "tactical": _ASKED, "reflex": ("decision", "state", "effect")}
 
 
-def check(context: Context) -> None:
+def check_records(context: Context) -> None:
     """Report every skill that leaves out what an auditor needs."""
     for skill in context.symbols.skills.values():
         written = {name.text for name in skill.record}

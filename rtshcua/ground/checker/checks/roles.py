@@ -17,7 +17,7 @@ from rtshcua.model.ir.policies import Rule, Use
 OPERATOR = "operator"
 
 
-def check(context: Context) -> None:
+def check_roles(context: Context) -> None:
     """Report every role that is declared twice in a file, and every one that a rule names and nothing declares."""
     for first, again in context.symbols.roles_again:
         text = f"the role `{again.text}` is declared twice"

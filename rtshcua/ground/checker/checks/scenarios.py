@@ -47,7 +47,7 @@ ENDS = tuple(each.replace("-", "_") for each in ENDINGS)
 BATTERY, WIND, AT = "battery", "wind", "at"
 
 
-def check(context: Context) -> None:
+def check_scenarios(context: Context) -> None:
     """Report every scenario that cannot be flown, or that expects what cannot be."""
     seen: dict[str, ScenarioDecl] = {}
     for scenario in context.symbols.scenarios:

@@ -22,7 +22,7 @@ PLACE_UNIT = "degE7"
 _DIRECTION = "orientation"
 
 
-def check(context: Context) -> None:
+def check_signals(context: Context) -> None:
     """Report every enumeration and signal that the dialect does not bear out."""
     for enum in context.symbols.enums.values():
         _enum(context, enum)

@@ -14,7 +14,7 @@ from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.skills import GivenSize, Parameter, SizesDecl, SkillDecl
 
 
-def check(context: Context) -> None:
+def check_sizes(context: Context) -> None:
     """Report every size that no contract could be checked with."""
     for skill in context.symbols.skills.values():
         for size in skill.sizes:

@@ -21,7 +21,7 @@ from rtshcua.model.ir.tests import Request, TestDecl
 MAX_CASES = 4096
 
 
-def check(context: Context) -> None:
+def check_tests(context: Context) -> None:
     """Report every test that does not say what it must, or says what cannot be."""
     tests = context.symbols.tests
     if _too_many(context, tests):

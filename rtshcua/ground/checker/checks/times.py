@@ -37,7 +37,7 @@ class _Times(NamedTuple):
     grace: Quantity | None
 
 
-def check(context: Context) -> None:
+def check_times(context: Context) -> None:
     """Report every contract, override and `confirm` rule whose times cannot all be meant."""
     for skill in context.symbols.skills.values():
         _coherent(context, _of(skill))

@@ -18,7 +18,7 @@ from rtshcua.model.quantity import Dimension, display
 MAX_OFFSET_US = 14 * 3_600_000_000  # local times are at most 14 h from UTC
 
 
-def check(context: Context) -> None:
+def check_vehicles(context: Context) -> None:
     """Report every field of a vehicle that is of the wrong dimension or size."""
     for vehicle in context.symbols.vehicles.values():
         on_globe(context, vehicle.home)

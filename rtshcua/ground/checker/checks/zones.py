@@ -15,7 +15,7 @@ from rtshcua.model.quantity import Dimension
 LEAST_WIDTH = 100  # mm
 
 
-def check(context: Context) -> None:
+def check_zones(context: Context) -> None:
     """Report every zone that no vehicle could be inside of, or that has no clear inside."""
     for zone in context.symbols.zones.values():
         height(context, zone.floor)

@@ -20,8 +20,7 @@ from rtshcua.evidence.proofs.cose_receipt import check_receipt
 from rtshcua.evidence.proofs.file import MAX_PROOF, read_extra
 from rtshcua.front.cli import app
 from rtshcua.ground.checker import geojson
-from rtshcua.ground.checker.geojson import read_area
-from rtshcua.ground.checker.refused import Refused
+from rtshcua.ground.checker.geojson import NoArea, read_area
 from rtshcua.ground.language.size import MAX_SIZE
 from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.bundle import MAX_BUNDLE, claimed_vehicle, envelopes
@@ -165,7 +164,7 @@ def test_geojson_of_tiny_values_is_refused_before_any_is_built(kind: str, monkey
     tracemalloc.start()
     begun = process_time()
     try:
-        with pytest.raises(Refused, match=f"more than {geojson.MAX_VALUES} values"):
+        with pytest.raises(NoArea, match=f"more than {geojson.MAX_VALUES} values"):
             read_area(data, None)
         took, (_, most) = process_time() - begun, tracemalloc.get_traced_memory()
     finally:
@@ -190,7 +189,7 @@ def test_borders_that_fill_a_file_are_read() -> None:
             tracemalloc.stop()
         assert len(area.outer) == 3
         assert most < MOST_BYTES // _PART, "of the positions, only those of the area are read"
-        with pytest.raises(Refused, match="positions, and at most 4,096 corners fit on board"):
+        with pytest.raises(NoArea, match="positions, and at most 4,096 corners fit on board"):
             read_area(whole, "b")
 
 

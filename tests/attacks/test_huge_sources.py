@@ -19,8 +19,7 @@ from rtshcua.diagnostics.codes import IMPORT_PATH, TOO_LARGE, UNKNOWN_IGNORE
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import MOST_TEXT, render_one
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.checker.geojson import read_area
-from rtshcua.ground.checker.refused import Refused
+from rtshcua.ground.checker.geojson import NoArea, read_area
 from rtshcua.ground.elaborate import elaborate
 from rtshcua.ground.format import format_text as attempting
 from rtshcua.ground.format.format_text import format_text
@@ -162,7 +161,7 @@ def test_no_pattern_keeps_what_it_might_give_back() -> None:
 def test_a_text_in_a_zone_that_is_not_closed_is_looked_through_once() -> None:
     text = b'"' + b'\\"' * 60_000  # from each quote to the end: minutes
     before = process_time()
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(NoArea) as refused:
         read_area(text, None)
     assert refused.value.message == "line 1, column 1: unterminated string starting at"
     assert process_time() - before < 3

@@ -7,7 +7,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.scope import Argument, Entry, Scope
-from rtshcua.ground.checker.sizes import named_at
+from rtshcua.ground.checker.substitution import named_at
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.checker.values import typed

@@ -1,18 +1,14 @@
 """All checks of declarations, in the order in which a reader wants to hear of them."""
 
-from rtshcua.ground.checker.checks.contracts import check_contracts
-from rtshcua.ground.checker.checks.durability import check_durability
-from rtshcua.ground.checker.checks.fallbacks import check_fallbacks
+from rtshcua.ground.checker.checks.contracts import check_contracts, check_durability, check_fallbacks, check_records
 from rtshcua.ground.checker.checks.missions import check_missions
 from rtshcua.ground.checker.checks.names import check_names
-from rtshcua.ground.checker.checks.nominals import check_nominals
-from rtshcua.ground.checker.checks.parameters import check_parameters
+from rtshcua.ground.checker.checks.parameters import check_parameters, check_sizes
 from rtshcua.ground.checker.checks.policies import check_policies
-from rtshcua.ground.checker.checks.records import check_records
+from rtshcua.ground.checker.checks.premises import check_nominals
 from rtshcua.ground.checker.checks.roles import check_roles
 from rtshcua.ground.checker.checks.scenarios import check_scenarios
 from rtshcua.ground.checker.checks.signals import check_signals
-from rtshcua.ground.checker.checks.sizes import check_sizes
 from rtshcua.ground.checker.checks.tests import check_tests
 from rtshcua.ground.checker.checks.times import check_times
 from rtshcua.ground.checker.checks.vehicles import check_vehicles

@@ -1,27 +1,450 @@
-"""Conditions are well typed, all through, and what is observed over time can be."""
+"""Conditions are well typed: comparisons, memberships, zones, phases, `is known`, and what is observed over time."""
 
-from rtshcua.ground.checker.comparisons import check_comparison, check_one_of, check_within
-from rtshcua.ground.checker.knowing import check_known, check_unturned
-from rtshcua.ground.checker.parts import Part, children, walk
-from rtshcua.ground.checker.phases import is_about_phase
-from rtshcua.ground.checker.places import check_inside
-from rtshcua.ground.checker.scope import Scope
-from rtshcua.ground.checker.temporal import check_observable, check_window
+from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.condition_nodes import Part, children, walk
+from rtshcua.ground.checker.fitting import declaration_labels, stored
+from rtshcua.ground.checker.ranges import check_compared, check_ends
+from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, Argument, Scope
+from rtshcua.ground.checker.types import DURATION, LENGTH, MISSION_PHASE, POSITION, TIME_OF_DAY, ZONE, Kind, Type, Typed
+from rtshcua.ground.checker.values import typed, typed_range, unknown_member
+from rtshcua.ground.checker.well_known import POSITION_SIGNAL
+from rtshcua.model.flat.limits import MAX_WINDOW
+from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import (
     Comparison,
     Condition,
     Edge,
     ForLast,
+    Grow,
     Inside,
     Junction,
     Known,
     Near,
     Not,
     OneOf,
+    Quantity,
     Reference,
+    Value,
     Within,
     WithinLast,
 )
+from rtshcua.model.ir.places import ZoneDecl
+from rtshcua.model.ir.signals import SignalDecl
+from rtshcua.model.quantity import Datum, Dimension, display
+
+
+def check_inside(scope: Scope, node: Inside) -> None:
+    """Where the vehicle is, where an argument is, or whether a zone argument lies within a zone."""
+    region = node.region.zone if isinstance(node.region, Grow) else node.region
+    if isinstance(node.region, Grow):
+        _margin(scope, node.region.margin)
+    of_region = typed(scope, region, ZONE)
+    subject = typed(scope, node.subject)
+    if of_region is None or subject is None:
+        return
+    found = scope.find(node.subject.name) if isinstance(node.subject, Reference) else None
+    is_vehicle = isinstance(found, SignalDecl) and found.name.text == POSITION_SIGNAL
+    is_argument = isinstance(found, Argument) and subject.type in (ZONE, POSITION)
+    if not is_vehicle and not is_argument:
+        scope.report.add(
+            codes.BAD_SUBJECT,
+            node.subject.span,
+            f"`{scope.report.text(node.subject.span)}` cannot be inside or outside of a zone",
+            help=f"of all signals, it is `{POSITION_SIGNAL}` that is read as the vehicle's place: call this one so"
+            if isinstance(found, SignalDecl) and subject.type == POSITION
+            else f"ask it of `{POSITION_SIGNAL}`, or of an argument that is a position or a zone",
+            labels=declaration_labels(scope, node.subject),
+        )
+    elif is_argument and not isinstance(scope.find(region.name), ZoneDecl):
+        scope.report.add(
+            codes.BAD_SUBJECT,
+            node.region.span,
+            "an argument is compared with a declared zone only, not with another argument",
+            help=f"write a declared zone instead of `{region.name}`, in which only `{POSITION_SIGNAL}` can be; "
+            "or make this a rule of a template, whose parameters stand for declared zones",
+            labels=declaration_labels(scope, region),
+        )
+
+
+def _margin(scope: Scope, node: Value) -> None:
+    """A margin is a length that is known at compile time, in whole mm."""
+    found = typed(scope, node)
+    if found is None:
+        return
+    text = scope.report.text(node.span)
+    if found.type != LENGTH:
+        scope.report.add(
+            codes.DIMENSION_MISMATCH,
+            node.span,
+            f"a zone grows by a length, and `{text}` is {found.type.describe()}",
+            help="write a length, such as `15 m`",
+            labels=declaration_labels(scope, node),
+        )
+    elif found.constant is None:
+        scope.report.add(
+            codes.NOT_CONSTANT,
+            node.span,
+            f"a zone grows by what is known before the flight, and `{text}` is not",
+            help="write a length, such as `15 m`, or the parameter of a template or a mission",
+            labels=declaration_labels(scope, node),
+        )
+    elif abs(found.constant) > MAX_COORDINATE:
+        scope.report.add(codes.NUMBER_SIZE, node.span, f"`{text}` is larger than the local plane")
+    else:
+        stored(scope, node, found.type, found.constant)
+
+
+_HELP = "write `phase == inspection`, `phase != inspection` or `phase in {departure, inspection}`"
+
+
+def is_phase(scope: Scope, node: Value) -> bool:
+    """Whether a value is the mission's phase."""
+    return isinstance(node, Reference) and node.name == PHASE and scope.find(PHASE) is None
+
+
+def is_about_phase(part: Part) -> bool:
+    """Whether a condition itself, not what it consists of, asks for the mission's phase; nothing else is called so."""
+    match part:
+        case Comparison():
+            subject = part.left
+        case Within() | OneOf():
+            subject = part.subject
+        case _:
+            return False
+    return isinstance(subject, Reference) and subject.name == PHASE
+
+
+def phase_compared(scope: Scope, node: Comparison) -> None:
+    """`phase == x`, `phase != x`."""
+    name = node.right
+    if not is_phase(scope, node.left):
+        _report(scope, node.left, "the mission's phase stands on the left side of a comparison")
+    elif node.operator not in ("==", "!="):
+        scope.report.add(codes.PHASE_NAME, node.span, "the phases of a mission have no order", help=_HELP)
+    elif not isinstance(name, Reference) or name.name in (PHASE, LOCAL_TIME) or "." in name.name:
+        _report(scope, name, f"`{scope.report.text(name.span)}` is not the name of a phase")
+
+
+def phase_in_range(scope: Scope, node: Within) -> None:
+    """A phase is in no range."""
+    _report(scope, node.range.low, "a phase is in no range: the phases of a mission have no order")
+
+
+def _report(scope: Scope, node: Value, message: str) -> None:
+    scope.report.add(codes.PHASE_NAME, node.span, message, help=_HELP)
+
+
+def check_known(scope: Scope, node: Known) -> None:
+    """Report what is asked to be known and is no signal."""
+    if typed(scope, node.subject) is None or isinstance(scope.find(node.subject.name), SignalDecl):
+        return
+    scope.report.add(
+        codes.WRONG_KIND,
+        node.subject.span,
+        f"`{node.subject.name}` is no signal, so it is always known",
+        help="ask it of a signal, as in `position is known`",
+        labels=declaration_labels(scope, node.subject),
+    )
+
+
+def check_unturned(scope: Scope, node: Not | Edge) -> None:
+    """Report each `is known` under a `not` or an edge."""
+    word = "not" if isinstance(node, Not) else "rising" if node.rising else "falling"
+    for part in walk(node.operand):
+        if isinstance(part, Known):
+            scope.report.add(
+                codes.TURNED_KNOWN,
+                part.span,
+                f"`{scope.report.text(part.span)}` is true or unknown, never false: `{word}` has nothing to turn",
+                help="what follows where a signal is not known, the contract's `fallback` says; ask that it is known",
+                labels=[(node.span, f"under this `{word}`")],
+            )
+
+
+def _enumeration(scope: Scope, node: Value) -> Type | None:
+    """The enumeration that a name's declaration gives to its value, if it does."""
+    if isinstance(node, Reference):
+        found = scope.find(node.name)
+        if found is not None:
+            type = scope.type_of(found)
+            if type is not None and type.kind is Kind.ENUMERATION:
+                return type
+    return None
+
+
+def _names_type(scope: Scope, node: Value, other: Value) -> bool:
+    """Whether an enumeration is named where its value is meant, and compared with one of its members."""
+    if not isinstance(node, Reference) or not isinstance(other, Reference) or scope.find(node.name) is not None:
+        return False
+    enum = scope.symbols.enums.get(node.name)
+    return enum is not None and any(member.name.text == other.name for member in enum.members)
+
+
+def check_comparison(scope: Scope, node: Comparison) -> None:
+    """`left operator right`."""
+    if is_phase(scope, node.left):
+        phase_compared(scope, node)
+        return
+    asked = _enumeration(scope, node.left)
+    for enum, member in ((node.left, node.right), (node.right, node.left)):
+        if _names_type(scope, enum, member):  # a signal of that type is meant, and the member is right
+            typed(scope, enum)
+            return
+    left = typed(scope, node.left, _enumeration(scope, node.right) if asked is None else None)
+    right = typed(scope, node.right, asked)
+    if left is None or right is None:
+        return
+    if right.type == MISSION_PHASE:
+        phase_compared(scope, node)
+        return
+    if TIME_OF_DAY in (left.type, right.type):
+        _clock(scope, node, left, right)
+    elif left.type.kind is Kind.NUMBER and right.type.kind is Kind.NUMBER:
+        _same(scope, node, left, right)
+    elif asked is not None or left.type.kind is Kind.ENUMERATION:
+        _enumerated(scope, node, left, right)
+    else:
+        _incomparable(scope, node, left)
+
+
+def _same(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
+    """Both sides of one dimension and datum; a literal length takes the datum of an altitude above home."""
+    if left.type == right.type:
+        check_compared(scope, node, left, right)
+        return
+    before = len(scope.report.found)
+    altitude = Dimension.ALTITUDE
+    if left.constant is not None and right.type.dimension is altitude:
+        typed(scope, node.left, right.type)
+    elif right.constant is not None or left.type.dimension is not altitude is right.type.dimension:
+        typed(scope, node.right, left.type)
+    elif left.constant is not None:
+        typed(scope, node.left, right.type)
+    else:
+        both = left.type.dimension is right.type.dimension
+        scope.report.add(
+            codes.DATUM_MISMATCH if both else codes.DIMENSION_MISMATCH,
+            node.span,
+            f"{left.type.describe()} is compared with {right.type.describe()}",
+            help="a length becomes an altitude only when it is added to one" if _lengths(left, right) else None,
+            labels=[*declaration_labels(scope, node.left), *declaration_labels(scope, node.right)],
+        )
+    if len(scope.report.found) == before:
+        check_compared(scope, node, left, right)
+
+
+def _lengths(left: Typed, right: Typed) -> bool:
+    return {left.type.dimension, right.type.dimension} == {Dimension.LENGTH, Dimension.ALTITUDE}
+
+
+def _enumerated(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
+    """A name's value against a constant of its enumeration; only an `enum` has an order."""
+    enumeration = left.type.enumeration
+    assert enumeration is not None
+    if (left.constant is None) == (right.constant is None):
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.span,
+            "a value of an enumeration is compared with one of its names",
+            help="write one of " + ", ".join(f"`{member}`" for member in enumeration.members),
+            labels=declaration_labels(scope, node.left),
+        )
+    elif not enumeration.ordered and node.operator not in ("==", "!="):
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.span,
+            f"the choices of `{enumeration.name}` have no order",
+            help="compare them with `==`, `!=` or `in { ... }`",
+            labels=[(enumeration.declared, "declared here")],
+        )
+
+
+def _clock(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
+    """`local time` before or after a time of day that is written out; what is meant is a part of the same day."""
+    if left.type != right.type:
+        odd, other = (node.left, left) if right.type == TIME_OF_DAY else (node.right, right)
+        message = (
+            f"`{scope.report.text(odd.span)}` is {other.type.describe()}, and is compared with {TIME_OF_DAY.describe()}"
+        )
+        help = "a time of day is compared with `local time`, as in `local time >= 19:00`"
+    elif (left.constant is None) == (right.constant is None):
+        message = f"`{node.operator}` compares `local time` with a time of day that is written out"
+        help = "write `local time >= 19:00`, or `local time in 08:00 .. 18:00`"
+    elif node.operator in ("==", "!="):
+        message = f"`{node.operator}` asks for one moment of the day, which no clock can be held to"
+        help = "write a window, such as `local time in 08:00 .. 08:10`, or a comparison, such as `local time >= 08:00`"
+    else:
+        return
+    scope.report.add(codes.NOT_COMPARABLE, node.span, message, help=help, labels=declaration_labels(scope, node.left))
+
+
+def _incomparable(scope: Scope, node: Comparison, left: Typed) -> None:
+    help = "ask whether it is `inside` or `outside` a zone" if left.type in (ZONE, POSITION) else None
+    scope.report.add(
+        codes.NOT_COMPARABLE,
+        node.span,
+        f"`{node.operator}` compares numbers and enumerations, and `{scope.report.text(node.left.span)}` is "
+        f"{left.type.describe()}",
+        help=help,
+        labels=declaration_labels(scope, node.left),
+    )
+
+
+def check_within(scope: Scope, node: Within) -> None:
+    """`subject in low .. high`."""
+    if is_phase(scope, node.subject):
+        phase_in_range(scope, node)
+        return
+    subject = typed(scope, node.subject)
+    if subject is None:
+        return
+    kind = subject.type.kind
+    if node.days and kind is not Kind.TIME_OF_DAY:
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.span,
+            f"only `local time` is on days of the week, and `{scope.report.text(node.subject.span)}` is "
+            f"{subject.type.describe()}",
+            help="write `local time in 08:00 .. 18:00 on monday .. friday`",
+            labels=declaration_labels(scope, node.subject),
+        )
+        return
+    if kind in (Kind.ZONE, Kind.POSITION):
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.span,
+            f"`{scope.report.text(node.subject.span)}` is {subject.type.describe()}, and a range has numbers",
+            help="ask whether it is `inside` or `outside` a zone",
+            labels=declaration_labels(scope, node.subject),
+        )
+        return
+    if kind is Kind.ENUMERATION and subject.type.enumeration is not None and not subject.type.enumeration.ordered:
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.span,
+            f"the choices of `{subject.type.enumeration.name}` have no order",
+            help="write `in { ... }`",
+            labels=[(subject.type.enumeration.declared, "declared here")],
+        )
+        return
+    ends = typed_range(scope, node.range, subject.type)
+    if ends is not None and kind is Kind.NUMBER:
+        check_ends(scope, node, subject, ends)
+    if ends is None or kind is not Kind.TIME_OF_DAY:
+        return
+    is_clock = isinstance(node.subject, Reference) and node.subject.name == LOCAL_TIME
+    if not is_clock or ends[0].constant is None or ends[1].constant is None:
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.span,
+            "only `local time` can be in a range of times, and both its ends are written out",
+            help="write `local time in 08:00 .. 18:00`",
+        )
+
+
+def check_one_of(scope: Scope, node: OneOf) -> None:
+    """`subject in {a, b}`."""
+    if is_phase(scope, node.subject):
+        return  # any name may be a phase's
+    subject = typed(scope, node.subject)
+    if subject is None:
+        return
+    enumeration = subject.type.enumeration
+    if enumeration is None:
+        scope.report.add(
+            codes.NOT_COMPARABLE,
+            node.subject.span,
+            f"`in {{ ... }}` asks for a value of an enumeration, and this is {subject.type.describe()}",
+            help="write `in low .. high` for numbers" if subject.type.kind is Kind.NUMBER else None,
+            labels=declaration_labels(scope, node.subject),
+        )
+        return
+    for name in node.names:
+        if name.text not in enumeration.members:
+            unknown_member(scope, name.span, name.text, enumeration)
+
+
+Temporal = ForLast | WithinLast | Near | Edge
+
+
+def check_window(scope: Scope, window: Quantity) -> None:
+    """A window is a duration above zero that fits on board."""
+    if typed(scope, window, DURATION) is None or 0 < window.value <= MAX_WINDOW:
+        return
+    longer = window.value > 0
+    scope.report.add(
+        codes.WINDOW_LENGTH,
+        window.span,
+        f"`{scope.report.text(window.span)}` is longer than what is kept on board"
+        if longer
+        else f"a window of `{scope.report.text(window.span)}` has no moment in it",
+        help=f"a window is longer than `0 s`, and at most `{display(MAX_WINDOW, Dimension.DURATION)}`",
+    )
+
+
+def check_observable(scope: Scope, node: Temporal) -> None:
+    """Report what the condition under a temporal operator, at any depth, may not read."""
+    for part in walk(node):
+        if is_about_phase(part):
+            scope.report.add(
+                codes.TIMED_ARGUMENT,
+                part.span,
+                "what is observed over time cannot ask for the mission's phase",
+                help="ask for the phase beside it, as in `phase == inspection and ... for the last 3 s`",
+                labels=[(node.span, "this is observed whether or not a mission flies")],
+            )
+        elif isinstance(part, Reference) and isinstance(found := scope.find(part.name), Argument):
+            scope.report.add(
+                codes.TIMED_ARGUMENT,
+                part.span,
+                f"what is observed over time cannot read the argument `{part.name}`",
+                help="compare signals, zones and times with what is written out",
+                labels=[
+                    (node.span, "this is observed whether or not the skill runs"),
+                    (found.declaration.span, f"`{part.name}` is declared here"),
+                ],
+            )
+        elif isinstance(part, Edge):
+            _exact(scope, part)
+
+
+def _exact(scope: Scope, edge: Edge) -> None:
+    """Report a zone under an edge that is not known exactly: a grown one, or one whose band is above sea where some
+    vehicle's elevation is known to within an error only.
+    """
+    for part in walk(edge.operand):
+        if isinstance(part, Inside) and not isinstance(part.region, Grow):
+            _banded(scope, edge, part.region)
+        if isinstance(part, Grow):
+            scope.report.add(
+                codes.TIMED_ARGUMENT,
+                part.span,
+                f"`{'rising' if edge.rising else 'falling'}` cannot read a grown zone",
+                help="declare a zone of the shape that you mean",
+                labels=[(edge.span, "an edge reads its condition both ways, and a grown zone is safe one way only")],
+            )
+
+
+def _banded(scope: Scope, edge: Edge, region: Reference) -> None:
+    zone = scope.find(region.name)
+    bands = (zone.floor, zone.ceiling) if isinstance(zone, ZoneDecl) else ()
+    above_sea = next((each for each in bands if each is not None and each.datum is Datum.SEA), None)
+    errors = (each.elevation_within for each in scope.symbols.vehicles.values())
+    error = next((each for each in errors if each is not None and each.value > 0), None)
+    if above_sea is None or error is None:
+        return
+    scope.report.add(
+        codes.TIMED_ARGUMENT,
+        region.span,
+        f"`{'rising' if edge.rising else 'falling'}` cannot read `{region.name}`, whose height above sea is not known "
+        "exactly",
+        help="declare a zone whose floor and ceiling are above home",
+        labels=[
+            (edge.span, "an edge reads its condition both ways, and the band is safe one way only"),
+            (above_sea.span, "above sea"),
+            (error.span, "how far the real elevation may differ"),
+        ],
+    )
 
 
 def check_condition(scope: Scope, node: Condition, *, observed: bool = False) -> None:

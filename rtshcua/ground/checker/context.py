@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.data import DataFiles
+from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Argument, Scope, parameter_type
 from rtshcua.ground.checker.symbols import Symbols

@@ -3,28 +3,294 @@
 Read strictly, for a zone is what the policy's signer saw: no key twice, no NaN, no ring that is not closed. Numbers are
 decimal digits until they are whole 1e-7 degrees (rounded to the nearest, half to even: at most 6 mm on the ground), so
 that no float decides on which side of a fence a place lies.
+
+`DataFiles` reads each file once. Sections 2, 3.2 and 3.3 of the RFC say which geometry is meant; members that speak of
+heights, times and radii, which no zone takes over, are warned of.
 """
 
 import json
 import re
 from array import array
 from codecs import BOM_UTF8
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal, localcontext
+from enum import Enum
 from itertools import pairwise
 from typing import Any
 
 import msgspec
 
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.kinds import GEOJSON, recognised
-from rtshcua.ground.checker.features import chosen
-from rtshcua.ground.checker.refused import Refused
-from rtshcua.ground.checker.unread import refuse_height
+from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.geometry.polygons import Point, contains, crossing, touching_edges
 from rtshcua.ground.language.size import bare_of, values_of
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
+from rtshcua.model.ir.places import GeoJson
+
+
+class NoArea(Exception):
+    """The text has no such area: what is wrong, and what would help."""
+
+    def __init__(self, code: Code, message: str, help: str | None = None) -> None:
+        super().__init__(message)
+        self.code, self.message, self.help = code, message, help
+
+
+MOST_TOLD = 4
+
+
+class What(Enum):
+    """What a member's name says that it holds."""
+
+    HEIGHT = "height"
+    TIME = "time"
+    RADIUS = "radius"
+    LENGTH = "length"
+
+
+#: parts of names, without what stands between their words; some of national feeds, French and German
+_STEMS = {
+    What.HEIGHT: ("altitude", "ceiling", "height", "elevation", "vertical", "lowerlimit", "upperlimit", "hauteur",
+                  "plafond", "plancher", "h\u00f6he", "hoehe", "obergrenze", "untergrenze"),
+    What.TIME: ("applicab", "schedule", "datetime", "starttime", "endtime", "startdate", "enddate", "validfrom",
+                "validto", "validuntil", "timesofuse", "timeofuse", "expir", "notbefore", "notafter"),
+    What.RADIUS: ("radius", "diameter"),
+}  # fmt: skip
+#: whole words of names
+_WORDS = {
+    What.HEIGHT: {"alt", "agl", "amsl", "asl", "msl", "floor", "floors", "upper", "lower", "layer", "elev", "z",
+                  "limite", "zmin", "zmax", "minz", "maxz", "minalt", "maxalt", "top", "bottom",
+                  "level", "levels", "fl"},
+    What.TIME: {"time", "times", "start", "starts", "end", "ends", "begin", "begins", "from", "until", "till", "since",
+                "valid", "validity", "effective", "eff", "permanent", "temporary", "active", "activation", "day",
+                "days", "weekday", "weekdays", "hours", "hour", "wkhr", "period", "periods", "season", "curfew", "date",
+                "dates"},
+    What.RADIUS: {"extent", "buffer"},
+}  # fmt: skip
+#: a time in a name with such a word is of the record, not of the area
+_OF_THE_RECORD = {
+    "created", "creation", "edit", "edited", "editor", "modified", "modification", "update", "updated", "changed",
+    "issued", "published", "imported", "exported", "downloaded", "retrieved", "surveyed", "captured", "generated",
+}  # fmt: skip
+#: names that are known to say something else
+_HARMLESS = {"admin_level"}
+_NAMES = {"id", "name", "title"}
+#: what RFC 7946 itself calls so, and what is looked at apart
+_STRUCTURE = {"type", "coordinates", "geometry", "geometries", "features", "crs", "bbox"}
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+#: a text that is one length, with what it counts from, or a flight level
+_LENGTH = re.compile(
+    r"\s*(?:FL\s*[0-9]{1,3}|[+-]?[0-9]+(?:[.,][0-9]+)?\s*(?:m|ft|feet|met(?:er|re)s?|km|nm))"
+    r"(?:\s*(?:agl|amsl|msl|asl|gnd|sfc))?\s*",
+    re.IGNORECASE,
+)
+
+
+def refuse_unread(tree: dict[str, Any], pointer: str = "") -> None:
+    """Raises `NoArea` where an object of GeoJSON has such members, at whatever depth, in a feature's geometry
+    too; the features of a collection are not looked at.
+    """
+    found = [*_members(tree.get("geometry"), f"{pointer}/geometry"), *_members(tree, pointer)]
+    if not found:
+        return
+    told = [f"a {what.value} at `{place}`" for place, what in found[:MOST_TOLD]]
+    more = f" and {len(found) - MOST_TOLD} more" if len(found) > MOST_TOLD else ""
+    raise NoArea(codes.GEOJSON_UNREAD, f"it says what a zone does not take over: {', '.join(told)}{more}", _HELP)
+
+
+_HELP = (
+    "write heights as `floor` and `ceiling`, times as `active`, a circle as `circle(...)` in the source, "
+    "and take these members out of the file"
+)
+
+
+def refuse_height(numbers: list[str], pointer: str) -> None:
+    """Raises `NoArea` where a position (RFC 7946, 3.1.1) has a third number other than zero."""
+    for text in numbers[2:]:
+        if Decimal(text):
+            raise NoArea(
+                codes.GEOJSON_UNREAD,
+                f"the position at `{pointer}` has a height, {text}, which a zone does not take over",
+                "write heights as `floor` and `ceiling` in the source, and take them out of the file's positions",
+            )
+
+
+def said_by(name: str) -> What | None:
+    """What a member holds by its name; None for what is harmless."""
+    if name in _HARMLESS:
+        return None
+    words = {word.casefold() for word in _WORD.findall(name)}
+    run = name.casefold().replace("_", "").replace("-", "").replace(" ", "")
+    for what in _WORDS:
+        if what is What.TIME and words & _OF_THE_RECORD:
+            continue
+        if words & _WORDS[what] or any(stem in run for stem in _STEMS[what]):
+            return what
+    return None
+
+
+def _is_height(number: Any) -> bool:
+    text = getattr(number, "text", None)
+    return not isinstance(text, str) or bool(Decimal(text))
+
+
+def _members(tree: Any, pointer: str) -> Iterator[tuple[str, What]]:
+    if isinstance(tree, list):
+        for number, each in enumerate(tree):
+            yield from _members(each, f"{pointer}/{number}")
+    if not isinstance(tree, dict):
+        return
+    for name, value in tree.items():
+        place = f"{pointer}/{name.replace('~', '~0').replace('/', '~1')}"  # RFC 6901, 3
+        if name == "bbox" and isinstance(value, list) and len(value) > 4:
+            if any(_is_height(value[each]) for each in range(2, len(value), 3)):
+                yield place, What.HEIGHT
+        elif name in _STRUCTURE or value is None or value in ("", [], {}):
+            continue
+        elif (what := said_by(name)) is not None:
+            yield place, what
+        elif isinstance(value, str) and name not in _NAMES and _LENGTH.fullmatch(value):
+            yield place, What.LENGTH
+        else:
+            yield from _members(value, place)
+
+
+AREAS = ("Polygon", "MultiPolygon")
+#: RFC 7946, 1.4
+GEOMETRIES = ("Point", "MultiPoint", "LineString", "MultiLineString", *AREAS, "GeometryCollection")
+#: the one reference system of RFC 7946, 4, as files name it that were written before it. The register of EPSG has the
+#: latitude of 4326 first; GeoJSON has the longitude first, whatever a `crs` says (GeoJSON 2008, 2.1.1)
+_WGS84 = re.compile(
+    r"urn:ogc:def:crs:OGC:[0-9.]*:CRS84|OGC:CRS84|(?:urn:ogc:def:crs:)?EPSG:(?:[0-9.]*:)?4326"
+    r"|https?://www\.opengis\.net/(?:def/crs/OGC/1\.3/CRS84|def/crs/EPSG/0/4326|gml/srs/epsg\.xml#4326)|WGS ?84",
+    re.IGNORECASE,
+)
+MOST_NAMED = 5
+
+
+def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
+    """The Polygon or MultiPolygon that is meant, and the JSON pointer to it."""
+    kind = tree.get("type") if isinstance(tree, dict) else None
+    if not isinstance(kind, str) or kind not in (*GEOMETRIES, "Feature", "FeatureCollection"):
+        raise NoArea(
+            codes.NOT_GEOJSON,
+            "it is JSON, and no GeoJSON object",
+            'a GeoJSON object has a `"type"`, such as `"FeatureCollection"` (RFC 7946, 3)',
+        )
+    _reference_system(tree)
+    if kind == "FeatureCollection":
+        return _among(tree, feature)
+    if kind == "Feature":
+        if feature is not None and feature not in _names(tree):
+            raise NoArea(codes.GEOJSON_SHAPE, f"its one feature is not called `{feature}`", _known([tree]))
+        return _geometry(tree, "")
+    if feature is not None:
+        raise NoArea(codes.GEOJSON_SHAPE, f"it is a {kind}, and has no features", "leave out `feature`")
+    refuse_unread(tree)
+    return _area(tree, "")
+
+
+def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], str]:
+    """The feature of that name, or the only one that is an area."""
+    features = tree.get("features")
+    if not isinstance(features, list):
+        raise NoArea(codes.NOT_GEOJSON, "its `/features` is not an array (RFC 7946, 3.3)")
+    for number, each in enumerate(features):
+        if not isinstance(each, dict) or each.get("type") != "Feature":
+            raise NoArea(codes.NOT_GEOJSON, f"its `/features/{number}` is not a Feature (RFC 7946, 3.3)")
+    if feature is None:
+        found = [number for number, each in enumerate(features) if _is_area(each.get("geometry"))]
+        what = "are areas"
+    else:
+        found = [number for number, each in enumerate(features) if feature in _names(each)]
+        what = f"are called `{feature}`"
+    if len(found) == 1:
+        refuse_unread(tree)
+        return _geometry(features[found[0]], f"/features/{found[0]}")
+    if feature is not None and not found:
+        raise NoArea(codes.GEOJSON_SHAPE, f"none of its features is called `{feature}`", _known(features, feature))
+    raise NoArea(
+        codes.GEOJSON_SHAPE,
+        f"{len(found) or 'none'} of its {len(features)} features {what}",
+        _known([features[number] for number in found]) if feature is None else "give each an id of its own",
+    )
+
+
+def _geometry(feature: dict[str, Any], pointer: str) -> tuple[dict[str, Any], str]:
+    """RFC 7946, 3.2: a Feature's geometry is a geometry object, or null where it has no place."""
+    _reference_system(feature)
+    refuse_unread(feature, pointer)
+    geometry = feature.get("geometry")
+    if geometry is None:
+        raise NoArea(codes.GEOJSON_SHAPE, f"the feature at `{pointer or '/'}` has no geometry")
+    return _area(geometry, f"{pointer}/geometry")
+
+
+def _area(geometry: Any, pointer: str) -> tuple[dict[str, Any], str]:
+    kind = geometry.get("type") if isinstance(geometry, dict) else None
+    if kind not in GEOMETRIES:
+        raise NoArea(codes.NOT_GEOJSON, f"its `{pointer}` is not a geometry (RFC 7946, 3.1)")
+    if kind not in AREAS:
+        raise NoArea(
+            codes.GEOJSON_SHAPE,
+            f"the geometry at `{pointer or '/'}` is a {kind}",
+            "a zone is read from a Polygon or a MultiPolygon",
+        )
+    assert isinstance(geometry, dict)
+    _reference_system(geometry)
+    return geometry, pointer
+
+
+def _is_area(geometry: Any) -> bool:
+    """Whether a zone might be meant by it: also what is refused then, such as the circles of ED-318."""
+    if not isinstance(geometry, dict):
+        return False
+    inner = geometry.get("geometries")
+    return (
+        geometry.get("type") in AREAS
+        or (geometry.get("type") == "Point" and bool(geometry.get("extent")))
+        or (geometry.get("type") == "GeometryCollection" and isinstance(inner, list) and any(map(_is_area, inner)))
+    )
+
+
+def _names(feature: dict[str, Any]) -> Iterator[str]:
+    """What a feature is called: its id, a text or a number (RFC 7946, 3.2), and its property `name`."""
+    properties = feature.get("properties")
+    for each in (feature.get("id"), properties.get("name") if isinstance(properties, dict) else None):
+        text = getattr(each, "text", each)
+        if isinstance(text, str):
+            yield text
+
+
+def _known(features: list[dict[str, Any]], asked: str | None = None) -> str | None:
+    """A hint at the features' names."""
+    names = [name for name in dict.fromkeys(name for each in features for name in _names(each)) if name.isprintable()]
+    near = None if asked is None else nearest(asked, names)
+    if near is not None:
+        return f"did you mean `{near}`?"
+    if not names:
+        return "give the feature an `id`, or a property `name`"
+    more = "" if len(names) <= MOST_NAMED else f" and {len(names) - MOST_NAMED} more"
+    return "name one of them with `feature`: " + ", ".join(f"`{name}`" for name in names[:MOST_NAMED]) + more
+
+
+def _reference_system(tree: dict[str, Any]) -> None:
+    """RFC 7946, 4: all positions are WGS 84; a `crs`, as files had before, must say the same,
+    wherever it stands (GeoJSON 2008, 3)."""
+    crs = tree.get("crs")
+    properties = crs.get("properties") if isinstance(crs, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    if crs is not None and not (isinstance(name, str) and _WGS84.fullmatch(name)):
+        told = f", `{name}`," if isinstance(name, str) and name.isprintable() and len(name) < 80 else ""
+        raise NoArea(
+            codes.GEOJSON_SHAPE,
+            f"its `crs`{told} does not name WGS 84, the one reference system of GeoJSON",
+            "convert it to longitudes and latitudes in WGS 84 (RFC 7946, 4)",
+        )
+
 
 #: a FeatureCollection's MultiPolygon takes nine, foreign members (RFC 7946, 6.1) may take some more
 MAX_DEPTH = 32
@@ -81,20 +347,20 @@ class Run(msgspec.Struct, frozen=True, eq=False, gc=False):
         return self.data.count(b"[", self.start, self.end)
 
     def read(self) -> list[list[Number]]:
-        """The positions. Raises `Refused` for a number that is too long."""
+        """The positions. Raises `NoArea` for a number that is too long."""
         found: list[list[Number]] = _read(f"[{self.data[self.start : self.end].decode()}]", _no_number)
         return found
 
 
-def _not_json(message: str) -> Refused:
-    return Refused(codes.NOT_GEOJSON, message)
+def _not_json(message: str) -> NoArea:
+    return NoArea(codes.NOT_GEOJSON, message)
 
 
 def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
-    """The polygons of the one area in a file, or of the feature with that id or name; raises `Refused`."""
+    """The polygons of the one area in a file, or of the feature with that id or name; raises `NoArea`."""
     kind = recognised(data)
     if kind is not None and kind is not GEOJSON:
-        raise Refused(codes.NOT_GEOJSON, f"it is {kind.name}, and no GeoJSON", kind.help or None)
+        raise NoArea(codes.NOT_GEOJSON, f"it is {kind.name}, and no GeoJSON", kind.help or None)
     geometry, pointer = chosen(_json(data), feature)
     return _polygons(geometry, pointer)
 
@@ -131,7 +397,7 @@ def _json(data: bytes) -> Any:
 
 
 class _Outline:
-    """A text with a stand-in for each run of positions; one of its own is a run of none. Raises `Refused` for many."""
+    """A text with a stand-in for each run of positions; one of its own is a run of none. Raises `NoArea` for many."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -180,13 +446,13 @@ def _read(text: str, constant: Callable[[str], Any]) -> Any:
     return json.loads(text, parse_float=_number, parse_int=_number, parse_constant=constant, object_pairs_hook=_object)
 
 
-def _too_many() -> Refused:
+def _too_many() -> NoArea:
     return _not_json(
         f"it has more than {MAX_VALUES} values beside its positions: leave the features out that are not needed"
     )
 
 
-def _nested() -> Refused:
+def _nested() -> NoArea:
     return _not_json(f"it is nested more than {MAX_DEPTH} deep")
 
 
@@ -211,7 +477,7 @@ def _number(text: str) -> Number:
     return Number(text)
 
 
-def _no_number(text: str) -> Refused:
+def _no_number(text: str) -> NoArea:
     return _not_json(f"`{text}` is not a number in JSON")  # RFC 8259, 6
 
 
@@ -235,7 +501,7 @@ def _polygons(geometry: dict[str, Any], pointer: str) -> tuple[GeoPolygon, ...]:
     written = geometry.get("coordinates")
     count = _count(written)
     if count > MAX_VERTICES + MAX_RINGS:  # what is really too much is known in the local plane
-        raise Refused(
+        raise NoArea(
             codes.GEOJSON_SHAPE,
             f"the area at `{pointer}` has {count:,} positions, and at most {MAX_VERTICES:,} corners fit on board",
             "simplify it to what matters for a flight",
@@ -245,7 +511,7 @@ def _polygons(geometry: dict[str, Any], pointer: str) -> tuple[GeoPolygon, ...]:
         return (_polygon(coordinates, pointer),)
     found = tuple(_polygon(_array(each, f"{pointer}/{i}"), f"{pointer}/{i}") for i, each in enumerate(coordinates))
     if not found:
-        raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` has no polygon")
+        raise NoArea(codes.GEOJSON_SHAPE, f"`{pointer}` has no polygon")
     return found
 
 
@@ -275,7 +541,7 @@ def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:
     """RFC 7946, 3.1.6: the first ring is the exterior one, all others are holes."""
     made = [_ring(_array(ring, f"{pointer}/{i}"), f"{pointer}/{i}") for i, ring in enumerate(rings)]
     if not made:
-        raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` has no ring")
+        raise NoArea(codes.GEOJSON_SHAPE, f"`{pointer}` has no ring")
     _holes(made, pointer)
     return GeoPolygon(made[0], tuple(made[1:]))
 
@@ -285,7 +551,7 @@ def _holes(rings: Sequence[GeoRing], pointer: str) -> None:
     met = touching_edges(rings)
     if met is not None:
         (one, i), (other, j) = met
-        raise Refused(
+        raise NoArea(
             codes.GEOJSON_SHAPE,
             f"the hole at `{pointer}/{max(one, other)}` crosses or touches the ring at `{pointer}/{min(one, other)}`: "
             f"the edge from {_written(rings[one][i])} meets the one from {_written(rings[other][j])}",
@@ -297,7 +563,7 @@ def _holes(rings: Sequence[GeoRing], pointer: str) -> None:
             where = (
                 f"outside of its polygon, `{pointer}/0`" if around is None else f"in the hole at `{pointer}/{around}`"
             )
-            raise Refused(
+            raise NoArea(
                 codes.GEOJSON_SHAPE,
                 f"the hole at `{pointer}/{number}` lies {where}",
                 "a hole lies within the polygon, apart from all others",
@@ -309,32 +575,32 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
     either way: parsers should not reject polygons that do not follow the right-hand rule.
     """
     if len(positions) < 4:
-        raise Refused(
+        raise NoArea(
             codes.GEOJSON_SHAPE,
             f"the ring at `{pointer}` has too few positions: {len(positions)}, and it needs four",
             "a ring ends with the position that it begins with (RFC 7946, 3.1.6)",
         )
     corners = [_position(_array(each, f"{pointer}/{i}"), f"{pointer}/{i}") for i, each in enumerate(positions)]
     if corners[0] != corners[-1]:
-        raise Refused(
+        raise NoArea(
             codes.GEOJSON_SHAPE,
             f"the ring at `{pointer}` is not closed",
             "a ring ends with the position that it begins with (RFC 7946, 3.1.6)",
         )
     for i, (a, b) in enumerate(pairwise(corners)):
         if abs(a[0] - b[0]) > MAX_LONGITUDE * int(_DEGREE):
-            raise Refused(
+            raise NoArea(
                 codes.GEOJSON_SHAPE,
                 f"the ring at `{pointer}` crosses the antimeridian after its position {i}",
                 "cut the area at longitude 180 into two parts of a MultiPolygon (RFC 7946, 3.1.9)",
             )
     ring = [a for a, b in pairwise(corners) if a != b]
     if len(ring) < 3:
-        raise Refused(codes.GEOJSON_SHAPE, f"the ring at `{pointer}` encloses nothing")
+        raise NoArea(codes.GEOJSON_SHAPE, f"the ring at `{pointer}` encloses nothing")
     met = crossing(ring)
     if met is not None:
         one, other = (_written(ring[i]) for i in met)
-        raise Refused(
+        raise NoArea(
             codes.GEOJSON_SHAPE,
             f"the ring at `{pointer}` crosses or touches itself: its edge from {one} meets the one from {other}",
         )
@@ -346,7 +612,7 @@ def _position(numbers: Sequence[Any], pointer: str) -> Point:
     ceiling in the source. WGS 84 by section 4.
     """
     if len(numbers) < 2 or not all(isinstance(each, Number) for each in numbers):
-        raise Refused(
+        raise NoArea(
             codes.GEOJSON_SHAPE,
             f"`{pointer}` is not a position",
             "a position is a longitude and a latitude, as in `[8.5456, 47.3977]` (RFC 7946, 3.1.1)",
@@ -356,7 +622,7 @@ def _position(numbers: Sequence[Any], pointer: str) -> Point:
     north, east = latitude.copy_abs(), longitude.copy_abs()  # exact; `abs` rounds
     if north > MAX_LATITUDE or east > MAX_LONGITUDE:
         swapped = east <= MAX_LATITUDE and north <= MAX_LONGITUDE
-        raise Refused(
+        raise NoArea(
             codes.GEOJSON_SHAPE,
             f"`{pointer}` is {longitude}, {latitude}, which is not a place that can be flown to",
             "the longitude comes first (RFC 7946, 3.1.1)"
@@ -377,10 +643,40 @@ def _whole(degrees: Decimal) -> int:
 def _array(value: Any, pointer: str) -> Sequence[Any]:
     if isinstance(value, list):
         return value
-    raise Refused(codes.GEOJSON_SHAPE, f"`{pointer}` is not an array")
+    raise NoArea(codes.GEOJSON_SHAPE, f"`{pointer}` is not an array")
 
 
 def _written(corner: Point) -> str:
     """A position as it stands in a file."""
     longitude, latitude = (Decimal(each) / _DEGREE for each in corner)
     return f"[{longitude}, {latitude}]"
+
+
+class DataFiles:
+    """`content` has the bytes of each file; `names` which of them is meant, by the source and the path as written."""
+
+    def __init__(
+        self, content: Mapping[str, bytes] | None = None, names: Mapping[tuple[str, str], str] | None = None
+    ) -> None:
+        self.content = content or {}
+        self._names = names or {}
+        self._areas: dict[tuple[str, str | None], tuple[GeoPolygon, ...] | NoArea] = {}
+
+    def name(self, shape: GeoJson) -> str | None:
+        """The file that a zone is read from; None where it could not be read."""
+        return self._names.get((shape.span.file, shape.path))
+
+    def area(self, shape: GeoJson) -> tuple[GeoPolygon, ...] | NoArea | None:
+        """The polygons of a zone, or why there are none; None where the file could not be read."""
+        name = self.name(shape)
+        if name is None:
+            return None
+        key = (name, shape.feature)
+        found = self._areas.get(key)
+        if found is None:
+            try:
+                found = read_area(self.content[name], shape.feature)
+            except NoArea as refused:
+                found = refused
+            self._areas[key] = found
+        return found

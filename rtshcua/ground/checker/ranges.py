@@ -10,7 +10,7 @@ from math import ceil, floor
 from typing import Final, NamedTuple
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.dimensions import COHERENT
+from rtshcua.ground.checker.arithmetic import COHERENT
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.symbols import Extent
 from rtshcua.ground.checker.types import Typed

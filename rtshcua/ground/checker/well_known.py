@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 
-from rtshcua.ground.checker.places import POSITION_SIGNAL
 from rtshcua.ground.checker.types import HEIGHT, POSITION, RATIO, SPEED, VOLTAGE, Type
 from rtshcua.model.flat.signal import CELL, DRAIN
 from rtshcua.model.ir.places import VehicleDecl
+
+#: the signal whose place is the vehicle's
+POSITION_SIGNAL = "position"
 
 #: the signals that every decision reads, in the order of their slots: where the vehicle is, how high, how much energy
 WELL_KNOWN: Mapping[str, Type] = {POSITION_SIGNAL: POSITION, "height": HEIGHT, "battery": RATIO}

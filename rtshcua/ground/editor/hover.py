@@ -6,8 +6,8 @@ from inspect import getdoc
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.data import DataFiles
 from rtshcua.ground.checker.faults import NAMED, example
+from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import WORDS, Declaration
 from rtshcua.ground.editor.keyword_help import KEYWORDS, REASONS, TYPES

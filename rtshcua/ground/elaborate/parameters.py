@@ -14,7 +14,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context, Instance
 from rtshcua.ground.checker.scope import Argument
-from rtshcua.ground.checker.substitute import names_in, substitute
+from rtshcua.ground.checker.substitution import names_in, substitute
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.elaborate.settings import Settings

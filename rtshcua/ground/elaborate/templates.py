@@ -9,7 +9,7 @@ from rtshcua.ground.checker.checks.parameters import ROLE
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.lookup import find_template
 from rtshcua.ground.checker.scope import Argument
-from rtshcua.ground.checker.substitute import names_in, substitute, substitute_roles
+from rtshcua.ground.checker.substitution import names_in, substitute, substitute_roles
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.elaborate.values import bound_value, value_of
 from rtshcua.model.ir.expression import Reference, Value

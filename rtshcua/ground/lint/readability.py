@@ -13,8 +13,8 @@ from typing import NamedTuple, TypeAlias
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.context import Parametric
-from rtshcua.ground.checker.parts import walk
 from rtshcua.ground.lint.lint_input import LintInput
 from rtshcua.model.ir.expression import Comparison, Condition, Grow, Quantity, Reference, Value, Within
 from rtshcua.model.ir.node import Name

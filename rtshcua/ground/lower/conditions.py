@@ -22,9 +22,9 @@ from math import gcd, lcm
 from typing import Any, NamedTuple, TypeAlias
 
 from rtshcua.diagnostics import codes
+from rtshcua.ground.checker.arithmetic import COHERENT
+from rtshcua.ground.checker.conditions import is_about_phase
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.dimensions import COHERENT
-from rtshcua.ground.checker.phases import is_about_phase
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.types import ZONE
 from rtshcua.ground.checker.values import typed

@@ -13,8 +13,7 @@ from itertools import pairwise
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.data import DataFiles
-from rtshcua.ground.checker.geojson import GeoRing
+from rtshcua.ground.checker.geojson import DataFiles, GeoRing
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.geometry.offset import within_disc
 from rtshcua.ground.geometry.overlay import Curve, TooManyPieces, Windings, nested, rounded_boundary

@@ -13,8 +13,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.scope import Scope, signal_type
+from rtshcua.ground.checker.symbols import brought_about
 from rtshcua.ground.checker.types import Type
-from rtshcua.ground.checker.uses import brought_about
 from rtshcua.ground.checker.well_known import MEASURED, PER_CELL, VELOCITY, WELL_KNOWN, read_by_all
 from rtshcua.ground.geometry.projection import projection_at
 from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace

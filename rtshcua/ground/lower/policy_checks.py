@@ -17,12 +17,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.checks.made_of import named
+from rtshcua.ground.checker.checks.zones import named
+from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.parts import walk
-from rtshcua.ground.checker.symbols import WORDS
-from rtshcua.ground.checker.uses import brought_about
+from rtshcua.ground.checker.symbols import WORDS, brought_about
 from rtshcua.model.flat import limits
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Policy

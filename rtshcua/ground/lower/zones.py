@@ -14,7 +14,7 @@ import msgspec
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.zones import entry_outside
-from rtshcua.ground.checker.data import DataFiles
+from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.geometry.offset import NoSuchOffset, inner, outer
 from rtshcua.ground.geometry.polygons import Point, square

@@ -11,11 +11,10 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.check import check_declarations
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.data import DataFiles
+from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.lookup import find_mission
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.symbols import collect
-from rtshcua.ground.checker.uses import with_uses
+from rtshcua.ground.checker.symbols import collect, with_uses
 from rtshcua.ground.elaborate.elaborate import elaborate
 from rtshcua.ground.elaborate.settings import Settings
 from rtshcua.ground.language.load import Program

@@ -30,7 +30,7 @@ from rtshcua.decision.values import TRUE, interval
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.sizes import named_at
+from rtshcua.ground.checker.substitution import named_at
 from rtshcua.ground.geometry.polygons import Point, length
 from rtshcua.ground.lower.mission import argument_span
 from rtshcua.ground.prove.proof_context import ProofContext

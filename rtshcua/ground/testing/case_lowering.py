@@ -15,11 +15,11 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.arguments import bind_value, pair
-from rtshcua.ground.checker.checks.tables import unranged
+from rtshcua.ground.checker.checks.premises import TestStart, nominal_of, start_of
+from rtshcua.ground.checker.checks.tests import unranged
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
-from rtshcua.ground.checker.starts import Start, nominal_of, start_of
 from rtshcua.ground.lower.mission import lower_mission
 from rtshcua.ground.testing.case import PolicyCase, PolicyUnderTest
 from rtshcua.ground.testing.case_situation import Situations, SubjectValue
@@ -54,7 +54,7 @@ class Requests:
         self._made: dict[tuple[object, ...], PreparedInvocation] = {}
 
     def of(
-        self, test: TestDecl, request: Request, start: Start, columns: Sequence[ArgumentValue], issued_at_us: int
+        self, test: TestDecl, request: Request, start: TestStart, columns: Sequence[ArgumentValue], issued_at_us: int
     ) -> PreparedInvocation | None:
         """A request with the arguments that it says and those of a row; None after a finding."""
         skill = self._context.symbols.skills[request.skill.text]
@@ -105,7 +105,7 @@ class Requests:
             bound.append(found)
         return bound
 
-    def _phase(self, request: Request, start: Start) -> str | None:
+    def _phase(self, request: Request, start: TestStart) -> str | None:
         """The phase that the step stands in: the mission's own, or else the first in which the skill is valid."""
         assert start.phase is not None
         valid = [name.text for name in self._context.symbols.skills[request.skill.text].phases]
@@ -221,7 +221,7 @@ def cases_of(context: Context, lower: Lower, names: Mapping[str, str]) -> Iterat
 class _Cases:
     """The cases of one test."""
 
-    def __init__(self, context: Context, under: _Under, test: TestDecl, request: Request, start: Start) -> None:
+    def __init__(self, context: Context, under: _Under, test: TestDecl, request: Request, start: TestStart) -> None:
         self._context = context
         self._under = under
         self._test = test

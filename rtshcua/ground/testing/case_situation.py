@@ -12,8 +12,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.analysis.space import means_unknown
+from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.parts import walk
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.lower.conditions import ConditionLowering
 from rtshcua.ground.lower.policy import LoweredPolicy

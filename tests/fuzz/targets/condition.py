@@ -9,9 +9,9 @@ from fuzz.mutation.sentences import mutated as mutated
 from reference.naive_expression import truth
 from reference.random_expressions import PHASES
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Context
-from rtshcua.ground.checker.parts import walk
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.language.parse import parse

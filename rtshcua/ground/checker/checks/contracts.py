@@ -1,11 +1,29 @@
-"""E0606, E0608 to E0610: a skill's contract is complete, and its motion names parameters of the right types."""
+"""Skill contracts: complete, with a motion of the right parameters, a fallback chain that lands, and enough records.
+
+For a decision to be derived again its records must hold what was decided, every signal that was read, and on what
+authority; the intent and the effect say why and what then happened. A reflex has no authority to record: the step that
+it belongs to gave it beforehand, and its effect shows what was decided.
+
+| class | must record |
+|---|---|
+| `semantic`, `tactical` | decision, state, authorization |
+| `reflex` | decision, state, effect |
+
+A skill that names no kind records all of it. Only a reflex may have `buffered` records, which are lost with the
+process (design section 6).
+"""
+
+from collections.abc import Sequence
 
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.suggest import listed
+from rtshcua.ground.checker.chains import check_chain
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import DURATION, HEIGHT, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.model.durability import BUFFERED, WORDS, WRITTEN
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.contract import TimingClass
 from rtshcua.model.flat.limits import FULL
@@ -119,3 +137,69 @@ def _not_parameter(context: Context, skill: SkillDecl, name: Name, asked: str) -
         help=None if labels else suggestion(name.text, names),
         labels=labels,
     )
+
+
+def check_fallbacks(context: Context) -> None:
+    """Report every fallback chain that might not end on the ground."""
+    for skill in context.symbols.skills.values():
+        if skill.fallback:
+            check_chain(context, skill.fallback, skill, skill.fallback[0].span.to(skill.fallback[-1].span))
+
+
+_ASKED = ("decision", "state", "authorization")
+NEEDED = {"semantic": _ASKED, "tactical": _ASKED, "reflex": ("decision", "state", "effect")}
+
+
+def check_records(context: Context) -> None:
+    """Report every skill that leaves out what an auditor needs."""
+    for skill in context.symbols.skills.values():
+        written = {name.text for name in skill.record}
+        if written.isdisjoint(KINDS) or skill.timing_class is None:
+            continue
+        if not written.issubset(RECORDS):
+            continue  # what is misspelt may be what is missing
+        missing = [f"`{name}`" for name in NEEDED.get(skill.timing_class.text, ()) if name not in written]
+        if missing:
+            span = skill.record[0].span.to(skill.record[-1].span)
+            whole = ", ".join([context.report.raw(span), *(name.strip("`") for name in missing)])
+            context.report.add(
+                codes.INSUFFICIENT_EVIDENCE,
+                span,
+                f"`{skill.name.text}` does not record {' and '.join(missing)}, so no decision derives again",
+                help=f"record {' and '.join(missing)} too, or write no `record` at all: then everything is recorded",
+                labels=[(skill.timing_class.span, "what a skill of this class needs")],
+                fix=(span, whole, "record it too"),
+            )
+
+
+def check_durability(context: Context) -> None:
+    """Report every skill whose `record` asks for two durabilities, or for less than its class may have."""
+    for skill in context.symbols.skills.values():
+        words = durability(context, skill.record)
+        if words is None or words.text != WORDS[BUFFERED] or skill.timing_class is None:
+            continue
+        if skill.timing_class.text != "reflex":
+            context.report.add(
+                codes.FLEETING_EVIDENCE,
+                words.span,
+                f"`{skill.name.text}` is no reflex, and its records would be lost with the process",
+                help=f"write `{WORDS[WRITTEN]}` or more, or leave the word out: then it is `synced`",
+                labels=[(skill.timing_class.span, "`buffered` is for reflexes alone")],
+                fix=(words.span, WORDS[WRITTEN], f"write `{WORDS[WRITTEN]}`"),
+            )
+
+
+def durability(context: Context, record: Sequence[Name]) -> Name | None:
+    """The word for the durability among those of a `record` clause; reports a second one that is another."""
+    words = [name for name in record if name.text in WORDS]
+    other = next((name for name in words if name.text != words[0].text), None)
+    if other is not None:
+        context.report.add(
+            codes.TWO_DURABILITIES,
+            other.span,
+            f"records cannot be both `{words[0].text}` and `{other.text}`",
+            help=f"write one of them; {listed(WORDS)} go from least to most",
+            labels=[(words[0].span, "asked for here")],
+        )
+        return None
+    return words[0] if words else None

@@ -1,13 +1,16 @@
-"""E0325, E1406: what nominals and tests hold for given is well typed, and said once."""
+"""Where a test starts: its nominal, and what the two hold for given, which is well typed and said once."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Bound, Context
 from rtshcua.ground.checker.fields import on_globe, one_of, quantity, size
+from rtshcua.ground.checker.lookup import find_nominal, find_policy, find_vehicle
 from rtshcua.ground.checker.ranges import beyond
 from rtshcua.ground.checker.scope import Argument, signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
@@ -17,7 +20,18 @@ from rtshcua.model.ir.expression import Coordinates, Edge, ForLast, Reference, V
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.signals import SignalDecl
 from rtshcua.model.ir.skills import Parameter
-from rtshcua.model.ir.tests import Asker, Cell, Named, OverTime, Premises, Subject
+from rtshcua.model.ir.tests import (
+    Asker,
+    Cell,
+    InPhase,
+    Instant,
+    Named,
+    NominalDecl,
+    OverTime,
+    Premises,
+    Subject,
+    TestDecl,
+)
 from rtshcua.model.quantity import Dimension
 
 #: the truths of a condition over time, as they are written; `unknown` is a word of the grammar
@@ -153,3 +167,67 @@ def _order(context: Context, order: tuple[Name, ...]) -> None:
                 f"the phase `{name.text}` is named twice",
                 labels=[(first.span, "first named here")],
             )
+
+
+def check_nominals(context: Context) -> None:
+    """Report every nominal whose parts do not exist or do not fit."""
+    for nominal in context.symbols.nominals.values():
+        find_policy(context, nominal.policy)
+        find_vehicle(context, nominal.vehicle)
+        check_asker(context, nominal.asker)
+        check_premises(context, nominal.premises)
+
+
+class TestStart(NamedTuple):
+    """What a test begins with: its own words, and its nominal's where it has none. None: neither says it."""
+
+    nominal: NominalDecl
+    role: Name | None
+    source: Name | None
+    instant: Instant | None
+    phase: InPhase | None
+    order: tuple[Name, ...]  # of the phases; never empty where there is a phase
+
+
+def nominal_of(context: Context, test: TestDecl) -> NominalDecl | None:
+    """The nominal that a test names; else the only one of its file, or, where that has none, the only one there is.
+
+    None after a finding, and where its declaration has an error.
+    """
+    if test.nominal is not None:
+        return find_nominal(context, test.nominal)
+    known = list(context.symbols.nominals.values())
+    own = [each for each in known if each.span.file == test.span.file] or known
+    if len(own) == 1:
+        return own[0]
+    if own or not context.symbols.broken:
+        names = listed(each.name.text for each in own)
+        context.report.add(
+            codes.NO_NOMINAL,
+            test.name.span,
+            f"there are {len(own)} nominals, and the test does not say from which it starts"
+            if own
+            else "nothing says where the test starts from",
+            help=f"write `test ... from {own[0].name.text} {{ ... }}`; there are {names}"
+            if own
+            else "declare or import a `nominal`, with the policy, the vehicle and the signals that a test starts with",
+            labels=[(each.name.span, "a nominal") for each in own[:2]],
+        )
+    return None
+
+
+def start_of(test: TestDecl, nominal: NominalDecl) -> TestStart:
+    """What the two say together; what the test says replaces what the nominal says."""
+    askers = [None if test.request is None else test.request.asker, nominal.asker]
+    said = [asker for asker in askers if asker is not None]
+    phase = test.premises.phase or nominal.premises.phase
+    orders = [each.order for each in (test.premises.phase, nominal.premises.phase) if each is not None and each.order]
+    alone = () if phase is None else (phase.phase,)
+    return TestStart(
+        nominal=nominal,
+        role=next((asker.role for asker in said if asker.role is not None), None),
+        source=next((asker.source for asker in said if asker.source is not None), None),
+        instant=test.premises.instant or nominal.premises.instant,
+        phase=phase,
+        order=orders[0] if orders else alone,
+    )

@@ -6,13 +6,12 @@ Only those of the file that was asked for are looked at: the scenarios of an imp
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.expectations import check_expectation
-from rtshcua.ground.checker.conditions import check_condition
+from rtshcua.ground.checker.condition_nodes import walk
+from rtshcua.ground.checker.conditions import check_condition, is_about_phase
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.faults import NAMED, fault_of
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_flown, find_skill, find_zone
-from rtshcua.ground.checker.parts import walk
-from rtshcua.ground.checker.phases import is_about_phase
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Condition, Edge, ForLast, Near, Quantity, WithinLast

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.checks.overrides import DEFAULT_GRACE_US
+from rtshcua.ground.checker.checks.missions import DEFAULT_GRACE_US
 from rtshcua.ground.checker.context import Context
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Overrides, Step

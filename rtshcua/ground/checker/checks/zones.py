@@ -1,15 +1,18 @@
-"""E0501 to E0504, E0112, E0113, E0516: a zone has a clear inside on the globe, with its floor below its ceiling."""
+"""A zone has a clear inside on the globe, its floor is below its ceiling, and it is not made of itself."""
+
+from collections.abc import Iterator
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.checks.made_of import circles, operands
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.fields import height, on_globe, quantity
-from rtshcua.ground.checker.refused import Refused
+from rtshcua.ground.checker.geojson import NoArea
+from rtshcua.ground.checker.lookup import find_zone
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.geometry.polygons import Point, contained, contains, crossing, touching_edges
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES, meridian
-from rtshcua.model.ir.expression import Coordinates
-from rtshcua.model.ir.places import Circle, Corridor, GeoJson, Polygon, ZoneDecl
+from rtshcua.model.ir.expression import Coordinates, Reference
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.places import Circle, Combination, Corridor, GeoJson, Polygon, Shape, ZoneDecl
 from rtshcua.model.quantity import Dimension
 
 LEAST_WIDTH = 100  # mm
@@ -52,7 +55,7 @@ def _heights(context: Context, zone: ZoneDecl) -> None:
 
 def _geojson(context: Context, shape: GeoJson) -> None:
     found = context.data.area(shape)
-    if isinstance(found, Refused):
+    if isinstance(found, NoArea):
         name = context.data.name(shape)
         context.report.add(found.code, shape.span, f"`{name}` cannot be used: {found.message}", help=found.help)
 
@@ -199,3 +202,55 @@ def _corners(shape: Polygon, ring: tuple[Coordinates, ...]) -> list[Point]:
 def _corner(place: Coordinates, near: Coordinates) -> Point:
     """A place in the plane of longitudes and latitudes around another, across longitude 180 where that is shorter."""
     return meridian(place.longitude, near.longitude), place.latitude
+
+
+def parts(shape: Shape) -> Iterator[Shape]:
+    """A shape, and all shapes that it is made of."""
+    yield shape
+    if isinstance(shape, Combination):
+        for each in shape.shapes:
+            yield from parts(each)
+
+
+def named(zone: ZoneDecl) -> Iterator[Reference]:
+    """The zones that a zone is made of, by name."""
+    return (each for each in parts(zone.shape) if isinstance(each, Reference))
+
+
+def operands(context: Context, zone: ZoneDecl) -> Iterator[Shape]:
+    """The shapes that a zone is made of, but for other zones: of these, reports names that stand for none."""
+    for each in parts(zone.shape):
+        if isinstance(each, Reference):
+            find_zone(context, Name(span=each.span, text=each.name))
+        elif not isinstance(each, Combination):
+            yield each
+
+
+def circles(context: Context) -> None:
+    """Report each zone that is made of itself, once for each way in which it is."""
+    zones = context.symbols.zones
+    finished: set[str] = set()
+    for start in zones:
+        way: list[tuple[str, Iterator[Reference]]] = [(start, named(zones[start]))] if start not in finished else []
+        while way:
+            name, waiting = way[-1]
+            reference = next(waiting, None)
+            if reference is None:
+                finished.add(name)
+                way.pop()
+            elif reference.name in (each for each, _ in way):
+                _circle(context, reference, [each for each, _ in way])
+            elif reference.name in zones and reference.name not in finished:
+                way.append((reference.name, named(zones[reference.name])))
+
+
+def _circle(context: Context, closing: Reference, way: list[str]) -> None:
+    around = way[way.index(closing.name) :]
+    context.report.add(
+        codes.ZONE_CYCLE,
+        closing.span,
+        f"`{closing.name}` is made of itself"
+        + (": " + ", which is made of ".join(f"`{each}`" for each in (*around, closing.name)) if around[1:] else ""),
+        help="a zone is made of shapes, and of zones that are made of shapes",
+        labels=[(context.symbols.zones[each].name.span, "declared here") for each in around],
+    )

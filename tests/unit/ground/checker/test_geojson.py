@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
-from rtshcua.ground.checker.geojson import GeoPolygon, read_area
-from rtshcua.ground.checker.refused import Refused
+from rtshcua.ground.checker.geojson import GeoPolygon, NoArea, read_area
 from virtual.rows import rows
 
 SQUARE = [[8.54, 47.39], [8.55, 47.39], [8.55, 47.40], [8.54, 47.40], [8.54, 47.39]]
@@ -38,8 +37,8 @@ def read(tree: Any, name: str | None = None) -> tuple[GeoPolygon, ...]:
     return read_area(json.dumps(tree).encode(), name)
 
 
-def refused(data: Any, name: str | None = None) -> Refused:
-    with pytest.raises(Refused) as caught:
+def refused(data: Any, name: str | None = None) -> NoArea:
+    with pytest.raises(NoArea) as caught:
         read_area(data if isinstance(data, bytes) else json.dumps(data).encode(), name)
     return caught.value
 
@@ -104,7 +103,7 @@ def test_fifteen_decimals_are_rounded_to_the_nearest_half_to_even(longitude: str
     text = f'{{"type":"Polygon","coordinates":[[[{longitude},{latitude}],[0,89e-1],[9,84],[{longitude},{latitude}]]]}}'
     try:
         (found,) = read_area(text.encode(), None)
-    except Refused:
+    except NoArea:
         assume(False)
         return
     assert found.outer[0] == tuple(round(Fraction(each) * 10_000_000) for each in (longitude, latitude))
@@ -227,10 +226,10 @@ def test_positions_in_texts_are_texts_and_other_values_stand_beside_positions() 
     (area,) = read_area(json.dumps({"type": "FeatureCollection", "features": [feature]}).encode(), '"[1,2],[3,4]')
     assert len(area.outer) == 3
     feature["geometry"] = {"type": "Polygon", "coordinates": [[*ring[:2], "x", *ring[2:]]]}
-    with pytest.raises(Refused, match="`/geometry/coordinates/0/2` is not an array"):
+    with pytest.raises(NoArea, match="`/geometry/coordinates/0/2` is not an array"):
         read_area(json.dumps(feature).encode(), None)
     feature["geometry"] = {"type": "Polygon", "coordinates": [[[8]], ring]}
-    with pytest.raises(Refused, match="the ring at `/geometry/coordinates/0` has too few"):
+    with pytest.raises(NoArea, match="the ring at `/geometry/coordinates/0` has too few"):
         read_area(json.dumps(feature).encode(), None)
 
 
@@ -273,6 +272,6 @@ def test_any_bytes_are_an_area_or_refused(data: bytes) -> None:
 def outcome(data: bytes, name: str | None) -> Code | None:
     try:
         read_area(data, name)
-    except Refused as refusal:
+    except NoArea as refusal:
         return refusal.code
     return None

@@ -8,19 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.geojson import read_area
-from rtshcua.ground.checker.refused import Refused
-from rtshcua.ground.checker.unread import said_by
+from rtshcua.ground.checker.geojson import NoArea, read_area, said_by
 from virtual.rows import rows
 
 RING = [[8.545, 47.397], [8.546, 47.397], [8.546, 47.398], [8.545, 47.398], [8.545, 47.397]]
 OUTLINE = {"type": "Polygon", "coordinates": [RING]}
 
 
-def refused(tree: Any, feature: str | None = None) -> Refused | None:
+def refused(tree: Any, feature: str | None = None) -> NoArea | None:
     try:
         read_area(json.dumps(tree).encode(), feature)
-    except Refused as found:
+    except NoArea as found:
         return found
     return None
 

@@ -8,7 +8,7 @@ from typing import Any, get_args, get_type_hints
 import rtshcua.model.ir as ir
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker import time_zones
-from rtshcua.ground.checker.sizes import sized
+from rtshcua.ground.checker.substitution import sized
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.report.cases import told_test

@@ -11,13 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 798,
-    "code lines": 84_264,
-    "shared class names": 57,
-    "of them across packages": 37,
-    "shared file names": 95,
+    "modules": 777,
+    "code lines": 84_146,
+    "shared class names": 56,
+    "of them across packages": 36,
+    "shared file names": 93,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 35,
+    "modules below 80 lines with one importer": 33,
     "functions of more than 60 lines": 21,
     "functions of a complexity over 15": 143,
     "functions of a complexity over 25": 9,

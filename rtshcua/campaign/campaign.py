@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from rtshcua.campaign.drawing import Drawn, Space, draw
-from rtshcua.campaign.flights import Field, Flight
-from rtshcua.campaign.results import Result, tally
-from rtshcua.campaign.workers import Workers
+from rtshcua.campaign.drawing import Drawn, FaultSpace, draw
+from rtshcua.campaign.flights import CampaignFlight, FlownMission
+from rtshcua.campaign.results import CampaignResult, tally
+from rtshcua.campaign.workers import FlightWorkers
 
 #: flights of a round; the first is small, for it knows nothing of the mission
 FIRST: Final = 20
@@ -19,12 +19,12 @@ ROUND: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class CampaignOrder:
     """What is asked for: flights 0 to `flights` - 1 of the campaign of this seed."""
 
     seed: int
     flights: int
-    space: Space
+    space: FaultSpace
 
 
 def rounds(flights: int) -> Iterator[range]:
@@ -36,13 +36,19 @@ def rounds(flights: int) -> Iterator[range]:
         first = end
 
 
-def drawn(order: Order, number: int, past: Mapping[int, Result]) -> Drawn:
+def drawn(order: CampaignOrder, number: int, past: Mapping[int, CampaignResult]) -> Drawn:
     """One flight, as the campaign draws it: `past` has all of the rounds before its own."""
     first = next(each for each in rounds(order.flights) if number in each)[0]
     return draw(order.seed, number, order.space, tally(past[n] for n in range(first)))
 
 
-def fly(order: Order, field: Field, workers: Workers, past: dict[int, Result], keep: Callable[[Result], None]) -> None:
+def fly_rounds(
+    order: CampaignOrder,
+    field: FlownMission,
+    workers: FlightWorkers,
+    past: dict[int, CampaignResult],
+    keep: Callable[[CampaignResult], None],
+) -> None:
     """Flies what `past` has not yet, and adds it to that; `keep` is called with each result as it comes."""
     for numbers in rounds(order.flights):
         left = [number for number in numbers if number not in past]
@@ -52,7 +58,7 @@ def fly(order: Order, field: Field, workers: Workers, past: dict[int, Result], k
         flights = []
         for number in left:
             made = draw(order.seed, number, order.space, known)
-            flights.append(Flight(number, made.scenario, made.tries))
+            flights.append(CampaignFlight(number, made.scenario, made.tries))
         for result in workers.fly(field, flights):
             past[result.number] = result
             keep(result)

@@ -74,7 +74,7 @@ GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class DrawnRange:
     """Whole numbers from `low` to `high` in steps of `step`; `by_ratio`: small ones as likely as large ones."""
 
     low: int
@@ -90,49 +90,49 @@ class Range:
         return min(self.high, max(self.low, round(drawn / self.step) * self.step))
 
 
-_LASTS = Range(200_000, 45 * S, 100_000, by_ratio=True)
-_SOMEWHERE = Range(-60_000, 60_000, 1_000)
+_LASTS = DrawnRange(200_000, 45 * S, 100_000, by_ratio=True)
+_SOMEWHERE = DrawnRange(-60_000, 60_000, 1_000)
 #: what a parameter of a kind is drawn from, and of all kinds that name it where there is no kind before it
-RANGES: Final[Mapping[tuple[type[Fault] | None, str], Range]] = {
+RANGES: Final[Mapping[tuple[type[Fault] | None, str], DrawnRange]] = {
     (None, "for_us"): _LASTS,
-    (None, "each_us"): Range(50_000, 5 * S, 50_000, by_ratio=True),
-    (None, "delay_us"): Range(50_000, 5 * S, 50_000, by_ratio=True),
-    (None, "jitter_us"): Range(20_000, 2 * S, 20_000, by_ratio=True),
-    (None, "part"): Range(100, 5_000, 100),
-    (None, "loss"): Range(500, 9_500, 500),
-    (None, "quality"): Range(0, 10_000, 500),
-    (None, "level"): Range(200, 6_000, 100),
-    (None, "drop_mv"): Range(300, 3_700, 100),
-    (None, "voltage_mv"): Range(12_000, 25_000, 500),
-    (None, "speed_mm_s"): Range(0, 18_000, 500),
-    (None, "gust_mm_s"): Range(0, 4_000, 500),
-    (None, "from_deg"): Range(0, 350, 10),
-    (None, "towards_deg"): Range(0, 350, 10),
+    (None, "each_us"): DrawnRange(50_000, 5 * S, 50_000, by_ratio=True),
+    (None, "delay_us"): DrawnRange(50_000, 5 * S, 50_000, by_ratio=True),
+    (None, "jitter_us"): DrawnRange(20_000, 2 * S, 20_000, by_ratio=True),
+    (None, "part"): DrawnRange(100, 5_000, 100),
+    (None, "loss"): DrawnRange(500, 9_500, 500),
+    (None, "quality"): DrawnRange(0, 10_000, 500),
+    (None, "level"): DrawnRange(200, 6_000, 100),
+    (None, "drop_mv"): DrawnRange(300, 3_700, 100),
+    (None, "voltage_mv"): DrawnRange(12_000, 25_000, 500),
+    (None, "speed_mm_s"): DrawnRange(0, 18_000, 500),
+    (None, "gust_mm_s"): DrawnRange(0, 4_000, 500),
+    (None, "from_deg"): DrawnRange(0, 350, 10),
+    (None, "towards_deg"): DrawnRange(0, 350, 10),
     (None, "north_mm"): _SOMEWHERE,
     (None, "east_mm"): _SOMEWHERE,
-    (None, "up_mm"): Range(2_000, 40_000, 1_000),
-    (None, "north_mm_s"): Range(-1_500, 1_500, 100),
-    (None, "east_mm_s"): Range(-1_500, 1_500, 100),
-    (None, "distance_mm"): Range(500, 30_000, 500, by_ratio=True),
-    (None, "radius_mm"): Range(500, 3_000, 500),
-    (None, "height_mm"): Range(5_000, 60_000, 1_000),
-    (None, "copies"): Range(1, 3, 1),
-    (None, "shuffle"): Range(0, 1_000, 1),
-    (None, "by_us"): Range(-3_600 * S, 3_600 * S, 10 * S),
-    (faults.GpsJump, "north_mm"): Range(-15_000, 15_000, 500),
-    (faults.GpsJump, "east_mm"): Range(-15_000, 15_000, 500),
-    (faults.GpsGlitch, "north_mm"): Range(-40_000, 40_000, 1_000),
-    (faults.GpsGlitch, "east_mm"): Range(-40_000, 40_000, 1_000),
-    (faults.PilotVelocity, "north_mm_s"): Range(-4_000, 4_000, 500),
-    (faults.PilotVelocity, "east_mm_s"): Range(-4_000, 4_000, 500),
-    (faults.PilotSpeed, "speed_mm_s"): Range(500, 10_000, 500),
-    (faults.Pillar, "speed_mm_s"): Range(0, 2_000, 500),
-    (faults.RuntimeKilled, "for_us"): Range(500_000, 20 * S, 500_000, by_ratio=True),
-    (faults.HostStall, "for_us"): Range(100_000, 8 * S, 100_000, by_ratio=True),
-    (faults.DiskStall, "for_us"): Range(100_000, 20 * S, 100_000, by_ratio=True),
-    (faults.Stall, "for_us"): Range(200_000, 20 * S, 100_000, by_ratio=True),
-    (faults.StaleSource, "delay_us"): Range(200_000, 8 * S, 100_000, by_ratio=True),
-    (faults.Babble, "copies"): Range(5, 200, 5, by_ratio=True),
+    (None, "up_mm"): DrawnRange(2_000, 40_000, 1_000),
+    (None, "north_mm_s"): DrawnRange(-1_500, 1_500, 100),
+    (None, "east_mm_s"): DrawnRange(-1_500, 1_500, 100),
+    (None, "distance_mm"): DrawnRange(500, 30_000, 500, by_ratio=True),
+    (None, "radius_mm"): DrawnRange(500, 3_000, 500),
+    (None, "height_mm"): DrawnRange(5_000, 60_000, 1_000),
+    (None, "copies"): DrawnRange(1, 3, 1),
+    (None, "shuffle"): DrawnRange(0, 1_000, 1),
+    (None, "by_us"): DrawnRange(-3_600 * S, 3_600 * S, 10 * S),
+    (faults.GpsJump, "north_mm"): DrawnRange(-15_000, 15_000, 500),
+    (faults.GpsJump, "east_mm"): DrawnRange(-15_000, 15_000, 500),
+    (faults.GpsGlitch, "north_mm"): DrawnRange(-40_000, 40_000, 1_000),
+    (faults.GpsGlitch, "east_mm"): DrawnRange(-40_000, 40_000, 1_000),
+    (faults.PilotVelocity, "north_mm_s"): DrawnRange(-4_000, 4_000, 500),
+    (faults.PilotVelocity, "east_mm_s"): DrawnRange(-4_000, 4_000, 500),
+    (faults.PilotSpeed, "speed_mm_s"): DrawnRange(500, 10_000, 500),
+    (faults.Pillar, "speed_mm_s"): DrawnRange(0, 2_000, 500),
+    (faults.RuntimeKilled, "for_us"): DrawnRange(500_000, 20 * S, 500_000, by_ratio=True),
+    (faults.HostStall, "for_us"): DrawnRange(100_000, 8 * S, 100_000, by_ratio=True),
+    (faults.DiskStall, "for_us"): DrawnRange(100_000, 20 * S, 100_000, by_ratio=True),
+    (faults.Stall, "for_us"): DrawnRange(200_000, 20 * S, 100_000, by_ratio=True),
+    (faults.StaleSource, "delay_us"): DrawnRange(200_000, 8 * S, 100_000, by_ratio=True),
+    (faults.Babble, "copies"): DrawnRange(5, 200, 5, by_ratio=True),
 }
 #: messages that may fall silent or stick
 MESSAGES: Final = (
@@ -152,7 +152,7 @@ class Moment:
 
 
 @dataclass
-class Tally:
+class CampaignTally:
     """What a campaign has seen and tried: what the next round is drawn by.
 
     `moments` are the state changes of flights, by flavour; `tried` counts pairs of a kind of fault and the state change
@@ -164,7 +164,7 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class Space:
+class FaultSpace:
     """What a campaign draws from: the skills of its mission's steps, how long it takes by flavour, who may approve."""
 
     skills: tuple[str, ...]
@@ -190,7 +190,7 @@ class Drawn:
 ANYWHERE: Final = "anywhere"
 
 
-def draw(campaign: int, number: int, space: Space, tally: Tally) -> Drawn:
+def draw(campaign: int, number: int, space: FaultSpace, tally: CampaignTally) -> Drawn:
     """Flight `number` of the campaign of that seed."""
     chance = Random(f"campaign {campaign} flight {number}")
     flavour = space.flavours[number % len(space.flavours)]
@@ -231,13 +231,15 @@ def answers_of(policy: Policy, mission: Mission) -> Iterator[Incident]:
                 yield Incident(when, fault, incident_text(when, fault, skills))
 
 
-def _pair(chance: Random, space: Space, moments: Sequence[Moment], tally: Tally) -> tuple[type[Fault], Moment | None]:
+def _pair(
+    chance: Random, space: FaultSpace, moments: Sequence[Moment], tally: CampaignTally
+) -> tuple[type[Fault], Moment | None]:
     guided = bool(moments) and chance.random() < 0.5
     pairs = [(_kind(chance, space), _moment(chance, moments)) for _ in range(CANDIDATES if guided else 1)]
     return min(pairs, key=lambda pair: tally.tried.get((pair[0].__name__, pair[1].label if pair[1] else ANYWHERE), 0))
 
 
-def _kind(chance: Random, space: Space) -> type[Fault]:
+def _kind(chance: Random, space: FaultSpace) -> type[Fault]:
     groups = [(weight, [kind for kind in kinds if kind in space.kinds]) for weight, kinds in GROUPS]
     groups = [(weight, kinds) for weight, kinds in groups if kinds]
     return chance.choice(chance.choices([kinds for _, kinds in groups], [weight for weight, _ in groups])[0])
@@ -250,12 +252,12 @@ def _moment(chance: Random, moments: Sequence[Moment]) -> Moment | None:
     return chance.choice([each for each in moments if each.label == label])
 
 
-def _when(chance: Random, space: Space, flavour: str, moment: Moment | None) -> AtTime | AfterStep:
+def _when(chance: Random, space: FaultSpace, flavour: str, moment: Moment | None) -> AtTime | AfterStep:
     if moment is None:
         if chance.random() < 0.5:
-            after = Range(0, 20 * S, 100_000).draw(chance)
+            after = DrawnRange(0, 20 * S, 100_000).draw(chance)
             return AfterStep(chance.randrange(len(space.skills)), after, after)
-        at = Range(0, max(space.lasts_us[flavour], S), 100_000).draw(chance)
+        at = DrawnRange(0, max(space.lasts_us[flavour], S), 100_000).draw(chance)
         return AtTime(at, at)
     at = max(moment.at_us + _away(chance), 0)
     return AtTime(at, at)
@@ -274,7 +276,7 @@ def _away(chance: Random) -> int:
     return round((AFTER_US if chance.random() < 0.6 else -BEFORE_US) * far / 20_000) * 20_000
 
 
-def _fault(chance: Random, kind: type[Fault], space: Space) -> Fault:
+def _fault(chance: Random, kind: type[Fault], space: FaultSpace) -> Fault:
     values: dict[str, Any] = {"at_us": 0}
     for each in fields(kind):
         if each.name == "at_us":
@@ -290,7 +292,7 @@ def _fault(chance: Random, kind: type[Fault], space: Space) -> Fault:
     return made
 
 
-def _value(chance: Random, kind: type[Fault], name: str, space: Space) -> object:
+def _value(chance: Random, kind: type[Fault], name: str, space: FaultSpace) -> object:
     if name == "way":
         return chance.choice((Direction.BOTH, Direction.BOTH, Direction.UP, Direction.DOWN))
     if name == "held":

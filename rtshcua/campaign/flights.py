@@ -8,7 +8,7 @@ from typing import Any, Final, Self
 
 import msgspec
 
-from rtshcua.campaign.results import Failed, Result
+from rtshcua.campaign.results import CampaignResult, JudgeFinding
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario
@@ -24,7 +24,7 @@ DIED: Final = "the process that flew it died, and the next one too"
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
+class CampaignFlight:
     """A flight that is to be flown."""
 
     number: int
@@ -33,7 +33,7 @@ class Flight:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class FlownMission:
     """What all flights of a campaign share: the bundle, the trust root that it is signed under (`development`), and the
     roles of the policy, of whom there are people to ask.
     """
@@ -54,7 +54,7 @@ class Field:
         keys = Keys(made[Duty.LOG], development.approvers(self.roles), made[Duty.MISSION], made[Duty.BOUNDARY])
         return fly(self.bundle, self.root, keys, scenario, flavour, seed)
 
-    def fly(self, flight: Flight) -> Result:
+    def fly(self, flight: CampaignFlight) -> CampaignResult:
         """The flight, judged."""
         began = process_time_ns()
         scenario = flight.scenario
@@ -64,15 +64,15 @@ class Field:
         for life in was.lives:
             for line in life.lines:
                 log.update(line)
-        return Result(
+        return CampaignResult(
             flight.number,
             was.flavour,
             was.seed,
             tuple(incident.text for incident in scenario.incidents),
             flight.tries,
             was.ending or "none",
-            tuple(Failed(each.slug, each.text, each.at_us) for each in verdict.failures),
-            tuple(Failed(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
+            tuple(JudgeFinding(each.slug, each.text, each.at_us) for each in verdict.failures),
+            tuple(JudgeFinding(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
             {name: value for name, value in asdict(verdict.margins).items() if value is not None},
             tuple(moments(was)),
             was.samples[-1].at_us,
@@ -80,13 +80,13 @@ class Field:
             (process_time_ns() - began) // 1_000,
         )
 
-    def lost(self, flight: Flight) -> Result:
+    def lost(self, flight: CampaignFlight) -> CampaignResult:
         """The flight, when the process that flew it died, more than once."""
         scenario = flight.scenario
         flavour, seed = scenario.flavours[0], scenario.first_seed
-        failed = Failed(LOST, DIED)
+        failed = JudgeFinding(LOST, DIED)
         texts = tuple(incident.text for incident in scenario.incidents)
-        return Result(flight.number, flavour, seed, texts, flight.tries, "none", (failed,), (), {}, (), 0, "")
+        return CampaignResult(flight.number, flavour, seed, texts, flight.tries, "none", (failed,), (), {}, (), 0, "")
 
 
 def moments(was: ScenarioFlown) -> Iterator[tuple[str, int]]:

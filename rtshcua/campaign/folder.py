@@ -13,16 +13,15 @@ import msgspec
 
 from rtshcua.adapters.store.reading import open_regular, read_if_there
 from rtshcua.adapters.store.writing import append, make_folder, replace, write_new
-from rtshcua.campaign import results
-from rtshcua.campaign.page import page
-from rtshcua.campaign.results import Result
-from rtshcua.campaign.summary import Summary, as_json
+from rtshcua.campaign.page import report_page
+from rtshcua.campaign.results import CampaignResult, read_results, result_line
+from rtshcua.campaign.summary import CampaignSummary, as_json
 from rtshcua.diagnostics.refusal import Refusal
 
 _LARGEST: Final = 1 << 16
 
 
-class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class CampaignIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What makes a campaign the same one: a flight of this number is drawn and flown alike wherever all of it is equal.
 
     `bundle` is the SHA-256 of what is flown, `kinds` those of faults that are drawn, `version` that of this program,
@@ -39,14 +38,14 @@ class Identity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     approved: bool = False
 
 
-class Folder:
+class CampaignFolder:
     """The folder, which is made if it is missing."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.report = path / "report.html"
 
-    def identity(self) -> Identity | Refusal | None:
+    def identity(self) -> CampaignIdentity | Refusal | None:
         """What was begun here; None: nothing yet."""
         if self.path.exists() and not self.path.is_dir():
             return Refusal("usage", f"`{self.path}` is no folder", "`-o` names a campaign's folder")
@@ -54,16 +53,16 @@ class Folder:
         if kept is None:
             return None
         try:
-            return msgspec.json.decode(kept, type=Identity)
+            return msgspec.json.decode(kept, type=CampaignIdentity)
         except msgspec.MsgspecError:
             return Refusal("malformed", f"`{self.path / 'campaign.json'}` is not what a campaign left", _ANOTHER)
 
-    def begin(self, identity: Identity) -> None:
+    def begin(self, identity: CampaignIdentity) -> None:
         """Begin a campaign. Raises OSError; FileExistsError where one was begun meanwhile."""
         make_folder(self.path)
         write_new(self.path / "campaign.json", msgspec.json.format(msgspec.json.encode(identity)) + b"\n")
 
-    def past(self) -> dict[int, Result]:
+    def past(self) -> dict[int, CampaignResult]:
         """What was flown so far. A last line that was torn is ended, so that the next result has a line of its own."""
         path = self.path / "results.jsonl"
         try:
@@ -73,16 +72,16 @@ class Folder:
             return {}
         if lines and not lines[-1].endswith(b"\n"):
             append(path, b"\n")
-        return results.read(lines)
+        return read_results(lines)
 
-    def keep(self, result: Result) -> None:
+    def keep(self, result: CampaignResult) -> None:
         """Keep a result, on the disk."""
-        append(self.path / "results.jsonl", results.line(result))
+        append(self.path / "results.jsonl", result_line(result))
 
-    def tell(self, summary: Summary) -> None:
+    def tell(self, summary: CampaignSummary) -> None:
         """Write the report, over an earlier one."""
         replace(self.path / "report.json", msgspec.json.format(msgspec.json.encode(as_json(summary))) + b"\n")
-        replace(self.report, page(summary).encode())
+        replace(self.report, report_page(summary).encode())
 
     def scenario(self, slug: str) -> Path:
         """Where the smallest flight that fails so is kept."""

@@ -10,14 +10,14 @@ from typing import Final
 from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
-from rtshcua.campaign.summary import Summary
+from rtshcua.campaign.summary import CampaignSummary
 from rtshcua.campaign.words import margin_told
 
 _HEIGHT: Final = 48
 _WIDTH: Final = 10
 
 
-def page(summary: Summary) -> str:
+def report_page(summary: CampaignSummary) -> str:
     """The page; the same bytes for the same summary."""
     environment, style = _environment()
     labels = sorted({label for counts in summary.near.values() for label in counts})

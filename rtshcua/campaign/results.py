@@ -8,10 +8,10 @@ from typing import Final
 
 import msgspec
 
-from rtshcua.campaign.drawing import Moment, Tally
+from rtshcua.campaign.drawing import CampaignTally, Moment
 
 
-class Failed(msgspec.Struct, frozen=True):
+class JudgeFinding(msgspec.Struct, frozen=True):
     """What the judge found, or what it excused: `why` says what in the flight allows it."""
 
     slug: str
@@ -20,7 +20,7 @@ class Failed(msgspec.Struct, frozen=True):
     why: str = ""
 
 
-class Result(msgspec.Struct, frozen=True):
+class CampaignResult(msgspec.Struct, frozen=True):
     """One flight. `tries` are pairs of a kind of fault and the state change it was near; `margins` the judge's numbers.
 
     `moments` are the state changes that were seen. `took_us` is processor time; it is the only thing that is not the
@@ -33,8 +33,8 @@ class Result(msgspec.Struct, frozen=True):
     incidents: tuple[str, ...]
     tries: tuple[tuple[str, str], ...]
     ending: str
-    failures: tuple[Failed, ...]
-    exceptions: tuple[Failed, ...]
+    failures: tuple[JudgeFinding, ...]
+    exceptions: tuple[JudgeFinding, ...]
     margins: dict[str, int]
     moments: tuple[tuple[str, int], ...]
     flown_us: int
@@ -45,17 +45,17 @@ class Result(msgspec.Struct, frozen=True):
 
 #: how many times of a state change are kept, the first that were seen
 _KEPT: Final = 40
-_DECODER: Final = msgspec.json.Decoder(Result)
+_DECODER: Final = msgspec.json.Decoder(CampaignResult)
 
 
-def line(result: Result) -> bytes:
+def result_line(result: CampaignResult) -> bytes:
     """As it is kept."""
     return msgspec.json.encode(result) + b"\n"
 
 
-def read(lines: Iterable[bytes]) -> dict[int, Result]:
+def read_results(lines: Iterable[bytes]) -> dict[int, CampaignResult]:
     """What was kept, by number; a line that is no result is left out."""
-    found: dict[int, Result] = {}
+    found: dict[int, CampaignResult] = {}
     for each in lines:
         try:
             result = _DECODER.decode(each)
@@ -65,9 +65,9 @@ def read(lines: Iterable[bytes]) -> dict[int, Result]:
     return found
 
 
-def tally(results: Iterable[Result]) -> Tally:
+def tally(results: Iterable[CampaignResult]) -> CampaignTally:
     """What the next round is drawn by: of results in the order of their numbers."""
-    made = Tally()
+    made = CampaignTally()
     seen: dict[tuple[str, str], int] = {}
     for result in results:
         moments = made.moments.setdefault(result.flavour, [])

@@ -6,14 +6,14 @@ from typing import Any, Final
 
 import msgspec
 
-from rtshcua.campaign.results import Failed, Result
+from rtshcua.campaign.results import CampaignResult, JudgeFinding
 from rtshcua.campaign.words import FAULTS, MARGINS
 
 #: bars of a histogram
 _BARS: Final = 24
 
 
-class Found(msgspec.Struct, frozen=True):
+class FindingSummary(msgspec.Struct, frozen=True):
     """All flights that the judge found the same fault in: how many, and those with the lowest numbers."""
 
     slug: str
@@ -25,7 +25,7 @@ class Found(msgspec.Struct, frozen=True):
     scenario: str = ""
 
 
-class Margin(msgspec.Struct, frozen=True):
+class MarginSummary(msgspec.Struct, frozen=True):
     """One of the judge's numbers over all flights: the least and the greatest, in which flight, and the spread.
 
     `name` ends in its unit (us, mm); `title` is for people.
@@ -43,7 +43,7 @@ class Margin(msgspec.Struct, frozen=True):
     """How many flights in each of as many equal parts from the least to the greatest."""
 
 
-class Summary(msgspec.Struct, frozen=True):
+class CampaignSummary(msgspec.Struct, frozen=True):
     """What `report.json` holds. Times in us; `endings` by kind of autopilot, `kinds` by kind of fault as in sources."""
 
     mission: str
@@ -53,15 +53,17 @@ class Summary(msgspec.Struct, frozen=True):
     flown_us: int
     took_us: int
     endings: dict[str, dict[str, int]]
-    failures: tuple[Found, ...]
-    exceptions: tuple[Found, ...]
-    margins: tuple[Margin, ...]
+    failures: tuple[FindingSummary, ...]
+    exceptions: tuple[FindingSummary, ...]
+    margins: tuple[MarginSummary, ...]
     kinds: dict[str, dict[str, int]]
     near: dict[str, dict[str, int]]
     """How often a kind of fault was near a state change."""
 
 
-def summarise(mission: str, campaign: int, results: Mapping[int, Result], scenarios: Mapping[str, str]) -> Summary:
+def summarise(
+    mission: str, campaign: int, results: Mapping[int, CampaignResult], scenarios: Mapping[str, str]
+) -> CampaignSummary:
     """Of results by number; `scenarios` says in which file the shrunken flight of a failure is kept, by slug."""
     ordered = [results[number] for number in sorted(results)]
     endings: defaultdict[str, Counter[str]] = defaultdict(Counter)
@@ -74,7 +76,7 @@ def summarise(mission: str, campaign: int, results: Mapping[int, Result], scenar
             kinds[FAULTS[kind]]["failed"] += bool(result.failures)
         for kind, label in result.tries:
             near[FAULTS[kind]][label] += 1
-    return Summary(
+    return CampaignSummary(
         mission,
         campaign,
         len(ordered),
@@ -95,15 +97,17 @@ def _plain(counted: Mapping[str, Counter[str]]) -> dict[str, dict[str, int]]:
 
 
 def _found(
-    results: Sequence[Result], of: Callable[[Result], Iterable[Failed]], scenarios: Mapping[str, str]
-) -> tuple[Found, ...]:
-    found: dict[tuple[str, str], list[tuple[Result, Failed]]] = {}
+    results: Sequence[CampaignResult],
+    of: Callable[[CampaignResult], Iterable[JudgeFinding]],
+    scenarios: Mapping[str, str],
+) -> tuple[FindingSummary, ...]:
+    found: dict[tuple[str, str], list[tuple[CampaignResult, JudgeFinding]]] = {}
     for result in results:
         for slug, why in {(each.slug, each.why) for each in of(result)}:
             one = next(each for each in of(result) if (each.slug, each.why) == (slug, why))
             found.setdefault((slug, why), []).append((result, one))
     return tuple(
-        Found(
+        FindingSummary(
             slug,
             len(flights),
             tuple(result.number for result, _ in flights[:10]),
@@ -116,7 +120,7 @@ def _found(
     )
 
 
-def _margins(results: Sequence[Result]) -> Iterable[Margin]:
+def _margins(results: Sequence[CampaignResult]) -> Iterable[MarginSummary]:
     names = sorted({name for result in results for name in result.margins})
     for name in names:
         values = sorted((result.margins[name], result.number) for result in results if name in result.margins)
@@ -125,12 +129,12 @@ def _margins(results: Sequence[Result]) -> Iterable[Margin]:
         for value, _ in values:
             bars[min(_BARS - 1, (value - least) * _BARS // max(greatest - least, 1))] += 1
         middle = values[len(values) // 2][0]
-        yield Margin(
+        yield MarginSummary(
             name, MARGINS[name].title, len(values), least, least_in, middle, greatest, greatest_in, tuple(bars)
         )
 
 
-def as_json(summary: Summary) -> dict[str, Any]:
+def as_json(summary: CampaignSummary) -> dict[str, Any]:
     """For a program."""
     made: dict[str, Any] = msgspec.to_builtins(summary)
     return made

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter_ns
 
-from rtshcua.campaign.flights import DIED, LOST, Field
+from rtshcua.campaign.flights import DIED, LOST, FlownMission
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
@@ -33,10 +33,10 @@ class Try:
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
+class ScenarioTrial:
     """How flights of scenarios of one mission are flown."""
 
-    field: Field
+    field: FlownMission
     with_coverage: bool = False
 
     def fly(self, flight: Try) -> FlightResult:

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 from rtshcua.model.faults import KINDS
 
 
-class Told(NamedTuple):
+class MarginUnit(NamedTuple):
     """What a margin is, its unit for people, and how many of its own make one of these."""
 
     title: str
@@ -15,12 +15,12 @@ class Told(NamedTuple):
 
 
 #: by the names of `rtshcua.virtual.judge.Margins`
-MARGINS: Final[Mapping[str, Told]] = {
-    "fence_mm": Told("distance inside the airspace, at its edge", "m", 1_000),
-    "obstacle_mm": Told("distance to what stands around", "m", 1_000),
-    "stop_us": Told("time from the cause of a fallback to its first frame", "s", 1_000_000),
-    "takeover_us": Told("time from a takeover to the last frame that moves the vehicle", "s", 1_000_000),
-    "ended_us": Told("time that the vehicle went on after the run had ended", "s", 1_000_000),
+MARGINS: Final[Mapping[str, MarginUnit]] = {
+    "fence_mm": MarginUnit("distance inside the airspace, at its edge", "m", 1_000),
+    "obstacle_mm": MarginUnit("distance to what stands around", "m", 1_000),
+    "stop_us": MarginUnit("time from the cause of a fallback to its first frame", "s", 1_000_000),
+    "takeover_us": MarginUnit("time from a takeover to the last frame that moves the vehicle", "s", 1_000_000),
+    "ended_us": MarginUnit("time that the vehicle went on after the run had ended", "s", 1_000_000),
 }
 
 #: what sources and `--fault` call a kind of fault, by its own name; of two the longer one, which says more

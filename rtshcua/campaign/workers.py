@@ -41,7 +41,7 @@ class Work(Protocol[F_contra, R_co]):
         ...
 
 
-class Workers(Protocol):
+class FlightWorkers(Protocol):
     """Whoever flies; what comes of flights comes as it is there."""
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
@@ -77,7 +77,7 @@ class Here:
         """There is nobody to let go."""
 
 
-class Processes:
+class WorkerProcesses:
     """`jobs` processes, as many as there are cores if it is not said."""
 
     def __init__(self, jobs: int | None = None, look: Look = _on) -> None:
@@ -130,7 +130,7 @@ class Processes:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-class Cluster:
+class DaskWorkers:
     """The workers of a scheduler, at an address such as `tcp://10.0.0.1:8786`. Raises OSError where there is none.
 
     They have this package installed, in this version. How connections are secured (`tls://`) is Dask's configuration.

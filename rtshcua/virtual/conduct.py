@@ -27,14 +27,14 @@ from rtshcua.model.faults import Fault
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import step_words
-from rtshcua.virtual.excuses import Failure
-from rtshcua.virtual.flown import Frame, Life, Sample, ScenarioFlown, records_of
+from rtshcua.virtual.excuses import JudgedFailure
+from rtshcua.virtual.flown import Life, ScenarioFlown, SentFrame, TruthSample, records_of
 from rtshcua.virtual.naive_supervision import DURATION, JudgedState, RunningStep, Span, WatchedStep, supervise
 from rtshcua.virtual.zone_truth import local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 
 Record = dict[str, Any]
-Motion = Sequence[tuple[Frame, frozenset[MotionKind]]]
+Motion = Sequence[tuple[SentFrame, frozenset[MotionKind]]]
 
 #: mm: what noise, lag and a position's own error make of a place that is told, and of one that was reached
 TOLD_MM: Final = 4_000
@@ -65,7 +65,7 @@ _DISTURBS: Final = (faults.WindStep, faults.Stall, faults.EstimatorUnhealthy)
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
+class LoggedCommand:
     """A command of a log: from when, until when, and how it ended; `until_us` None: it did not."""
 
     kind: int
@@ -78,7 +78,7 @@ class Flight:
     detail: str
 
 
-class Conduct:
+class RuntimeChecks:
     """What is to be said of the runtime in one flight. `motion` are its frames that move the vehicle."""
 
     def __init__(self, flown: ScenarioFlown, motion: Motion) -> None:
@@ -87,7 +87,7 @@ class Conduct:
         self._times = [sample.at_us for sample in flown.samples]
         self._kinds = {contract.name: MotionKind(contract.motion.kind) for contract in flown.policy.contracts}
 
-    def failures(self) -> Iterator[Failure]:
+    def failures(self) -> Iterator[JudgedFailure]:
         """All of them."""
         lives = [life for life in self._flown.lives if life.turns]  # else what it heard is not told
         if not lives:
@@ -110,13 +110,13 @@ class Conduct:
     def _at(self, record: Record) -> int:
         return int(record["at_us"]) - self._flown.start_us
 
-    def _flights(self, records: Sequence[Record]) -> Iterator[Flight]:
+    def _flights(self, records: Sequence[Record]) -> Iterator[LoggedCommand]:
         effects = [record for record in records if record["type"] == "effect"]
         for number, record in enumerate(effects):
             if record["event"] != "dispatched" or record["detail"] not in self._kinds:
                 continue
             end = next((each for each in effects[number + 1 :] if each["token"] == record["token"]), None)
-            yield Flight(
+            yield LoggedCommand(
                 record["kind"], record["step"], record["link"], self._kinds[record["detail"]], self._at(record),
                 None if end is None else self._at(end),
                 "" if end is None else end["event"],
@@ -130,11 +130,11 @@ class Conduct:
 
     # -------------------------------------------------------- what really was
 
-    def _between(self, from_us: int, to_us: int) -> Sequence[Sample]:
+    def _between(self, from_us: int, to_us: int) -> Sequence[TruthSample]:
         low = max(bisect_left(self._times, from_us) - 1, 0)
         return self._flown.samples[low : bisect_right(self._times, to_us) + 1]
 
-    def _sample(self, at_us: int) -> Sample:
+    def _sample(self, at_us: int) -> TruthSample:
         return self._flown.samples[max(bisect_right(self._times, at_us) - 1, 0)]
 
     def _before(self, at_us: int, *kinds: type[Fault]) -> bool:
@@ -159,7 +159,7 @@ class Conduct:
 
     # -------------------------------------------------------- effects are what is seen
 
-    def _succeeded(self, flights: Sequence[Flight]) -> Iterator[Failure]:
+    def _succeeded(self, flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
         for flight in flights:
             at_us = flight.until_us
             if at_us is None or self._before(at_us, *_DECEIVES):
@@ -174,9 +174,9 @@ class Conduct:
             sample = self._sample(at_us)
             what = "it landed" if flight.how == "landed" else f"a `{flight.motion.name.lower()}` succeeded"
             text = f"{what}, and it was {sample.up_mm / 1000:.1f} m up at "
-            yield Failure("untrue", at_us, text + f"{sample.speed_mm_s / 1000:.1f} m/s")
+            yield JudgedFailure("untrue", at_us, text + f"{sample.speed_mm_s / 1000:.1f} m/s")
 
-    def _is_so(self, flight: Flight, sample: Sample) -> bool:
+    def _is_so(self, flight: LoggedCommand, sample: TruthSample) -> bool:
         match flight.motion:
             case MotionKind.HOME | MotionKind.LAND:
                 return not sample.in_air
@@ -190,13 +190,13 @@ class Conduct:
         x, y = self._place(sample)
         return hypot(x - plan.path[-2], y - plan.path[-1]) <= REACHED_MM
 
-    def _place(self, sample: Sample) -> tuple[float, float]:
+    def _place(self, sample: TruthSample) -> tuple[float, float]:
         return local_mm(self._flown.policy, sample.latitude, sample.longitude)
 
-    def _told(self, life: Life) -> Iterator[Failure]:
+    def _told(self, life: Life) -> Iterator[JudgedFailure]:
         """A place was taken over, and the vehicle was nowhere near since it is said to have been measured."""
         slot = self._flown.policy.vehicle.position
-        worst: Failure | None = None
+        worst: JudgedFailure | None = None
         count = 0
         for turn in life.turns[::3]:
             for heard in turn.heard:
@@ -214,11 +214,11 @@ class Conduct:
                     count += 1
                     if worst is None or off > worst.amount:
                         text = f"a place was heard that is {off / 1000:.1f} m from where it was since it was measured"
-                        worst = Failure("untrue", turn.at_us, text, round(off))
+                        worst = JudgedFailure("untrue", turn.at_us, text, round(off))
         if worst is not None and count >= 3:
             yield worst
 
-    def _stops(self, flights: Sequence[Flight]) -> Iterator[Failure]:
+    def _stops(self, flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
         """From the first frame of a stop that got there: so long later it is slower."""
         after_us = (self._flown.policy.vehicle.reaction_us or 1_000_000) + _STOPS_US
         heard = [(frame.sent_us, frame.heard_us) for frame, _ in self._motion if frame.heard_us is not None]
@@ -232,16 +232,16 @@ class Conduct:
             elif heard_us - flight.since_us <= 1_000_000 and ends_us >= heard_us + after_us - 300_000:
                 yield from self._slows(heard_us, heard_us + after_us)
 
-    def _slows(self, at_us: int, then_us: int) -> Iterator[Failure]:
+    def _slows(self, at_us: int, then_us: int) -> Iterator[JudgedFailure]:
         """Whoever hears a stop, and is disturbed by nothing, is slower then."""
         if self._is_others(then_us) or self._before(then_us, *_DECEIVES, *_DISTURBS):
             return
         fast, left = self._sample(at_us).speed_mm_s, self._sample(then_us).speed_mm_s
         if fast >= _FAST_MM_S and left > max(fast - _LOST_MM_S, _SLOW_MM_S):
             text = f"told to stop at {fast / 1000:.1f} m/s, and {left / 1000:.1f} m/s are left"
-            yield Failure("no-stop", then_us, text, left)
+            yield JudgedFailure("no-stop", then_us, text, left)
 
-    def _unheard(self, flight: Flight) -> Iterator[Failure]:
+    def _unheard(self, flight: LoggedCommand) -> Iterator[JudgedFailure]:
         """A stop of which nothing got there, though it would have in the end, was not said again."""
         ends_us = flight.until_us
         if ends_us is None or ends_us - flight.since_us < _AGAIN_US or self._is_others(ends_us):
@@ -249,9 +249,9 @@ class Conduct:
         deaf = (faults.LinkFault, faults.Stall, faults.Reboot, faults.HostStall, faults.MessageSilence)
         sent = any(flight.since_us <= frame.sent_us < ends_us for frame, _ in self._motion)
         if sent and not self._during(ends_us - _AGAIN_US, ends_us, *deaf):
-            yield Failure("no-stop", ends_us, "no stop got to the vehicle, and none was sent again")
+            yield JudgedFailure("no-stop", ends_us, "no stop got to the vehicle, and none was sent again")
 
-    def _left(self) -> Iterator[Failure]:
+    def _left(self) -> Iterator[JudgedFailure]:
         """Whoever hears it, and is heard, and still has it, does not leave it in the air."""
         flown = self._flown
         last, ended_us = flown.samples[-1], flown.ended_us
@@ -261,11 +261,13 @@ class Conduct:
             return
         deaf = (faults.LinkFault, faults.Stall, faults.Reboot, faults.HostStall, faults.MessageSilence, faults.Freeze)
         if not self._during(ended_us - _HELD_OUT_US, ended_us, *deaf):
-            yield Failure("not-ended", ended_us, f"the run ended ({flown.ending}), and left it in the air")
+            yield JudgedFailure("not-ended", ended_us, f"the run ended ({flown.ending}), and left it in the air")
 
     # -------------------------------------------------------- supervision
 
-    def _watched(self, life: Life, records: Sequence[Record], flights: Sequence[Flight]) -> Iterator[Failure]:
+    def _watched(
+        self, life: Life, records: Sequence[Record], flights: Sequence[LoggedCommand]
+    ) -> Iterator[JudgedFailure]:
         steps = [each for each in flights if each.kind == STEP]
         decision = next((record for record in records if record["type"] == "decision"), None)
         if not steps or decision is None:
@@ -280,10 +282,10 @@ class Conduct:
         for step, watched in zip(steps, early, strict=True):
             if step.how == "violated" and watched.doubtful is None and watched.looked_us == step.until_us:
                 text = f"{step_words(step.step)} was broken off, and as heard holds: {step.detail}"
-                yield Failure("needless", watched.looked_us, text)
+                yield JudgedFailure("needless", watched.looked_us, text)
 
     def _supervised(
-        self, life: Life, decision: Record, steps: Sequence[Flight], silences: Sequence[Span]
+        self, life: Life, decision: Record, steps: Sequence[LoggedCommand], silences: Sequence[Span]
     ) -> Sequence[RunningStep]:
         """What the steps rest on, by what was heard; nothing is judged in the silences."""
         policy, mission, start_us = self._flown.policy, self._flown.mission, self._flown.start_us
@@ -293,8 +295,8 @@ class Conduct:
         return watched
 
     def _ignored(
-        self, life: Life, step: Flight, broken: tuple[int, str] | None, silences: Sequence[Span]
-    ) -> Iterator[Failure]:
+        self, life: Life, step: LoggedCommand, broken: tuple[int, str] | None, silences: Sequence[Span]
+    ) -> Iterator[JudgedFailure]:
         """What a step rests on broke, and it went on for longer than a turn or two."""
         if broken is None:
             return
@@ -306,7 +308,7 @@ class Conduct:
         silent = any(since_us <= at_us + 2 * bound_us and at_us <= until_us for since_us, until_us in silences)
         if not mute and not silent:
             end = "it went on" if step.until_us is None else f"it ended {(step.until_us - at_us) / 1e6:.2f} s later"
-            yield Failure("not-watched", at_us, f"{step_words(step.step)} rests on `{what}`, and {end}")
+            yield JudgedFailure("not-watched", at_us, f"{step_words(step.step)} rests on `{what}`, and {end}")
 
     def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int, int]]:
         """From when a link was lost, or the computer stood still, until state was judged again, and for how long after
@@ -334,7 +336,7 @@ class Conduct:
 
     # -------------------------------------------------------- chains
 
-    def _chains(self, records: Sequence[Record], flights: Sequence[Flight]) -> Iterator[Failure]:
+    def _chains(self, records: Sequence[Record], flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
         airborne = [record for record in records if self._sample(self._at(record)).in_air]
         for number, (record, after) in enumerate(pairwise(airborne)):
             if record["type"] == "decision":
@@ -350,15 +352,15 @@ class Conduct:
                 case "not-fresh":
                     yield from self._hasty(record, records)
 
-    def _denied(self, record: Record, later: Sequence[Record]) -> Iterator[Failure]:
+    def _denied(self, record: Record, later: Sequence[Record]) -> Iterator[JudgedFailure]:
         """Nothing that a denied step says itself is listened to."""
         if record["kind"] == STEP and record["outcome"] == "deny":
             asked = next((each for each in later if each["type"] == "decision"), None)
             if asked is not None and asked["kind"] == FALLBACK_LINK:
                 text = f"{step_words(record['step'])} was denied, and its own fallback was asked for"
-                yield Failure("chain", self._at(record), text)
+                yield JudgedFailure("chain", self._at(record), text)
 
-    def _went_on(self, records: Sequence[Record]) -> Iterator[Failure]:
+    def _went_on(self, records: Sequence[Record]) -> Iterator[JudgedFailure]:
         """Nothing is decided or sent after a takeover or a crash was told."""
         told: Record | None = None
         for record in records:
@@ -366,10 +368,12 @@ class Conduct:
             if effect and record["event"] in ("taken-over", "crashed"):
                 told = told or record
             elif told is not None and (record["type"] == "decision" or (effect and record["event"] == "dispatched")):
-                yield Failure("went-on", self._at(record), f"it went on, though `{told['event']}: {told['detail']}`")
+                yield JudgedFailure(
+                    "went-on", self._at(record), f"it went on, though `{told['event']}: {told['detail']}`"
+                )
                 return
 
-    def _first(self, asked: Record) -> Iterator[Failure]:
+    def _first(self, asked: Record) -> Iterator[JudgedFailure]:
         """The first link that a chain begins with is the first that could fly."""
         now = Now(asked["at_us"], asked["utc_us"], asked["utc_error_us"])
         said, policy = asked["state"], self._flown.policy
@@ -380,9 +384,11 @@ class Conduct:
             return
         of = step_words(asked["step"])
         text = f"the fallback of {of} begins with link {asked['link']}, and {link} could fly"
-        yield Failure("chain", self._at(asked), text)
+        yield JudgedFailure("chain", self._at(asked), text)
 
-    def _recalled(self, at_us: int, flights: Sequence[Flight], records: Sequence[Record]) -> Iterator[Failure]:
+    def _recalled(
+        self, at_us: int, flights: Sequence[LoggedCommand], records: Sequence[Record]
+    ) -> Iterator[JudgedFailure]:
         """A step that goes nowhere near home ends at once."""
         bound_us = self._bound_us
         silent = any(
@@ -394,27 +400,27 @@ class Conduct:
             if flight.since_us <= at_us and flight.until_us is not None and flight.until_us > at_us + bound_us:
                 lasted_s = (flight.until_us - at_us) / 1e6
                 text = f"{step_words(flight.step)} went on for {lasted_s:.1f} s after it was called off"
-                yield Failure("chain", at_us, text)
+                yield JudgedFailure("chain", at_us, text)
 
-    def _stranded(self, record: Record, flights: Sequence[Flight]) -> Iterator[Failure]:
+    def _stranded(self, record: Record, flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
         """The last link was tried as often as may be."""
         last = len(self._flown.policy.contingency) - 1
         tried = sum(each.kind == CONTINGENCY_LINK and each.link == last for each in flights)
         if tried < 1 + _TRIES:
-            yield Failure("chain", self._at(record), f"given up after the last link was tried {tried} times")
+            yield JudgedFailure("chain", self._at(record), f"given up after the last link was tried {tried} times")
 
-    def _hasty(self, record: Record, records: Sequence[Record]) -> Iterator[Failure]:
+    def _hasty(self, record: Record, records: Sequence[Record]) -> Iterator[JudgedFailure]:
         """Fresh state is waited for as long as it may still come."""
         before = [each for each in records if each["type"] == "effect" and each["at_us"] <= record["at_us"]]
         backs = [each for each in before if each["event"] in ("link-back", _STOOD_STILL)]
         ends = [each for each in before if each["event"] in ("fresh", "not-fresh") and each is not record]
         in_this = [each for each in backs if not ends or each["at_us"] > ends[-1]["at_us"]]
         if len(in_this) == 1 and record["at_us"] - in_this[0]["at_us"] < _FRESH_US:
-            yield Failure("chain", self._at(record), f"fresh state was not waited for: {record['detail']}")
+            yield JudgedFailure("chain", self._at(record), f"fresh state was not waited for: {record['detail']}")
 
     # -------------------------------------------------------- releases and records
 
-    def _released(self, records: Sequence[Record]) -> Iterator[Failure]:
+    def _released(self, records: Sequence[Record]) -> Iterator[JudgedFailure]:
         """A step is released by the end of the one before it, and by nothing else."""
         released: int | None = None
         for record in records:
@@ -427,9 +433,9 @@ class Conduct:
                 if given != released:
                     late_s = (given - released) / 1e6
                     text = f"{step_words(record['step'])} counts as released {late_s:.1f} s later than it was"
-                    yield Failure("release", self._at(record), text, abs(given - released))
+                    yield JudgedFailure("release", self._at(record), text, abs(given - released))
 
-    def _recorded(self, life: Life, records: Sequence[Record]) -> Iterator[Failure]:
+    def _recorded(self, life: Life, records: Sequence[Record]) -> Iterator[JudgedFailure]:
         """What only steps send leaves after the record of the last such step's decision was kept."""
         allowed = list(self._allowed(life, records))
         decided = [decided_us for decided_us, _, _ in allowed]
@@ -441,7 +447,7 @@ class Conduct:
             _, kept_us, kind = allowed[at] if at >= 0 else (0, frame.sent_us + 1, MotionKind.HOLD)
             if kept_us > frame.sent_us or kind not in parts:
                 text = "a frame of a step was sent before the record of its decision was kept"
-                yield Failure("unrecorded", frame.sent_us, text)
+                yield JudgedFailure("unrecorded", frame.sent_us, text)
                 return
 
     def _allowed(self, life: Life, records: Sequence[Record]) -> Iterator[tuple[int, int, MotionKind]]:

@@ -32,7 +32,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from rtshcua.model import faults
 from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.virtual.flown import Happened, Sample, ScenarioFlown
+from rtshcua.virtual.flown import IncidentOccurrence, ScenarioFlown, TruthSample
 
 #: mm/s: what a multirotor of this size does not fly against, and us: how long after it counts
 STRONG_MM_S: Final = 12_000
@@ -70,7 +70,7 @@ _RANGES: Final = frozenset({"DISTANCE_SENSOR", "OBSTACLE_DISTANCE"})
 _FOREVER: Final = 1 << 60
 
 
-class Failure(NamedTuple):
+class JudgedFailure(NamedTuple):
     """What went wrong, when (us of the simulation), and by how much, in mm, mm/s or us, where that can be said.
 
     `cause` None: it should not have happened. Else it is an exception: that caused it, and nothing could be done.
@@ -92,7 +92,7 @@ class Excuses:
         vehicle = flown.policy.vehicle
         self._braking = vehicle.braking or _BRAKING
         self._reaction_us = vehicle.reaction_us or _REACTION_US
-        self._rules: dict[str, tuple[Callable[[Failure], str | None], ...]] = {
+        self._rules: dict[str, tuple[Callable[[JudgedFailure], str | None], ...]] = {
             "outside-fence": (self._motors, self._taken, self._wind, self._position, self._nudged),
             "collision": (
                 self._motors, self._battery, self._taken, self._wind, self._process, self._link, self._obstacle,
@@ -105,7 +105,7 @@ class Excuses:
             "not-watched": (self._disk,),
         }  # fmt: skip
 
-    def judged(self, failure: Failure) -> Failure:
+    def judged(self, failure: JudgedFailure) -> JudgedFailure:
         """The failure, with its cause if there is an excuse."""
         for rule in self._rules.get(failure.slug, ()):
             cause = rule(failure)
@@ -151,7 +151,7 @@ class Excuses:
         """What began before `to_us`, and was not over before `from_us`."""
         return (each.fault for each in self._happened if each.at_us <= to_us and _ends_us(each) >= from_us)
 
-    def _sample(self, at_us: int) -> Sample | None:
+    def _sample(self, at_us: int) -> TruthSample | None:
         found = None
         for sample in self._flown.samples:
             if sample.at_us > at_us:
@@ -167,19 +167,19 @@ class Excuses:
 
     # -------------------------------------------------------- causes
 
-    def _motors(self, failure: Failure) -> str | None:
+    def _motors(self, failure: JudgedFailure) -> str | None:
         for fault in self._before(failure.at_us, faults.Kill, faults.Reboot):
             sample = self._sample(fault.at_us)
             if sample is not None and sample.in_air:
                 return "motors"
         return None
 
-    def _battery(self, failure: Failure) -> str | None:
+    def _battery(self, failure: JudgedFailure) -> str | None:
         sample = self._sample(failure.at_us)
         made = any(self._before(failure.at_us, faults.BatteryLevel, faults.BatteryCell))
         return "battery" if made and sample is not None and sample.battery <= 0 else None
 
-    def _taken(self, failure: Failure) -> str | None:
+    def _taken(self, failure: JudgedFailure) -> str | None:
         sample = self._sample(failure.at_us)
         if sample is None or sample.taken_over_us is None or sample.taken_over_us >= failure.at_us:
             return None
@@ -187,7 +187,7 @@ class Excuses:
             return "pilot"
         return "failsafe" if failure.slug != "collision" else None
 
-    def _wind(self, failure: Failure) -> str | None:
+    def _wind(self, failure: JudgedFailure) -> str | None:
         start = self._flown.scenario.start
         winds = [(0, start.wind_mm_s or 0, start.gust_mm_s)]
         for fault in self._before(failure.at_us, faults.WindStep):
@@ -199,7 +199,7 @@ class Excuses:
                 return "wind"
         return None
 
-    def _position(self, failure: Failure) -> str | None:
+    def _position(self, failure: JudgedFailure) -> str | None:
         off, since_us = 0.0, failure.at_us
         for fault in self._before(failure.at_us, faults.ReceiverFault):
             ended_us = fault.at_us + (getattr(fault, "for_us", None) or _FOREVER)
@@ -231,7 +231,7 @@ class Excuses:
         lands = [sample.mode is FlightMode.LAND for sample in self._flown.samples if from_us <= sample.at_us <= at_us]
         return self._flown.flavour == "ardupilot" and all(lands)
 
-    def _misled(self, failure: Failure) -> str | None:
+    def _misled(self, failure: JudgedFailure) -> str | None:
         """The last mode that showed came from a HEARTBEAT that was stuck, as if somebody had chosen it again. So it is
         with ArduCopter's target that is told no more, and with a position that stands still.
         """
@@ -259,14 +259,14 @@ class Excuses:
             strongest = max(strongest, fault.speed_mm_s + 2 * fault.gust_mm_s)
         return strongest
 
-    def _nudged(self, failure: Failure) -> str | None:
+    def _nudged(self, failure: JudgedFailure) -> str | None:
         nudged = 0.0
         for fault in self._before(failure.at_us, faults.PilotSticks):
             assert isinstance(fault, faults.PilotSticks)
             nudged += fault.for_us / 1e6 * _NUDGE_MM_S
         return "pilot" if nudged and failure.amount <= nudged + 1_000 else None
 
-    def _unseen(self, failure: Failure) -> str | None:
+    def _unseen(self, failure: JudgedFailure) -> str | None:
         """Nothing reports ArduCopter's pause, nor sticks that nudge it where it lands. PX4's pause ends a climb as the
         climb itself does, near the height of it.
         """
@@ -287,7 +287,7 @@ class Excuses:
                 return "unseen"
         return None
 
-    def _is_silent(self, failure: Failure) -> bool:
+    def _is_silent(self, failure: JudgedFailure) -> bool:
         """Whether what a pilot did to ArduCopter may not have shown. A pause on a leg does, once it stands, unless
         something else went wrong, or is at its end.
         """
@@ -350,7 +350,7 @@ class Excuses:
             if invocation.plan.kind == MotionKind.CLIMB:
                 yield invocation.plan.altitude
 
-    def _link(self, failure: Failure) -> str | None:
+    def _link(self, failure: JudgedFailure) -> str | None:
         """Nothing came from the vehicle, or got there, while something had to be done. When a permit's time is over, or
         a deadline, our own clock tells, whatever the link does.
         """
@@ -371,7 +371,7 @@ class Excuses:
                     return "link"
         return None
 
-    def _process(self, failure: Failure) -> str | None:
+    def _process(self, failure: JudgedFailure) -> str | None:
         """Nobody was there, or could do anything: dead, or held up, and no longer than a stop after that."""
         flown = self._flown
         if failure.slug == "not-ended":
@@ -391,7 +391,7 @@ class Excuses:
                 return "process"
         return None
 
-    def _obstacle(self, failure: Failure) -> str | None:
+    def _obstacle(self, failure: JudgedFailure) -> str | None:
         pillars = [fault for fault in self._before(failure.at_us, faults.Pillar) if isinstance(fault, faults.Pillar)]
         if not pillars:
             return None
@@ -429,7 +429,7 @@ class Excuses:
                 return sample.obstacle_mm
         return None
 
-    def _disk(self, failure: Failure) -> str | None:
+    def _disk(self, failure: JudgedFailure) -> str | None:
         if failure.slug == "log" and not failure.text.startswith("incomplete"):
             return None
         for fault in self._before(failure.at_us, faults.DiskFull, faults.DiskStall):
@@ -438,14 +438,14 @@ class Excuses:
                 return "disk"
         return None
 
-    def _boundary(self, failure: Failure) -> str | None:
+    def _boundary(self, failure: JudgedFailure) -> str | None:
         """A log whose boundary was lost in flight proves nothing from there on."""
         lost = failure.text.startswith("incomplete: boundary/lost") and any(
             self._before(failure.at_us, faults.BoundaryKilled)
         )
         return "boundary" if lost else None
 
-    def _killed(self, failure: Failure) -> str | None:
+    def _killed(self, failure: JudgedFailure) -> str | None:
         """What was sent in the last moment before a process died may not be written: a fallback waits for no record."""
         for life in self._flown.lives:
             if life.ending is None and 0 <= life.ended_us - failure.at_us <= _UNWRITTEN_US:
@@ -453,7 +453,7 @@ class Excuses:
         return None
 
 
-def _ends_us(happened: Happened) -> int:
+def _ends_us(happened: IncidentOccurrence) -> int:
     for_us = getattr(happened.fault, "for_us", None)
     if isinstance(happened.fault, faults.Reboot):
         return happened.at_us + 10_000_000

@@ -14,7 +14,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import Scenario
 
 
-class Sample(NamedTuple):
+class TruthSample(NamedTuple):
     """What really was at a moment, whatever the vehicle reported (`simulation.world.Truth`)."""
 
     at_us: int
@@ -36,7 +36,7 @@ class Sample(NamedTuple):
     """`pilot` or `failsafe`."""
 
 
-class Frame(NamedTuple):
+class SentFrame(NamedTuple):
     """A frame of ours: when it was sent, when it came to the vehicle, and when the autopilot got to it, to obey,
     answer or refuse it. None: it never did.
     """
@@ -47,7 +47,7 @@ class Frame(NamedTuple):
     obeyed_us: int | None = None
 
 
-class Happened(NamedTuple):
+class IncidentOccurrence(NamedTuple):
     """An incident of the scenario, by its number, that really came. `note`: what became of it, where that is told."""
 
     number: int
@@ -64,7 +64,7 @@ class Reaction(NamedTuple):
     acted_us: int
 
 
-class Heard(NamedTuple):
+class HeardReadings(NamedTuple):
     """What one frame told: when it was measured, on the clock of the logs, and (slot, value) of its signals."""
 
     measured_us: int
@@ -75,7 +75,7 @@ class Turn(NamedTuple):
     """A turn of the loop: when, and which values of signals it was given, in their order."""
 
     at_us: int
-    heard: tuple[Heard, ...]
+    heard: tuple[HeardReadings, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +122,9 @@ class ScenarioFlown:
     tick_us: int
     wait_us: int
     lives: tuple[Life, ...]
-    happened: tuple[Happened, ...]
-    samples: tuple[Sample, ...]
-    frames: tuple[Frame, ...]
+    happened: tuple[IncidentOccurrence, ...]
+    samples: tuple[TruthSample, ...]
+    frames: tuple[SentFrame, ...]
     """All that were sent, in their order."""
     ended_us: int
     """When the last process ended; what came after it, the vehicle did alone."""

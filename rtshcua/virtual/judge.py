@@ -36,9 +36,9 @@ from rtshcua.ground.audit.audit import Auditor
 from rtshcua.model.faults import FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.step_number import step_words
-from rtshcua.virtual.conduct import Conduct
-from rtshcua.virtual.excuses import Excuses, Failure
-from rtshcua.virtual.flown import Frame, Sample, ScenarioFlown, records_of
+from rtshcua.virtual.conduct import RuntimeChecks
+from rtshcua.virtual.excuses import Excuses, JudgedFailure
+from rtshcua.virtual.flown import ScenarioFlown, SentFrame, TruthSample, records_of
 from rtshcua.virtual.zone_truth import airspace_mm, in_force, is_timed, local_mm
 
 SLUGS: Final = (
@@ -73,8 +73,8 @@ class Margins:
 class Judgement:
     """What went wrong and should not have, what had to, and how near it was."""
 
-    failures: tuple[Failure, ...]
-    exceptions: tuple[Failure, ...]
+    failures: tuple[JudgedFailure, ...]
+    exceptions: tuple[JudgedFailure, ...]
     margins: Margins
 
 
@@ -88,7 +88,7 @@ def judge(flown: ScenarioFlown) -> Judgement:
     end, ended_us = _end(flown)
     found = [
         *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
-        *_unlogged(flown, motion), *_faults(flown), *Conduct(flown, motion).failures(),
+        *_unlogged(flown, motion), *_faults(flown), *RuntimeChecks(flown, motion).failures(),
     ]  # fmt: skip
     judged = [each if each.cause is not None else excuses.judged(each) for each in found]
     margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)
@@ -99,9 +99,9 @@ def judge(flown: ScenarioFlown) -> Judgement:
     )
 
 
-def _told(found: Sequence[Failure]) -> tuple[Failure, ...]:
+def _told(found: Sequence[JudgedFailure]) -> tuple[JudgedFailure, ...]:
     """The first and the worst of each slug and cause, in the order of time."""
-    chosen: set[Failure] = set()
+    chosen: set[JudgedFailure] = set()
     for slug, cause in {(each.slug, each.cause) for each in found}:
         alike = [each for each in found if (each.slug, each.cause) == (slug, cause)]
         chosen |= {min(alike, key=lambda each: each.at_us), max(alike, key=lambda each: each.amount)}
@@ -111,7 +111,7 @@ def _told(found: Sequence[Failure]) -> tuple[Failure, ...]:
 # ---------------------------------------------------------------- place
 
 
-def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
+def _fence(flown: ScenarioFlown) -> tuple[list[JudgedFailure], int | None]:
     """Where it left the airspace, the first time and farthest out; how far inside it always was.
 
     Between two places that are d apart the distance to an edge changes by d at most: what is far inside for sure is
@@ -122,7 +122,7 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
         return [], None
     timed = any(is_timed(flown.policy.zones[number]) for number in (*stated.inside, *stated.outside))
     there = in_force(flown.policy, flown.utc_us)
-    worst, found = inf, list[Failure]()
+    worst, found = inf, list[JudgedFailure]()
     x0 = y0 = up0 = 0.0
     known = -inf  # how far inside it was at x0, y0, up0
     for sample in flown.samples:
@@ -134,7 +134,9 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
             there, known = now, -inf
         if len(there.inside) < len(stated.inside):
             found.append(
-                Failure("outside-fence", sample.at_us, "it is in the air while a zone that it must keep is not there")
+                JudgedFailure(
+                    "outside-fence", sample.at_us, "it is in the air while a zone that it must keep is not there"
+                )
             )
             continue
         x, y = local_mm(flown.policy, sample.latitude, sample.longitude)
@@ -146,23 +148,23 @@ def _fence(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
         if known < 0:
             place = f"{x / 1000:.1f} m east and {y / 1000:.1f} m north of home, {up0 / 1000:.1f} m up"
             text = f"{-known / 1000:.2f} m outside the airspace: {place}"
-            found.append(Failure("outside-fence", sample.at_us, text, round(-known)))
+            found.append(JudgedFailure("outside-fence", sample.at_us, text, round(-known)))
     return found, None if worst == inf else round(worst)
 
 
-def _nearest(samples: Sequence[Sample]) -> int | None:
+def _nearest(samples: Sequence[TruthSample]) -> int | None:
     return min(
         (sample.obstacle_mm for sample in samples if sample.obstacle_mm is not None and sample.in_air), default=None
     )
 
 
-def _collision(flown: ScenarioFlown) -> list[Failure]:
+def _collision(flown: ScenarioFlown) -> list[JudgedFailure]:
     for before, sample in pairwise(flown.samples):
         if sample.crashed and not before.crashed:
             near = min((d for d in (before.obstacle_mm, sample.obstacle_mm) if d is not None), default=None)
             what = "came down too hard" if near is None or near > _TOUCHES_MM else "flew into something"
             return [
-                Failure(
+                JudgedFailure(
                     "collision", sample.at_us, f"it {what} at {before.speed_mm_s / 1000:.1f} m/s", before.speed_mm_s
                 )
             ]
@@ -175,7 +177,7 @@ _TOUCHES_MM: Final = 1_000
 # ---------------------------------------------------------------- the end
 
 
-def _end(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
+def _end(flown: ScenarioFlown) -> tuple[list[JudgedFailure], int | None]:
     samples = flown.samples
     if not samples:
         return [], None
@@ -187,21 +189,23 @@ def _end(flown: ScenarioFlown) -> tuple[list[Failure], int | None]:
     where = f"{last.up_mm / 1000:.1f} m up in {last.mode}, at {last.speed_mm_s / 1000:.1f} m/s"
     if flown.ending == "completed":
         return [
-            Failure("not-ended", last.at_us, f"the run says that it completed the mission, and it flies {where}")
+            JudgedFailure("not-ended", last.at_us, f"the run says that it completed the mission, and it flies {where}")
         ], ended_us
     if flown.left == "replayed":
-        return [Failure("not-ended", last.at_us, f"no run began, for it was on the ground; it flies {where}")], ended_us
+        return [
+            JudgedFailure("not-ended", last.at_us, f"no run began, for it was on the ground; it flies {where}")
+        ], ended_us
     if any(not _is_still(each) for each in samples if each.at_us > last.at_us - STILL_US):
-        return [Failure("not-ended", last.at_us, f"it flies on {where}", last.speed_mm_s)], ended_us
+        return [JudgedFailure("not-ended", last.at_us, f"it flies on {where}", last.speed_mm_s)], ended_us
     return [], ended_us
 
 
-def _is_still(sample: Sample) -> bool:
+def _is_still(sample: TruthSample) -> bool:
     return sample.speed_mm_s <= STILL_MM_S and abs(sample.climb_mm_s) <= LEVEL_MM_S
 
 
-def _faults(flown: ScenarioFlown) -> list[Failure]:
-    return [] if flown.fault is None else [Failure("fault", flown.ended_us, flown.fault)]
+def _faults(flown: ScenarioFlown) -> list[JudgedFailure]:
+    return [] if flown.fault is None else [JudgedFailure("fault", flown.ended_us, flown.fault)]
 
 
 # ---------------------------------------------------------------- frames
@@ -282,7 +286,7 @@ def _moves(message: Any, name: str, flavour: str) -> frozenset[MotionKind] | Non
     return None if message.command in _ASKS else frozenset()
 
 
-Obeyed = tuple[Frame, frozenset[MotionKind]]
+Obeyed = tuple[SentFrame, frozenset[MotionKind]]
 Motion = Sequence[Obeyed]
 """Frames that move the vehicle, in the order in which they were sent, and what each can be a part of."""
 
@@ -295,7 +299,7 @@ def _motion(flown: ScenarioFlown) -> Motion:
 # ---------------------------------------------------------------- somebody took over
 
 
-def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[Failure], int | None]:
+def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[JudgedFailure], int | None]:
     """Frames that left later than W after a takeover took effect.
 
     One that was on its way then undoes the takeover. Where nothing of that shows, ours counts (docs/adr/0034): what
@@ -304,7 +308,7 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
     arrived.
     """
     times = [sample.at_us for sample in flown.samples]
-    found, latest, crossed = list[Failure](), None, False
+    found, latest, crossed = list[JudgedFailure](), None, False
     for frame, kinds, since_us, last, met in _after_takeovers(flown, motion, times):
         crossed = crossed or met
         after_us = frame.sent_us - since_us
@@ -319,13 +323,13 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         as_lost = _flies_as_lost(flown, motion, times, since_us, max(since_us, frame.sent_us - within_us))
         cause = "crossed" if crossed else "unseen" if stood or as_lost else "ground" if lands else None
         crossed = crossed or (as_lost and frame.heard_us is not None)
-        found.append(Failure("motion-after-takeover", frame.sent_us, text, after_us, cause))
+        found.append(JudgedFailure("motion-after-takeover", frame.sent_us, text, after_us, cause))
     return found, latest
 
 
 def _after_takeovers(
     flown: ScenarioFlown, motion: Motion, times: Sequence[int]
-) -> Iterator[tuple[Frame, frozenset[MotionKind], int, Obeyed | None, bool]]:
+) -> Iterator[tuple[SentFrame, frozenset[MotionKind], int, Obeyed | None, bool]]:
     """Frames that came after somebody took over, since when he flies it, our last frame that was obeyed before, and
     whether one of ours came at the very moment of a takeover.
     """
@@ -354,7 +358,7 @@ def _obeyed(motion: Motion, by_us: int) -> Obeyed | None:
     return next((each for each in reversed(motion) if each[0].heard_us is not None and each[0].heard_us <= by_us), None)
 
 
-def _ends_at(last: Obeyed | None, sample: Sample) -> bool:
+def _ends_at(last: Obeyed | None, sample: TruthSample) -> bool:
     """Whether a pause there ends what it was told where that ends: to stop, to climb, or a leg, whose end is no farther
     ahead than PX4 says that it will stop.
     """
@@ -373,7 +377,7 @@ def _ends_at(last: Obeyed | None, sample: Sample) -> bool:
     return abs(left - ahead) <= _SAME_MM
 
 
-def _stops(last: Obeyed | None, then: Sample, samples: Sequence[Sample], times: Sequence[int]) -> bool:
+def _stops(last: Obeyed | None, then: TruthSample, samples: Sequence[TruthSample], times: Sequence[int]) -> bool:
     """Whether it slows down then, since we told it to stop."""
     if last is None or last[1] != {MotionKind.HOLD} or last[0].heard_us is None:
         return False
@@ -381,7 +385,7 @@ def _stops(last: Obeyed | None, then: Sample, samples: Sequence[Sample], times: 
     return then is told or _fast_mm_s(then) < _fast_mm_s(told)
 
 
-def _fast_mm_s(sample: Sample) -> float:
+def _fast_mm_s(sample: TruthSample) -> float:
     return hypot(sample.speed_mm_s, sample.climb_mm_s)
 
 
@@ -398,7 +402,7 @@ def _flies_as_lost(flown: ScenarioFlown, motion: Motion, times: Sequence[int], f
     return True
 
 
-def _lost_mode(frame: Frame, flavour: str) -> FlightMode | None:
+def _lost_mode(frame: SentFrame, flavour: str) -> FlightMode | None:
     """The mode that a lost frame asked for, where that mode reports no target, which would tell who chose it."""
     if frame.heard_us is not None:
         return None
@@ -408,7 +412,7 @@ def _lost_mode(frame: Frame, flavour: str) -> FlightMode | None:
     return _NO_TARGET[flavour].get((int(message.param2), int(message.param3)))
 
 
-def _name(frame: Frame) -> str:
+def _name(frame: SentFrame) -> str:
     message = dialect.MAVLink(None).decode(bytearray(frame.octets))
     number = getattr(message, "command", None)
     known = dialect.enums["MAV_CMD"].get(number) if number is not None else None
@@ -418,12 +422,12 @@ def _name(frame: Frame) -> str:
 # ---------------------------------------------------------------- in time
 
 
-def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[Failure], int | None]:
+def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[JudgedFailure], int | None]:
     """From what a fallback follows from to its first frame: a turn of the loop, and what the mode's report takes, which
     the autopilot may be slow to give.
     """
     sent = [frame.sent_us for frame, _ in motion]
-    found, latest = list[Failure](), None
+    found, latest = list[JudgedFailure](), None
     within_us = flown.wait_us + 2 * flown.tick_us
     for life in flown.lives:
         ends = (*(each.acted_us for each in life.reactions[1:]), life.ended_us + 1)
@@ -438,11 +442,11 @@ def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
                 text = (
                     f"a fallback took {took_us / 1e6:.3f} s to its first frame; {within_us / 1e6:.3f} s are the bound"
                 )
-                found.append(Failure("late", first_us, text, took_us))
+                found.append(JudgedFailure("late", first_us, text, took_us))
     return found, latest
 
 
-def _slow_mode_us(frames: Sequence[Frame], from_us: int) -> int:
+def _slow_mode_us(frames: Sequence[SentFrame], from_us: int) -> int:
     """How long the autopilot, from then on, has the question for its mode that it answers next."""
     for frame in frames:
         if frame.heard_us is not None and (frame.obeyed_us or 0) > from_us and _asks_for_mode(frame.octets):
@@ -455,7 +459,7 @@ def _asks_for_mode(octets: bytes) -> bool:
     return getattr(message, "command", None) == _REQUEST_MESSAGE and message.param1 == _HEARTBEAT
 
 
-def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
+def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[JudgedFailure]:
     """The first frame of a command leaves within its permit's time, a step's within its deadline."""
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
@@ -483,26 +487,26 @@ def _decided(records: Sequence[dict[str, Any]]) -> Iterator[tuple[dict[str, Any]
             yield decided.pop(ref), record
 
 
-def _in_time(flown: ScenarioFlown, first: Frame, decision: dict[str, Any]) -> Iterator[Failure]:
+def _in_time(flown: ScenarioFlown, first: SentFrame, decision: dict[str, Any]) -> Iterator[JudgedFailure]:
     if decision["at_us"] > first.sent_us + flown.start_us:
         return
     after_us = first.sent_us - (decision["valid_until_us"] - flown.start_us)
     if after_us > 0:
         text = f"{_name(first)} was sent {after_us / 1e6:.3f} s after its permit's time was over"
-        yield Failure("late", first.sent_us, text, after_us)
+        yield JudgedFailure("late", first.sent_us, text, after_us)
     if decision["kind"] == 0:
         contract = flown.mission.invocations[decision["step"]].contract
         released_us = max([decision["context"]["released_us"], *(each[3] for each in decision["context"]["approvals"])])
         after_us = first.sent_us + flown.start_us - released_us - contract.deadline_us
         if after_us > 0:
             text = f"{step_words(decision['step'])} began {after_us / 1e6:.3f} s after its deadline"
-            yield Failure("late", first.sent_us, text, after_us)
+            yield JudgedFailure("late", first.sent_us, text, after_us)
 
 
 # ---------------------------------------------------------------- logs
 
 
-def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
+def _logs(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
     for life in flown.lives:
         if life.ending is None and not any(line.endswith(b"\n") for line in life.lines):
             continue  # it died before it had begun a log; whatever it sent all the same is an unlogged effect
@@ -516,13 +520,15 @@ def _logs(flown: ScenarioFlown) -> Iterator[Failure]:
         if report.failure is None:
             missing = report.shortfall
             text = "" if missing is None else f"{missing.slug}: {missing.text}"
-            yield Failure("log", life.ended_us, f"incomplete: {text}")
+            yield JudgedFailure("log", life.ended_us, f"incomplete: {text}")
             continue
         auditor = Auditor(flown.root, derive=False)
         for line in life.lines:
             auditor.take(line)
         slug = "derive" if auditor.audit().report.failure is None else "log"
-        yield Failure(slug, at_us, f"record {report.failure.record}: {report.failure.slug}: {report.failure.text}")
+        yield JudgedFailure(
+            slug, at_us, f"record {report.failure.record}: {report.failure.slug}: {report.failure.text}"
+        )
 
 
 class _Sent(NamedTuple):
@@ -534,7 +540,7 @@ class _Sent(NamedTuple):
     over: str
 
 
-def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
+def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[JudgedFailure]:
     """Frames that carry out no command that a log had at that time: its last command is of another kind, or over."""
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
@@ -545,10 +551,10 @@ def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[Failure]:
                     frame.sent_us, [each for each in commands if each.at_us <= frame.sent_us], parts, kinds
                 )
                 if why:
-                    yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent{why}")
+                    yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent{why}")
     for frame, _ in motion:
         if not any(life.began_us <= frame.sent_us <= life.ended_us for life in flown.lives):
-            yield Failure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")
+            yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")
 
 
 def _commands(records: Sequence[dict[str, Any]], start_us: int) -> Iterator[_Sent]:

@@ -23,7 +23,7 @@ from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy, Rule, RuleKi
 from rtshcua.model.flat.signal import DRAIN, NUMBER, POSITION
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zone
-from rtshcua.virtual.flown import Heard, Turn
+from rtshcua.virtual.flown import HeardReadings, Turn
 from rtshcua.virtual.zone_truth import Answers as Truths
 from rtshcua.virtual.zone_truth import Edge, apart_mm, both, daily, edges, exists, is_timed, level_mm, shown
 
@@ -156,7 +156,7 @@ class HeardState:
         self._histories = [TruthHistory(monitor) for monitor in policy.monitors]
         self._says: list[bool | None] = [None] * len(policy.monitors)
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, heard: HeardReadings) -> None:
         """Take over what one frame told, but for what is older than what is known."""
         for slot, value in heard.values:
             before_us = self._measured_us[slot]
@@ -164,7 +164,7 @@ class HeardState:
                 self._measured_us[slot], self._values[slot] = heard.measured_us, value
                 self._new.add(slot)
 
-    def hides(self, heard: Heard) -> bool:
+    def hides(self, heard: HeardReadings) -> bool:
         """Whether this replaces a value that nobody looked at."""
         return any(slot in self._new for slot, _ in heard.values)
 

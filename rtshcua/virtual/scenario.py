@@ -33,7 +33,16 @@ from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 from rtshcua.virtual.fitting import fitting, with_room
 from rtshcua.virtual.flight import MemorySink, VirtualFlight, claimed
-from rtshcua.virtual.flown import Frame, Happened, Heard, Life, Reaction, Sample, ScenarioFlown, Turn
+from rtshcua.virtual.flown import (
+    HeardReadings,
+    IncidentOccurrence,
+    Life,
+    Reaction,
+    ScenarioFlown,
+    SentFrame,
+    TruthSample,
+    Turn,
+)
 from rtshcua.virtual.triggers import Due, Triggers
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from rtshcua.wire import cose
@@ -132,8 +141,8 @@ class _Watched(Simulation):
 
     def __init__(self, config: SimulationConfig) -> None:
         super().__init__(config)
-        self.samples: list[Sample] = []
-        self.frames: list[Frame] = []
+        self.samples: list[TruthSample] = []
+        self.frames: list[SentFrame] = []
         self._sent: dict[bytes, int] = {}  # the number of the last frame of these octets
         self._come: dict[bytes, int] = {}  # and of what the autopilot has not got to
         self._due_us = 0
@@ -142,7 +151,7 @@ class _Watched(Simulation):
     def send(self, frame: bytes) -> bool:
         """Note that a frame is sent; that none is lost by us."""
         self._sent[frame] = len(self.frames)
-        self.frames.append(Frame(self._now_us, None, frame))
+        self.frames.append(SentFrame(self._now_us, None, frame))
         return False
 
     def _hear(self, at_us: int, frame: bytes) -> None:
@@ -171,7 +180,7 @@ class _Watched(Simulation):
         self._due_us = self._now_us + SAMPLE_US
         truth = self.truth()
         self.samples.append(
-            Sample(
+            TruthSample(
                 self._now_us, truth.latitude, truth.longitude, truth.up_mm, truth.speed_mm_s, truth.climb_mm_s,
                 truth.armed, truth.in_air, truth.crashed, truth.mode, truth.battery,
                 truth.distance_to_obstacle_mm,
@@ -195,7 +204,7 @@ class _Flight:
         self._full_until_us: int | None = 0  # None: for good
         self._slow_until_us = 0
         self._lives: list[Life] = []
-        self._happened: list[Happened] = []
+        self._happened: list[IncidentOccurrence] = []
         self._notes: list[str] = []
         self._triggers = Triggers(scenario, seed)
         self._agenda: list[tuple[int, int]] = []  # when, and the number of what happens to host or documents
@@ -254,7 +263,7 @@ class _Flight:
             else:
                 fault = replace(incident.fault, at_us=at_us)
                 self._world.inject(fault)
-                self._happened.append(Happened(number, at_us, fault, incident.text))
+                self._happened.append(IncidentOccurrence(number, at_us, fault, incident.text))
 
     def _begin_life(self, flight: VirtualFlight) -> None:
         self._flight = flight
@@ -273,7 +282,7 @@ class _Flight:
     def _stepped(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
         """What a turn of the loop did."""
         at_us = self._flight.clock.elapsed_us
-        heard = tuple([Heard(event.at_us, event.values) for event in events if isinstance(event, Readings)])
+        heard = tuple([HeardReadings(event.at_us, event.values) for event in events if isinstance(event, Readings)])
         self._turns.append(Turn(now.monotonic_us - START.monotonic_us, heard))
         for action in actions:
             if isinstance(action, Command) and not action.needs_record:
@@ -351,7 +360,7 @@ class _Flight:
             _, number = heappop(self._agenda)
             incident = self._scenario.incidents[number]
             fault = replace(incident.fault, at_us=clock.elapsed_us)
-            happened = Happened(number, clock.elapsed_us, fault, incident.text)
+            happened = IncidentOccurrence(number, clock.elapsed_us, fault, incident.text)
             self._happened.append(happened)
             if isinstance(fault, AgentFault):
                 documents = list(self._documents(number, fault))
@@ -451,7 +460,7 @@ class _Flight:
             incident = self._scenario.incidents[number]
             fault = replace(incident.fault, at_us=at_us)
             if isinstance(fault, faults.DiskFull | faults.DiskStall | faults.ClockStep):
-                self._happened.append(Happened(number, at_us, fault, incident.text))
+                self._happened.append(IncidentOccurrence(number, at_us, fault, incident.text))
                 self._hurt(fault)
         self._babble = []
 

@@ -8,9 +8,9 @@ from typing import Final
 
 from campaign.wrong import BY_NAME, Aimed
 from rtshcua.app.programs import compile_sources
-from rtshcua.campaign.drawing import FLAVOURS, Space, Tally, draw
-from rtshcua.campaign.flights import Field, Flight, moments
-from rtshcua.campaign.results import Failed, Result
+from rtshcua.campaign.drawing import FLAVOURS, CampaignTally, FaultSpace, draw
+from rtshcua.campaign.flights import CampaignFlight, FlownMission, moments
+from rtshcua.campaign.results import CampaignResult, JudgeFinding
 from rtshcua.model.faults import KINDS
 from rtshcua.model.scenario import Scenario, Start
 from rtshcua.virtual.flown import ScenarioFlown
@@ -21,7 +21,7 @@ _COMPILED, _ = compile_sources([Path(__file__).with_name("field.rts")], mission=
 assert _COMPILED.policy is not None, _COMPILED.diagnostics
 assert _COMPILED.mission is not None
 POLICY, MISSION = _COMPILED.policy, _COMPILED.mission
-FIELD: Final = Field.of(POLICY, MISSION, ISSUED_US)
+FIELD: Final = FlownMission.of(POLICY, MISSION, ISSUED_US)
 SKILLS: Final = tuple(POLICY.contracts[each.skill].name for each in MISSION.invocations)
 #: us: how long a calm flight takes
 LASTS_US: Final = {"px4": 76_650_000, "ardupilot": 77_700_000}
@@ -31,8 +31,8 @@ LASTS_US: Final = {"px4": 76_650_000, "ardupilot": 77_700_000}
 class Right:
     """A flight by the right runtime, and its log."""
 
-    flight: Flight
-    result: Result
+    flight: CampaignFlight
+    result: CampaignResult
     log: bytes
 
     def shows(self, words: Sequence[bytes]) -> bool:
@@ -41,20 +41,20 @@ class Right:
 
 
 @cache
-def space(aimed: Aimed | None = None) -> Space:
+def space(aimed: Aimed | None = None) -> FaultSpace:
     """What is drawn from."""
     roles = sorted({POLICY.roles[rule.approver] for rule in POLICY.rules if rule.approver >= 0})
     read = sorted({source.message for signal in POLICY.signals for source in signal.sources})
-    drawn_from = Space(SKILLS, LASTS_US, tuple(roles), FLAVOURS, read=tuple(read))
+    drawn_from = FaultSpace(SKILLS, LASTS_US, tuple(roles), FLAVOURS, read=tuple(read))
     if aimed is None:
         return drawn_from
     return replace(drawn_from, kinds=frozenset(KINDS[kind] for kind in aimed.kinds), flavours=aimed.flavours)
 
 
-def flight_of(seed: int, number: int, drawn_from: Space, known: Tally) -> Flight:
+def flight_of(seed: int, number: int, drawn_from: FaultSpace, known: CampaignTally) -> CampaignFlight:
     """A flight of a campaign."""
     made = draw(seed, number, drawn_from, known)
-    return Flight(number, made.scenario, made.tries)
+    return CampaignFlight(number, made.scenario, made.tries)
 
 
 def calm(flavour: str) -> Scenario:
@@ -67,18 +67,18 @@ def flown(scenario: Scenario) -> ScenarioFlown:
     return FIELD.flown(scenario, scenario.flavours[0], scenario.first_seed)
 
 
-def right(flight: Flight) -> Right:
+def right(flight: CampaignFlight) -> Right:
     """By the right runtime."""
     return judged(flight, flown(flight.scenario))
 
 
-def judged(flight: Flight, was: ScenarioFlown) -> Right:
+def judged(flight: CampaignFlight, was: ScenarioFlown) -> Right:
     """What came of it."""
     verdict = judge(was)
-    result = Result(
+    result = CampaignResult(
         flight.number, was.flavour, was.seed, tuple(each.text for each in flight.scenario.incidents), flight.tries,
-        was.ending or "none", tuple(Failed(each.slug, each.text, each.at_us) for each in verdict.failures),
-        tuple(Failed(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
+        was.ending or "none", tuple(JudgeFinding(each.slug, each.text, each.at_us) for each in verdict.failures),
+        tuple(JudgeFinding(each.slug, each.text, each.at_us, each.cause or "") for each in verdict.exceptions),
         {name: value for name, value in asdict(verdict.margins).items() if value is not None}, tuple(moments(was)),
         was.samples[-1].at_us, "",
     )  # fmt: skip
@@ -91,6 +91,6 @@ def wrongly(name: str, scenario: Scenario) -> ScenarioFlown:
         return flown(scenario)
 
 
-def wrong_fails(name: str, flight: Flight) -> tuple[str, ...]:
+def wrong_fails(name: str, flight: CampaignFlight) -> tuple[str, ...]:
     """The slugs of its failures."""
     return tuple(dict.fromkeys(each.slug for each in judge(wrongly(name, flight.scenario)).failures))

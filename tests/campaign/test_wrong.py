@@ -4,7 +4,7 @@ import pytest
 
 from campaign.flying import SKILLS, calm, flight_of, flown, right, space, wrong_fails, wrongly
 from campaign.wrong import BY_NAME, WRONG
-from rtshcua.campaign.drawing import Tally
+from rtshcua.campaign.drawing import CampaignTally
 from rtshcua.campaign.written import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Direction, Fault, FlightMode
@@ -114,7 +114,9 @@ def test_the_right_runtime_does_not_fail_there(name: str) -> None:
 @pytest.mark.soak
 @pytest.mark.parametrize(("name", "number"), [("restart-over-pilot", 4), ("mode-not-asked", 214)])
 def test_a_campaign_that_is_aimed_at_it_finds_it(name: str, number: int) -> None:
-    flight = flight_of(1, number - 1, space(BY_NAME[name].aimed), Tally())  # of the first round, which knows nothing
+    flight = flight_of(
+        1, number - 1, space(BY_NAME[name].aimed), CampaignTally()
+    )  # of the first round, which knows nothing
     assert wrong_fails(name, flight)
     assert right(flight).result.failures == ()
 

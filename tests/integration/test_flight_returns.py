@@ -12,7 +12,7 @@ from rtshcua.model import faults
 from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.scenario import AfterStep
 from rtshcua.onboard.ports import Ending
-from rtshcua.virtual.flown import Sample, ScenarioFlown
+from rtshcua.virtual.flown import ScenarioFlown, TruthSample
 from rtshcua.virtual.judge import judge
 from rtshcua.virtual.zone_truth import local_mm
 from virtual import case
@@ -83,10 +83,10 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return sealed(Path(source))
 
 
-def away(of: ScenarioFlown) -> Callable[[Sample], float]:
+def away(of: ScenarioFlown) -> Callable[[TruthSample], float]:
     """How far from the middle of the tower it was, on the plane, metres."""
 
-    def metres(sample: Sample) -> float:
+    def metres(sample: TruthSample) -> float:
         x, y = local_mm(of.policy, sample.latitude, sample.longitude)
         return hypot(x / M, y / M - NORTH)
 

@@ -8,7 +8,7 @@ import pytest
 
 from rtshcua.app.programs import read_sources
 from rtshcua.app.testing.run import ISSUED_AT_US
-from rtshcua.campaign.flights import Field
+from rtshcua.campaign.flights import FlownMission
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.front.cli import app
 from rtshcua.front.cli.table import COMMANDS
@@ -69,7 +69,7 @@ def test_it_flies_as_its_scenarios_say(farm: Path, name: str, flavour: str) -> N
     policy, start = chosen.policy.lowered.policy, chosen.scenario.start
     assert start.utc_us is not None
     mission = development.flies_at(chosen.mission, start.utc_us)
-    was = Field.of(policy, mission, mission.issued_at_us).flown(chosen.scenario, flavour, 1)
+    was = FlownMission.of(policy, mission, mission.issued_at_us).flown(chosen.scenario, flavour, 1)
     verdict = judge(was)
     assert verdict.failures == ()
     assert [each.found for each in expectations(was, verdict) if not each.met] == []

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from typing import Final
 
-from rtshcua.campaign.flights import Field
-from rtshcua.campaign.trying import Trial, tries
-from rtshcua.campaign.workers import Here, Processes, Workers, cores
+from rtshcua.campaign.flights import FlownMission
+from rtshcua.campaign.trying import ScenarioTrial, tries
+from rtshcua.campaign.workers import Here, WorkerProcesses, FlightWorkers, cores
 from rtshcua.ground.testing.reporting import FlightResult, ScenarioResult, findings
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.virtual import development
@@ -24,7 +24,7 @@ class Flying:
     def __init__(self, *, with_coverage: bool, say: Callable[[str], None]) -> None:
         self._with_coverage = with_coverage
         self._say = say
-        self._workers: Workers | None = None
+        self._workers: FlightWorkers | None = None
 
     def fly(self, scenarios: Sequence[ScenarioFlight]) -> Iterator[ScenarioResult]:
         """Fly all of them, in their order."""
@@ -42,13 +42,13 @@ class Flying:
         policy, mission, start = scenario.policy.lowered.policy, scenario.mission, scenario.scenario.start
         if start.utc_us is not None:
             mission = development.flies_at(mission, start.utc_us)
-        field = Field.of(policy, mission, mission.issued_at_us)
+        field = FlownMission.of(policy, mission, mission.issued_at_us)
         wanted = list(tries(scenario.scenario))
-        workers: Workers = Here()
+        workers: FlightWorkers = Here()
         if len(wanted) >= _FEW and cores() > 1:
-            workers = self._workers = self._workers or Processes()
+            workers = self._workers = self._workers or WorkerProcesses()
         flown: list[FlightResult] = []
-        for each in workers.fly(Trial(field, self._with_coverage), wanted):
+        for each in workers.fly(ScenarioTrial(field, self._with_coverage), wanted):
             flown.append(each)
             self._say(f"{scenario.scenario.name}: {len(flown)} of {len(wanted)} flights")
         self._say("")

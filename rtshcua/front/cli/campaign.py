@@ -17,15 +17,14 @@ from rtshcua import __version__, library
 from rtshcua.app.exit_codes import exit_code, words_of
 from rtshcua.app.programs import compile_sources, no_source
 from rtshcua.app.wording import moment
-from rtshcua.campaign import campaign as flying
-from rtshcua.campaign.campaign import Order
-from rtshcua.campaign.drawing import FLAVOURS, Space, answers_of
-from rtshcua.campaign.flights import Field, Flight
-from rtshcua.campaign.folder import Folder, Identity
-from rtshcua.campaign.results import Result
+from rtshcua.campaign.campaign import CampaignOrder, drawn, fly_rounds
+from rtshcua.campaign.drawing import FLAVOURS, FaultSpace, answers_of
+from rtshcua.campaign.flights import CampaignFlight, FlownMission
+from rtshcua.campaign.folder import CampaignFolder, CampaignIdentity
+from rtshcua.campaign.results import CampaignResult
 from rtshcua.campaign.shrinking import shrink
-from rtshcua.campaign.summary import Summary, as_json, summarise
-from rtshcua.campaign.workers import Cluster, Here, Processes, Workers, cores
+from rtshcua.campaign.summary import CampaignSummary, as_json, summarise
+from rtshcua.campaign.workers import DaskWorkers, FlightWorkers, Here, WorkerProcesses, cores
 from rtshcua.campaign.written import scenario_text
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -97,7 +96,7 @@ def campaign(
     if misused is not None:
         return findings.end(misused)
     flavours = tuple(dict.fromkeys(str(each) for each in flavour or ())) or FLAVOURS
-    folder = Folder(output or Path("runs") / f"campaign-{mission or source.stem}-{seed}")
+    folder = CampaignFolder(output or Path("runs") / f"campaign-{mission or source.stem}-{seed}")
     begun = folder.identity()
     if isinstance(begun, Refusal):
         return findings.end(begun)
@@ -105,8 +104,8 @@ def campaign(
     compiled, sources = compile_sources([source, *(with_ or ())], mission=mission, issued_at_us=issued_us)
     if findings.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
-    field = Field.of(compiled.policy, compiled.mission, issued_us)
-    identity = Identity(
+    field = FlownMission.of(compiled.policy, compiled.mission, issued_us)
+    identity = CampaignIdentity(
         compiled.mission.name, issued_us, sha256(field.bundle).hexdigest(), seed, flavours,
         tuple(sorted(kind.__name__ for kind in kinds)), __version__, approve,
     )  # fmt: skip
@@ -119,7 +118,9 @@ def campaign(
         return findings.end(space)
     stop = StopRequest()
     try:
-        workers: Workers = Cluster(cluster, stop.look) if cluster is not None else _here(jobs or cores(), stop)
+        workers: FlightWorkers = (
+            DaskWorkers(cluster, stop.look) if cluster is not None else _here(jobs or cores(), stop)
+        )
     except ImportError:
         help = "install it with the extra: `pip install 'rtshcua[cluster]'`"
         return findings.refuse(ExitCode.USAGE, "usage", "`--cluster` needs Dask, which is not installed", help)
@@ -129,12 +130,12 @@ def campaign(
                 folder.begin(identity)
             except OSError as error:
                 return findings.refuse(ExitCode.FULL, "io", f"cannot write to `{folder.path}`: {words_of(error)}")
-        order = Order(seed, flights, space)
+        order = CampaignOrder(seed, flights, space)
         past = folder.past()
         progress = _Progress(flights, sum(number < flights for number in past), quiet=as_json_, stop=stop)
         progress.begun(folder)
         try:
-            flying.fly(order, field, workers, past, lambda result: progress.flown(result, folder))
+            fly_rounds(order, field, workers, past, lambda result: progress.flown(result, folder))
             wanted = {number: past[number] for number in range(flights)}
             if not quickly:
                 folder.tell(_summary(identity, past, folder))
@@ -162,8 +163,8 @@ def _misused(source: Path, cluster: str | None, jobs: int | None) -> Refusal | N
     return no_source(source)
 
 
-def _here(jobs: int, stop: StopRequest) -> Workers:
-    return Here() if jobs == 1 else Processes(jobs, stop.look)
+def _here(jobs: int, stop: StopRequest) -> FlightWorkers:
+    return Here() if jobs == 1 else WorkerProcesses(jobs, stop.look)
 
 
 def _kinds(names: Sequence[str]) -> frozenset[type] | Refusal:
@@ -175,7 +176,7 @@ def _kinds(names: Sequence[str]) -> frozenset[type] | Refusal:
     return frozenset(KINDS[name.replace("_", "-")] for name in names) or frozenset(KINDS.values())
 
 
-def _other(folder: Folder, begun: Identity, asked: Identity) -> Refusal:
+def _other(folder: CampaignFolder, begun: CampaignIdentity, asked: CampaignIdentity) -> Refusal:
     words = {
         "bundle": "another bundle (its sources changed)",
         "flavours": "other kinds of autopilots",
@@ -184,22 +185,27 @@ def _other(folder: Folder, begun: Identity, asked: Identity) -> Refusal:
         "issued_at_us": "another time of issue",
         "approved": "another choice of `--approve`",
     }
-    differ = [name for name in Identity.__struct_fields__ if getattr(begun, name) != getattr(asked, name)]
+    differ = [name for name in CampaignIdentity.__struct_fields__ if getattr(begun, name) != getattr(asked, name)]
     what = " and ".join(words.get(name, f"another {name}") for name in differ)
     help = "give another folder with `-o`, or take this one away"
     return Refusal("usage", f"`{folder.path}` holds a campaign with {what}", help)
 
 
 def _space(
-    field: Field, policy: Policy, mission: Mission, flavours: tuple[str, ...], kinds: frozenset[type], approve: bool
-) -> Space | Refusal:
+    field: FlownMission,
+    policy: Policy,
+    mission: Mission,
+    flavours: tuple[str, ...],
+    kinds: frozenset[type],
+    approve: bool,
+) -> FaultSpace | Refusal:
     """What is drawn from: how long the mission takes where nothing goes wrong, on each kind of autopilot."""
     lasts = {}
     roles = sorted({policy.roles[role] for rule in policy.rules for role in (rule.approver, rule.second) if role >= 0})
     asked = tuple(answers_of(policy, mission))
     answers = asked if approve else ()
     for each in flavours:
-        calm = field.fly(Flight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), answers, ())))
+        calm = field.fly(CampaignFlight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), answers, ())))
         wrong = f"fails even if nothing goes wrong: {calm.failures[0].text}" if calm.failures else None
         if wrong is None and calm.ending != Ending.COMPLETED:
             wrong = f"ends as `{calm.ending}` even if nothing goes wrong"
@@ -211,10 +217,10 @@ def _space(
         lasts[each] = calm.flown_us
     skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
     read = sorted({source.message for signal in policy.signals for source in signal.sources})
-    return Space(skills, lasts, tuple(roles), flavours, kinds, tuple(read), answers)
+    return FaultSpace(skills, lasts, tuple(roles), flavours, kinds, tuple(read), answers)
 
 
-def _imported(source: Path, folder: Folder) -> str:
+def _imported(source: Path, folder: CampaignFolder) -> str:
     """How a scenario in the folder imports the mission."""
     shipped = library.root().resolve()
     path = source.resolve()
@@ -224,8 +230,9 @@ def _imported(source: Path, folder: Folder) -> str:
 
 
 def _shrink(
-    order: Order, field: Field, wanted: Mapping[int, Result], past: Mapping[int, Result], folder: Folder,
-    identity: Identity, imported: str, progress: "_Progress",
+    order: CampaignOrder, field: FlownMission, wanted: Mapping[int, CampaignResult], past: Mapping[int, CampaignResult],
+    folder: CampaignFolder,
+    identity: CampaignIdentity, imported: str, progress: "_Progress",
 ) -> None:  # fmt: skip
     """Keep the smallest flight of each failure as a scenario, if none is kept yet."""
     first: dict[str, int] = {}
@@ -235,11 +242,11 @@ def _shrink(
     for slug, number in list(first.items())[:_SHRUNK]:
         if folder.scenario(slug).exists():
             continue
-        scenario = flying.drawn(order, number, past).scenario
+        scenario = drawn(order, number, past).scenario
 
         def still(candidate: Scenario, slug: str = slug, number: int = number) -> bool:
             progress.shrinks(slug)
-            return any(each.slug == slug for each in field.fly(Flight(number, candidate)).failures)
+            return any(each.slug == slug for each in field.fly(CampaignFlight(number, candidate)).failures)
 
         small, _ = shrink(scenario, order.space.skills, still)
         small = replace(small, start=replace(small.start, utc_us=identity.issued_at_us + LATER_US))
@@ -249,14 +256,14 @@ def _shrink(
     progress.clear()
 
 
-def _summary(identity: Identity, past: Mapping[int, Result], folder: Folder) -> Summary:
+def _summary(identity: CampaignIdentity, past: Mapping[int, CampaignResult], folder: CampaignFolder) -> CampaignSummary:
     """Of all that the folder has, also where fewer are asked for this time."""
     slugs = {failed.slug for result in past.values() for failed in result.failures}
     kept = {slug: f"failures/{slug}.rts" for slug in slugs if folder.scenario(slug).exists()}
     return summarise(identity.mission, identity.seed, past, kept)
 
 
-def _told(summary: Summary, folder: Folder) -> list[str]:
+def _told(summary: CampaignSummary, folder: CampaignFolder) -> list[str]:
     hours = summary.took_us / 3_600_000_000
     lines = []
     for each in summary.failures:
@@ -294,12 +301,12 @@ class _Progress:
         self._shows = not self.quiet and sys.stderr is not None
         self._changes = self._shows and sys.stderr.isatty()
 
-    def begun(self, folder: Folder) -> None:
+    def begun(self, folder: CampaignFolder) -> None:
         """What was flown before is told."""
         if self._shows and 0 < self.before < self.flights:
             say(f"{self.before} of {self.flights} flights are kept in `{folder.path}`: it goes on behind them")
 
-    def flown(self, result: Result, folder: Folder) -> None:
+    def flown(self, result: CampaignResult, folder: CampaignFolder) -> None:
         """A flight is over; it is kept. Raises Stopped."""
         folder.keep(result)
         self.done += 1

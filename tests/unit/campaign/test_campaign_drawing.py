@@ -3,16 +3,16 @@
 from collections import Counter
 from dataclasses import fields
 
-from rtshcua.campaign.drawing import ANYWHERE, GROUPS, HOW_MANY, RANGES, Drawn, Moment, Space, Tally, draw
+from rtshcua.campaign.drawing import ANYWHERE, GROUPS, HOW_MANY, RANGES, CampaignTally, Drawn, FaultSpace, Moment, draw
 from rtshcua.model import faults
 from rtshcua.model.scenario import AfterStep, AtTime
 
 S = 1_000_000
-SPACE = Space(("takeoff", "goto", "goto", "return_home"), {"px4": 60 * S, "ardupilot": 70 * S}, ("supervisor",))
-SEEN = Tally({"px4": [Moment("takeoff sent", 2 * S), Moment("landed", 50 * S)], "ardupilot": []})
+SPACE = FaultSpace(("takeoff", "goto", "goto", "return_home"), {"px4": 60 * S, "ardupilot": 70 * S}, ("supervisor",))
+SEEN = CampaignTally({"px4": [Moment("takeoff sent", 2 * S), Moment("landed", 50 * S)], "ardupilot": []})
 
 
-def drawn(count: int, tally: Tally = SEEN, space: Space = SPACE) -> list[Drawn]:
+def drawn(count: int, tally: CampaignTally = SEEN, space: FaultSpace = SPACE) -> list[Drawn]:
     return [draw(1, number, space, tally) for number in range(count)]
 
 
@@ -63,7 +63,7 @@ def test_faults_gather_near_state_changes_that_were_seen() -> None:
 
 
 def test_half_of_the_flights_go_where_little_was_tried() -> None:
-    worn = Tally(SEEN.moments, {(kind.__name__, "landed"): 1_000 for kind in faults.KINDS.values()})
+    worn = CampaignTally(SEEN.moments, {(kind.__name__, "landed"): 1_000 for kind in faults.KINDS.values()})
     tried = Counter(label for one in drawn(1_000, worn)[::2] for _, label in one.tries)
     even = Counter(label for one in drawn(1_000)[::2] for _, label in one.tries)
     assert tried["landed"] < 0.75 * even["landed"]
@@ -71,5 +71,5 @@ def test_half_of_the_flights_go_where_little_was_tried() -> None:
 
 
 def test_kinds_that_are_left_out_are_not_drawn() -> None:
-    wind = Space(SPACE.skills, SPACE.lasts_us, kinds=frozenset({faults.WindStep}))
+    wind = FaultSpace(SPACE.skills, SPACE.lasts_us, kinds=frozenset({faults.WindStep}))
     assert {type(each.fault) for one in drawn(50, space=wind) for each in one.scenario.incidents} == {faults.WindStep}

@@ -8,27 +8,26 @@ from random import Random
 
 import pytest
 
-from rtshcua.campaign import campaign
-from rtshcua.campaign.campaign import FIRST, ROUND, Order, drawn, fly, rounds
-from rtshcua.campaign.drawing import Space
-from rtshcua.campaign.flights import LOST, Field, Flight
-from rtshcua.campaign.results import Failed, Result, line, read, tally
-from rtshcua.campaign.workers import Here, Processes
+from rtshcua.campaign.campaign import FIRST, ROUND, CampaignOrder, drawn, fly_rounds, rounds
+from rtshcua.campaign.drawing import FaultSpace
+from rtshcua.campaign.flights import LOST, CampaignFlight, FlownMission
+from rtshcua.campaign.results import CampaignResult, JudgeFinding, read_results, result_line, tally
+from rtshcua.campaign.workers import Here, WorkerProcesses
 
 S = 1_000_000
-SPACE = Space(("takeoff", "goto", "return_home"), {"px4": 60 * S, "ardupilot": 70 * S})
-FIELD = Field(b"bundle", b"root", ())
-ORDER = Order(5, 230, SPACE)
+SPACE = FaultSpace(("takeoff", "goto", "return_home"), {"px4": 60 * S, "ardupilot": 70 * S})
+FIELD = FlownMission(b"bundle", b"root", ())
+ORDER = CampaignOrder(5, 230, SPACE)
 
 
-def result(flight: Flight) -> Result:
+def result(flight: CampaignFlight) -> CampaignResult:
     """What comes of a flight here: made of its number alone."""
     chance = Random(flight.number)
     moments = tuple((label, chance.randrange(60 * S)) for label in ("airborne", "down"))
-    failed = (Failed("late", "too late", 3),) if flight.number % 7 == 0 else ()
+    failed = (JudgeFinding("late", "too late", 3),) if flight.number % 7 == 0 else ()
     texts = tuple(each.text for each in flight.scenario.incidents)
     flavour, seed = flight.scenario.flavours[0], flight.scenario.first_seed
-    return Result(
+    return CampaignResult(
         flight.number, flavour, seed, texts, flight.tries, "completed", failed, (), {}, moments, 60 * S, "00"
     )  # fmt: skip
 
@@ -40,7 +39,7 @@ class Shuffled:
         self.chance, self.left = Random(seed), most
         self.flown: list[int] = []
 
-    def fly(self, field: Field, flights: Sequence[Flight]) -> Iterator[Result]:
+    def fly_rounds(self, field: FlownMission, flights: Sequence[CampaignFlight]) -> Iterator[CampaignResult]:
         assert field is FIELD
         for flight in self.chance.sample(flights, len(flights)):
             if not self.left:
@@ -53,9 +52,9 @@ class Shuffled:
         pass
 
 
-def all_of(workers: Shuffled, past: dict[int, Result] | None = None) -> dict[int, Result]:
+def all_of(workers: Shuffled, past: dict[int, CampaignResult] | None = None) -> dict[int, CampaignResult]:
     flown = {} if past is None else past
-    fly(ORDER, FIELD, workers, flown, lambda _: None)
+    fly_rounds(ORDER, FIELD, workers, flown, lambda _: None)
     return flown
 
 
@@ -72,19 +71,19 @@ def test_the_order_in_which_flights_come_back_changes_nothing() -> None:
 @pytest.mark.parametrize("most", [0, 1, FIRST - 1, FIRST, FIRST + 1, FIRST + ROUND + 50])
 def test_an_interrupted_campaign_goes_on_as_if_nothing_had_been(most: int) -> None:
     first = Shuffled(3, most)
-    past: dict[int, Result] = {}
+    past: dict[int, CampaignResult] = {}
     with pytest.raises(KeyboardInterrupt):
         all_of(first, past)
     assert len(past) == most
-    kept = read([line(each) for each in past.values()])
+    kept = read_results([result_line(each) for each in past.values()])
     second = Shuffled(4)
     assert all_of(second, kept) == all_of(Shuffled(5))
     assert sorted(first.flown + second.flown) == list(range(ORDER.flights))
 
 
 def test_more_flights_can_be_asked_for_later() -> None:
-    few: dict[int, Result] = {}
-    fly(Order(5, 40, SPACE), FIELD, Shuffled(), few, lambda _: None)
+    few: dict[int, CampaignResult] = {}
+    fly_rounds(CampaignOrder(5, 40, SPACE), FIELD, Shuffled(), few, lambda _: None)
     assert few == {number: each for number, each in all_of(Shuffled()).items() if number < 40}
 
 
@@ -97,10 +96,10 @@ def test_a_flight_can_be_drawn_again_by_its_number() -> None:
 
 
 def test_a_torn_line_counts_as_not_flown() -> None:
-    lines = [line(each) for each in all_of(Shuffled()).values()]
+    lines = [result_line(each) for each in all_of(Shuffled()).values()]
     torn = [*lines[:-1], lines[-1][: len(lines[-1]) // 2]]
-    assert len(read(torn)) == ORDER.flights - 1
-    assert len(read([b"\xff\n", b"{}\n", b"\n", *lines])) == ORDER.flights
+    assert len(read_results(torn)) == ORDER.flights - 1
+    assert len(read_results([b"\xff\n", b"{}\n", b"\n", *lines])) == ORDER.flights
 
 
 def test_what_was_seen_is_counted_by_kind_and_moment() -> None:
@@ -113,12 +112,12 @@ def test_what_was_seen_is_counted_by_kind_and_moment() -> None:
 # ------------------------------------------------------------------------------ processes
 
 
-class Nothing(Field):
+class Nothing(FlownMission):
     """Flies nothing."""
 
     __slots__ = ()
 
-    def fly(self, flight: Flight) -> Result:
+    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
         return result(flight)
 
 
@@ -127,7 +126,7 @@ class DiesOnce(Nothing):
 
     __slots__ = ()
 
-    def fly(self, flight: Flight) -> Result:
+    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
         return _dies_once(Path(self.root.decode()), flight)
 
 
@@ -136,30 +135,30 @@ class DiesAlways(Nothing):
 
     __slots__ = ()
 
-    def fly(self, flight: Flight) -> Result:
+    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
         return _dies_always(flight)
 
 
-def _dies_once(mark: Path, flight: Flight) -> Result:
+def _dies_once(mark: Path, flight: CampaignFlight) -> CampaignResult:
     if flight.number == 3 and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return result(flight)
 
 
-def _dies_always(flight: Flight) -> Result:
+def _dies_always(flight: CampaignFlight) -> CampaignResult:
     if flight.number == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     return result(flight)
 
 
-def few() -> list[Flight]:
-    return [Flight(number, drawn(ORDER, number, {}).scenario) for number in range(5)]
+def few() -> list[CampaignFlight]:
+    return [CampaignFlight(number, drawn(ORDER, number, {}).scenario) for number in range(5)]
 
 
 @pytest.mark.slow
 def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
-    processes = Processes(1)
+    processes = WorkerProcesses(1)
     flown = list(processes.fly(DiesOnce(b"", str(tmp_path / "died").encode(), ()), few()))
     processes.close()
     assert sorted(flown, key=lambda each: each.number) == [result(flight) for flight in few()]
@@ -167,7 +166,7 @@ def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown() -> None:
-    processes = Processes(1)
+    processes = WorkerProcesses(1)
     flown = sorted(processes.fly(DiesAlways(b"", b"", ()), few()), key=lambda each: each.number)
     processes.close()
     assert flown == [FIELD.lost(flight) if flight.number == 3 else result(flight) for flight in few()]
@@ -176,7 +175,7 @@ def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown
 
 def test_one_process_is_enough() -> None:
     assert list(Here().fly(Nothing(b"", b"", ()), few())) == [result(flight) for flight in few()]
-    assert campaign.FIRST < campaign.ROUND
+    assert FIRST < ROUND
 
 
 class Enough(Exception):
@@ -188,7 +187,7 @@ class NeverEnds(Nothing):
 
     __slots__ = ()
 
-    def fly(self, flight: Flight) -> Result:
+    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
         while True:
             signal.pause()
 
@@ -201,7 +200,7 @@ def test_a_flight_that_is_under_way_is_not_waited_for_once_somebody_asks_for_the
         if next(looks, Enough) is Enough:
             raise Enough
 
-    processes = Processes(1, look)
+    processes = WorkerProcesses(1, look)
     with pytest.raises(Enough):
         list(processes.fly(NeverEnds(b"", b"", ()), few()))
     processes.close()

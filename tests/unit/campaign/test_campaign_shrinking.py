@@ -1,6 +1,6 @@
 """A failing scenario becomes small: only what is needed is left, and what is left is round."""
 
-from rtshcua.campaign.drawing import Moment, Space, Tally, draw
+from rtshcua.campaign.drawing import CampaignTally, FaultSpace, Moment, draw
 from rtshcua.campaign.shrinking import shrink
 from rtshcua.campaign.written import incident_text, scenario_text
 from rtshcua.model.faults import Fault, GpsLoss, LinkSilence, WindStep
@@ -9,7 +9,7 @@ from virtual.rows import rows
 
 S = 1_000_000
 SKILLS = ("takeoff", "goto", "goto", "return_home")
-SPACE = Space(SKILLS, {"px4": 60 * S, "ardupilot": 70 * S}, ("supervisor",))
+SPACE = FaultSpace(SKILLS, {"px4": 60 * S, "ardupilot": 70 * S}, ("supervisor",))
 
 
 def at(us: int, fault: Fault) -> Incident:
@@ -52,7 +52,7 @@ def test_it_becomes_as_weak_and_as_round_as_it_may() -> None:
 
 @rows("number", range(40))
 def test_it_comes_to_an_end_whatever_was_drawn(number: int) -> None:
-    scenario = draw(3, number, SPACE, Tally({"px4": [Moment("landed", 9 * S)]})).scenario
+    scenario = draw(3, number, SPACE, CampaignTally({"px4": [Moment("landed", 9 * S)]})).scenario
     small, flown = shrink(scenario, SKILLS, lambda _: True, most=2_000)
     assert small.incidents == ()
     assert flown < 100
@@ -60,7 +60,7 @@ def test_it_comes_to_an_end_whatever_was_drawn(number: int) -> None:
 
 @rows("number", range(40))
 def test_the_smallest_of_one_fault_is_not_smaller_than_itself(number: int) -> None:
-    scenario = draw(3, number, SPACE, Tally()).scenario
+    scenario = draw(3, number, SPACE, CampaignTally()).scenario
     many = len(scenario.incidents)
 
     def keeps(one: Scenario) -> bool:

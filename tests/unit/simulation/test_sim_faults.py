@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.campaign.drawing import Space, Tally, draw
+from rtshcua.campaign.drawing import CampaignTally, FaultSpace, draw
 from rtshcua.model import faults
 from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.fault_syntax import OF_VEHICLE, fault_words, parse_fault
@@ -314,10 +314,10 @@ def test_low_voltage_may_be_told_to_act(pilot: Callable[..., Any], action: int, 
 
 
 def test_a_fault_is_written_as_it_is_read() -> None:
-    space = Space(
+    space = FaultSpace(
         ("takeoff", "return_home"), {"px4": 60 * S, "ardupilot": 60 * S}, kinds=frozenset(OF_VEHICLE.values())
     )
-    drawn = [draw(7, number, space, Tally()) for number in range(400)]
+    drawn = [draw(7, number, space, CampaignTally()) for number in range(400)]
     made = [replace(each.fault, at_us=7) for one in drawn for each in one.scenario.incidents]
     assert {type(each) for each in made} == set(OF_VEHICLE.values())
     for fault in made:

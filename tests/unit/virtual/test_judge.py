@@ -15,7 +15,7 @@ from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import AREA, Zone, unproject
 from rtshcua.model.scenario import Start
-from rtshcua.virtual.flown import Frame, Happened, Reaction, Sample, ScenarioFlown
+from rtshcua.virtual.flown import IncidentOccurrence, Reaction, ScenarioFlown, SentFrame, TruthSample
 from rtshcua.virtual.judge import SLUGS, Judgement, judge, moves
 from rtshcua.virtual.zone_truth import inside_mm
 from virtual import case
@@ -33,9 +33,9 @@ def good() -> ScenarioFlown:
     return replace(was, lives=tuple(replace(life, turns=()) for life in was.lives))
 
 
-def sample(at_s: float, east_m: float = 0, north_m: float = 0, up_m: float = 10, **fields: Any) -> Sample:
+def sample(at_s: float, east_m: float = 0, north_m: float = 0, up_m: float = 10, **fields: Any) -> TruthSample:
     latitude, longitude = unproject(case.policy().projection, round(east_m * M), round(north_m * M))
-    plain = Sample(
+    plain = TruthSample(
         round(at_s * S),
         latitude,
         longitude,
@@ -54,9 +54,9 @@ def sample(at_s: float, east_m: float = 0, north_m: float = 0, up_m: float = 10,
     return plain._replace(**fields)
 
 
-def judged(good: ScenarioFlown, samples: Sequence[Sample], *happened: Fault, **fields: Any) -> Judgement:
+def judged(good: ScenarioFlown, samples: Sequence[TruthSample], *happened: Fault, **fields: Any) -> Judgement:
     """What is said of these truths, of a flight whose logs and frames are good."""
-    incidents = tuple(Happened(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
+    incidents = tuple(IncidentOccurrence(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
     given: dict[str, Any] = {"frames": (), "lives": (replace(good.lives[0], ending="aborted"),), **fields}
     return judge(replace(good, samples=tuple(samples), happened=incidents, **given))
 
@@ -242,7 +242,7 @@ def test_a_wind_at_the_start_excuses_too(good: ScenarioFlown) -> None:
 # ---------------------------------------------------------------- collision
 
 
-def crash(speed_mm_s: int = 3 * M, near_mm: int | None = 0) -> list[Sample]:
+def crash(speed_mm_s: int = 3 * M, near_mm: int | None = 0) -> list[TruthSample]:
     near = {"obstacle_mm": near_mm}
     return [
         sample(5, **near), sample(9, speed_mm_s=speed_mm_s, **near),
@@ -286,7 +286,7 @@ def test_a_pillar_that_could_be_seen_in_time_is_no_excuse(good: ScenarioFlown) -
     far = [sample(5, obstacle_mm=60 * M), *crash()[1:]]
     excused = [("collision", "obstacle")]
 
-    def found(samples: Sequence[Sample], *happened: Fault) -> list[tuple[str, str | None]]:
+    def found(samples: Sequence[TruthSample], *happened: Fault) -> list[tuple[str, str | None]]:
         return causes(judged(good, samples, *happened, policy=looks_out))
 
     assert found(far, pillar(5 * S)) == []
@@ -307,7 +307,7 @@ def test_an_empty_battery_excuses_only_who_was_given_one(good: ScenarioFlown) ->
 # ---------------------------------------------------------------- not-ended
 
 
-def after(good: ScenarioFlown, **fields: Any) -> list[Sample]:
+def after(good: ScenarioFlown, **fields: Any) -> list[TruthSample]:
     end_s = good.ended_us / S
     return [sample(end_s + tenths / 10, **fields) for tenths in range(1, 60)]
 
@@ -378,14 +378,14 @@ def test_what_a_frame_moves(frame: bytes, flavour: str, kinds: set[MotionKind] |
     assert moves(frame, flavour) == kinds
 
 
-def motion(good: ScenarioFlown) -> list[Frame]:
+def motion(good: ScenarioFlown) -> list[SentFrame]:
     return [frame for frame in good.frames if moves(frame.octets, good.flavour) is not None]
 
 
 def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
-    def taken(before_us: int, *happened: Fault, more: Sequence[Frame] = (), **fields: Any) -> Judgement:
+    def taken(before_us: int, *happened: Fault, more: Sequence[SentFrame] = (), **fields: Any) -> Judgement:
         since_us = frame.sent_us - before_us
         samples = [
             each._replace(taken_over_us=since_us if each.at_us >= since_us else None, taken_over_by="pilot")
@@ -418,22 +418,22 @@ def test_a_takeover_by_the_mode_that_a_lost_frame_asked_for(good: ScenarioFlown)
     land, hold = long(176, 1, 9), long(176, 1, 17)
     since_us, again_us = 30 * S, 33 * S
 
-    def sent_again(before: Frame, *modes: tuple[float, FlightMode], heard_us: int | None = None) -> Judgement:
+    def sent_again(before: SentFrame, *modes: tuple[float, FlightMode], heard_us: int | None = None) -> Judgement:
         samples = [
             sample(at_us / S, mode=next((mode for to_s, mode in modes if at_us < to_s * S), FlightMode.LAND))._replace(
                 taken_over_us=since_us if at_us >= since_us else None, taken_over_by="failsafe"
             )
             for at_us in range(0, 40 * S, S // 10)
         ]
-        return judged(good, samples, frames=(before, Frame(again_us, heard_us, land)), flavour="ardupilot")
+        return judged(good, samples, frames=(before, SentFrame(again_us, heard_us, land)), flavour="ardupilot")
 
     def taken(found: Judgement) -> list[tuple[str, str | None]]:
         return [each for each in causes(found) if each[0] == "motion-after-takeover"]
 
-    lost = Frame(20 * S, None, land)
+    lost = SentFrame(20 * S, None, land)
     assert taken(sent_again(lost)) == [("motion-after-takeover", "unseen")]
-    assert "motion-after-takeover" in slugs(sent_again(Frame(20 * S, 20 * S, land)))
-    assert "motion-after-takeover" in slugs(sent_again(Frame(20 * S, None, hold)))
+    assert "motion-after-takeover" in slugs(sent_again(SentFrame(20 * S, 20 * S, land)))
+    assert "motion-after-takeover" in slugs(sent_again(SentFrame(20 * S, None, hold)))
     assert "motion-after-takeover" in slugs(sent_again(lost, (60, FlightMode.POSITION)))
     assert "motion-after-takeover" in slugs(sent_again(lost, (31, FlightMode.LAND), (60, FlightMode.POSITION)))
 
@@ -441,7 +441,7 @@ def test_a_takeover_by_the_mode_that_a_lost_frame_asked_for(good: ScenarioFlown)
 def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
-    def paused(flavour: str, up_m: float, *others: Fault, frames: tuple[Frame, ...] = (frame,)) -> Judgement:
+    def paused(flavour: str, up_m: float, *others: Fault, frames: tuple[SentFrame, ...] = (frame,)) -> Judgement:
         since_us = frame.sent_us - 5 * S
         before = sample(since_us / S, up_m=up_m, mode=FlightMode.TAKEOFF)
         after = [each for each in good.samples if each.at_us > since_us]
@@ -451,7 +451,7 @@ def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
 
     assert causes(paused("px4", 4.5)) == [("motion-after-takeover", "unseen")]
     assert "motion-after-takeover" in slugs(paused("px4", 3))
-    stop = Frame(S, S, reposition(0x7FFFFFFF, 0x7FFFFFFF))
+    stop = SentFrame(S, S, reposition(0x7FFFFFFF, 0x7FFFFFFF))
     assert causes(paused("px4", 1, frames=(stop, frame))) == [("motion-after-takeover", "unseen")]
     assert "motion-after-takeover" in slugs(paused("px4", 4.5, faults.PilotMode(frame.sent_us - 4 * S)))
     assert causes(paused("px4", 4.5, faults.PilotGoto(S, 0, 0, 0))) == [
@@ -490,7 +490,7 @@ def test_a_pause_of_what_stops_already(good: ScenarioFlown, climb_mm_s: int, cau
     """Told to stop, it still climbs when a pilot tells it the same: nothing shows that, while it slows down."""
     frame = motion(good)[-1]
     since_us = frame.sent_us - 5 * S
-    stop = Frame(since_us - S // 10, since_us - S // 10, reposition(0x7FFFFFFF, 0x7FFFFFFF))
+    stop = SentFrame(since_us - S // 10, since_us - S // 10, reposition(0x7FFFFFFF, 0x7FFFFFFF))
     told = sample(stop.sent_us / S, up_m=2, mode=FlightMode.TAKEOFF, climb_mm_s=700)
     paused = sample(since_us / S, up_m=2, mode=FlightMode.LOITER, climb_mm_s=climb_mm_s)
     after = [each for each in good.samples if each.at_us > since_us]
@@ -512,16 +512,16 @@ def test_a_flight_that_no_run_began_to_watch(good: ScenarioFlown, left: str) -> 
 
 def test_a_frame_that_the_log_does_not_have(good: ScenarioFlown) -> None:
     frame = motion(good)[0]
-    early = Frame(S // 10, S // 10, frame.octets)
+    early = SentFrame(S // 10, S // 10, frame.octets)
     assert slugs(judge(replace(good, frames=(early,)))) == ["unlogged-effect"]
     land = long(176, 1, 4, 6)
-    other = [*good.frames, Frame(frame.sent_us + S, frame.sent_us + S, land)]
+    other = [*good.frames, SentFrame(frame.sent_us + S, frame.sent_us + S, land)]
     assert "the last command was" in judge(replace(good, frames=tuple(other))).failures[0].text
-    over = [*good.frames, Frame(good.ended_us + S, good.ended_us + S, land)]
+    over = [*good.frames, SentFrame(good.ended_us + S, good.ended_us + S, land)]
     assert slugs(judge(replace(good, frames=tuple(over)))) == ["unlogged-effect"]
     ended = frame._replace(sent_us=good.ended_us - 1)
     assert "unlogged-effect" in slugs(judge(replace(good, frames=(ended,))))
-    full = (Happened(0, 0, faults.DiskFull(0), ""),)
+    full = (IncidentOccurrence(0, 0, faults.DiskFull(0), ""),)
     assert causes(judge(replace(good, frames=(early,), happened=full))) == [("unlogged-effect", "disk")]
 
 
@@ -534,14 +534,14 @@ def test_two_commands_at_one_moment() -> None:
 def test_a_late_fallback(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
-    def reacts(in_us: int, *happened: Fault, questions: tuple[Frame, ...] = ()) -> Judgement:
+    def reacts(in_us: int, *happened: Fault, questions: tuple[SentFrame, ...] = ()) -> Judgement:
         reaction = Reaction(frame.sent_us - in_us, frame.sent_us)
         life = replace(good.lives[0], reactions=(reaction,))
-        incidents = tuple(Happened(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
+        incidents = tuple(IncidentOccurrence(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
         return judge(replace(good, lives=(life,), happened=incidents, frames=(*questions, *good.frames)))
 
-    def asked(came_us: int, obeyed_us: int | None, message: int = 0) -> Frame:
-        return Frame(frame.sent_us - S, frame.sent_us - came_us, long(512, message), obeyed_us)
+    def asked(came_us: int, obeyed_us: int | None, message: int = 0) -> SentFrame:
+        return SentFrame(frame.sent_us - S, frame.sent_us - came_us, long(512, message), obeyed_us)
 
     assert slugs(reacts(100_000)) == []
     assert reacts(100_000).margins.stop_us == 100_000
@@ -573,7 +573,7 @@ def test_a_log_that_does_not_verify(good: ScenarioFlown) -> None:
     lines = list(good.lives[0].lines)
 
     def logged(changed: Sequence[bytes], *happened: Fault) -> Judgement:
-        incidents = tuple(Happened(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
+        incidents = tuple(IncidentOccurrence(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
         return judge(replace(good, lives=(replace(good.lives[0], lines=tuple(changed)),), happened=incidents))
 
     assert "log" in slugs(logged(lines[:3] + lines[4:]))

@@ -21,7 +21,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import NUMBER, Signal
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.virtual.flown import Heard, Turn
+from rtshcua.virtual.flown import HeardReadings, Turn
 from rtshcua.virtual.naive_supervision import (
     ConditionQuery,
     HeardState,
@@ -138,7 +138,7 @@ def test_temporal_monitors_say_what_the_product_makes_of_the_same_past(of: Rando
     for _ in range(12):
         at_us += of.choice([0, 1, 50_000, 50_000, 400_000, S, S + 1, 3 * S])
         state = worlds.state(of)
-        memory.hear(Heard(at_us, tuple(enumerate(state.values))))
+        memory.hear(HeardReadings(at_us, tuple(enumerate(state.values))))
         now = Now(at_us, flat.NOW.utc_us + at_us, 20_000)
         memory.observe(now)
         fresh = replace(state, ages=(0,) * policy.slots)
@@ -190,7 +190,7 @@ def turns(unknown: tuple[int, int], until_us: int) -> list[Turn]:
     made = []
     for at_us in range(0, until_us, S // 10):
         quality = None if unknown[0] <= at_us < unknown[1] else 9_000
-        made.append(Turn(at_us, (Heard(at_us, tuple(enumerate(flat.state({flat.LINK: quality}).values))),)))
+        made.append(Turn(at_us, (HeardReadings(at_us, tuple(enumerate(flat.state({flat.LINK: quality}).values))),)))
     return made
 
 
@@ -213,7 +213,10 @@ def test_a_silence_counts_for_no_grace(silences: tuple[tuple[int, int], ...], br
 def test_each_of_the_frames_that_come_at_once_is_looked_at() -> None:
     values = tuple(enumerate(flat.state().values))
     gust = tuple((slot, 11 * M if slot == flat.WIND else value) for slot, value in values)
-    at_once = [Turn(S // 10, (Heard(0, values),)), Turn(S, (Heard(S, values), Heard(S, gust), Heard(S, values)))]
+    at_once = [
+        Turn(S // 10, (HeardReadings(0, values),)),
+        Turn(S, (HeardReadings(S, values), HeardReadings(S, gust), HeardReadings(S, values))),
+    ]
     step = RunningStep(QUIET, flat.MISSION, flat.INSPECTION_STEP, (0, None), ())
     supervise(QUIET, [step], at_once, lambda us: replace(flat.NOW, monotonic_us=us))
     assert step.sure == (S, "wind.speed < 10 m/s")

@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from rtshcua import library
 from rtshcua.app.testing import flying
-from rtshcua.campaign.flights import Field, Flight
-from rtshcua.campaign.results import Failed, Result
-from rtshcua.campaign.trying import Trial, Try
+from rtshcua.campaign.flights import FlownMission, CampaignFlight
+from rtshcua.campaign.results import JudgeFinding, CampaignResult
+from rtshcua.campaign.trying import ScenarioTrial, Try
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.ground.testing.reporting import FlightFailure, FlightResult
@@ -33,32 +33,34 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def flies(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Field, Flight], Result]], None]:
+def flies(
+    monkeypatch: pytest.MonkeyPatch,
+) -> Callable[[Callable[[FlownMission, CampaignFlight], CampaignResult]], None]:
     """Lets flights be flown in another way."""
 
-    def put(fly: Callable[[Field, Flight], Result]) -> None:
-        monkeypatch.setattr(Field, "fly", fly)
+    def put(fly: Callable[[FlownMission, CampaignFlight], CampaignResult]) -> None:
+        monkeypatch.setattr(FlownMission, "fly", fly)
 
     return put
 
 
-def told(flight: Flight, *failures: Failed) -> Result:
+def told(flight: CampaignFlight, *failures: JudgeFinding) -> CampaignResult:
     scenario = flight.scenario
     texts = tuple(each.text for each in scenario.incidents)
-    return Result(
+    return CampaignResult(
         flight.number, scenario.flavours[0], scenario.first_seed, texts, flight.tries, "completed", failures, (),
         {"fence_mm": 20_000 + flight.number}, (("airborne", 5 * S), ("down", 50 * S)), 60 * S, "00", S,
     )  # fmt: skip
 
 
-def good(_: Field, flight: Flight) -> Result:
+def good(_: FlownMission, flight: CampaignFlight) -> CampaignResult:
     return told(flight)
 
 
-def without_gps(_: Field, flight: Flight) -> Result:
+def without_gps(_: FlownMission, flight: CampaignFlight) -> CampaignResult:
     """Fails whenever the fix is lost."""
     lost = any(isinstance(each.fault, GpsLoss) for each in flight.scenario.incidents)
-    return told(flight, Failed("collision", "flew into a <pillar>", 7 * S)) if lost else told(flight)
+    return told(flight, JudgeFinding("collision", "flew into a <pillar>", 7 * S)) if lost else told(flight)
 
 
 def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
@@ -88,10 +90,10 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
     assert [each.log for each in again] == [lines[0]["log"]]
 
 
-def fly_one_again(line: dict[str, Any]) -> Result:
+def fly_one_again(line: dict[str, Any]) -> CampaignResult:
     """Flight 0 once more, in this process, from what the folder says alone."""
     from rtshcua.app.programs import compile_sources
-    from rtshcua.campaign.campaign import Order, drawn
+    from rtshcua.campaign.campaign import CampaignOrder, drawn
     from rtshcua.campaign.drawing import FLAVOURS
     from rtshcua.front.cli.campaign import _kinds, _space
 
@@ -99,13 +101,13 @@ def fly_one_again(line: dict[str, Any]) -> Result:
     compiled, _ = compile_sources([Path(SHORT)], mission=None, issued_at_us=begun["issued_at_us"])
     assert compiled.policy is not None
     assert compiled.mission is not None
-    field = Field.of(compiled.policy, compiled.mission, begun["issued_at_us"])
+    field = FlownMission.of(compiled.policy, compiled.mission, begun["issued_at_us"])
     kinds = _kinds(["link-silence", "wind"])
     assert isinstance(kinds, frozenset)
     space = _space(field, compiled.policy, compiled.mission, FLAVOURS, kinds, False)
     assert not hasattr(space, "slug")
-    made = drawn(Order(begun["seed"], 2, space), line["number"], {})
-    return field.fly(Flight(line["number"], made.scenario, made.tries))
+    made = drawn(CampaignOrder(begun["seed"], 2, space), line["number"], {})
+    return field.fly(CampaignFlight(line["number"], made.scenario, made.tries))
 
 
 def test_it_goes_on_where_it_stopped(
@@ -113,7 +115,7 @@ def test_it_goes_on_where_it_stopped(
 ) -> None:
     seen: list[int] = []
 
-    def interrupted(field: Field, flight: Flight) -> Result:
+    def interrupted(field: FlownMission, flight: CampaignFlight) -> CampaignResult:
         seen.append(flight.number)
         if len(seen) == 12:  # the flight that is under way is flown to its end
             signal.raise_signal(signal.SIGTERM)
@@ -136,7 +138,7 @@ def test_it_stops_while_a_failure_is_shrunk_and_shrinks_it_the_next_time(
 ) -> None:
     seen: list[int] = []
 
-    def interrupted(field: Field, flight: Flight) -> Result:
+    def interrupted(field: FlownMission, flight: CampaignFlight) -> CampaignResult:
         seen.append(flight.number)
         if len(seen) == 122:  # the calm ones, those that are drawn, and then candidates
             signal.raise_signal(signal.SIGINT)
@@ -182,7 +184,7 @@ def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(
     assert "collision" in capsys.readouterr().err
 
 
-def _failing(_: Trial, flight: Try) -> FlightResult:
+def _failing(_: ScenarioTrial, flight: Try) -> FlightResult:
     """What a kept failure says can be read: it is the flight that failed."""
     assert [type(each.fault) for each in flight.scenario.incidents] == [GpsLoss]
     assert flight.scenario.start.utc_us == 1_780_300_800_000_000 + 60 * S
@@ -231,7 +233,7 @@ def test_a_flight_whose_line_was_torn_is_flown_again_and_no_other_is_lost(
 def test_a_flight_that_fails_in_two_ways_is_one_that_failed(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
-    both = Failed("collision", "flew into it"), Failed("late", "came late")
+    both = JudgeFinding("collision", "flew into it"), JudgeFinding("late", "came late")
     flies(lambda _, flight: told(flight, *both) if flight.scenario.incidents else told(flight))
     code, out, _ = run(capsys, "--flights", "2", "--no-shrink", "--json")
     assert code == ExitCode.TESTS
@@ -251,7 +253,7 @@ def test_a_mission_that_does_not_fly_without_faults_is_refused(
 def test_a_mission_that_fails_without_faults_is_refused(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
-    flies(lambda _, flight: told(flight, Failed("collision", "flew into the ground")))
+    flies(lambda _, flight: told(flight, JudgeFinding("collision", "flew into the ground")))
     code, _, err = run(capsys)
     assert code == ExitCode.TESTS
     assert "on px4 the mission fails even if nothing goes wrong: flew into the ground" in err
@@ -263,9 +265,9 @@ def test_who_is_asked_for_an_approval_gives_it_in_every_flight_where_that_is_ask
 ) -> None:
     """Two roles are asked before each of two orbits: without them the mission cannot be flown."""
     asked = [f"1 s .. 5 s after goto {step} approve(role = {role})" for step in (2, 3) for role in ("chief", "safety")]
-    refused: list[Flight] = []
+    refused: list[CampaignFlight] = []
 
-    def fly(_: Field, flight: Flight) -> Result:
+    def fly(_: FlownMission, flight: CampaignFlight) -> CampaignResult:
         texts = [each.text for each in flight.scenario.incidents]
         refused.extend([flight] * any(text.split()[-3:] == ["refuse(role", "=", "safety)"] for text in texts))
         return replace(told(flight), ending="completed" if texts[-4:] == asked else "aborted")
@@ -287,7 +289,7 @@ def test_who_is_asked_for_an_approval_gives_it_in_every_flight_where_that_is_ask
 def test_fewer_flights_than_were_flown_are_reported_with_all_that_were(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
-    flies(lambda _, flight: told(flight, *[Failed("late", "came late")] * (flight.number == 3)))
+    flies(lambda _, flight: told(flight, *[JudgeFinding("late", "came late")] * (flight.number == 3)))
     assert run(capsys, "--flights", "5", "-o", "made", "--no-shrink")[0] == ExitCode.TESTS
     code, out, _ = run(capsys, "--flights", "2", "-o", "made", "--no-shrink")
     assert code == ExitCode.TESTS

@@ -17,7 +17,7 @@ from math import exp, log
 from random import Random
 from typing import Any, Final
 
-from rtshcua.campaign.written import incident_text
+from rtshcua.campaign.scenario_source import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Direction, Fault, FlightMode, Voice
 from rtshcua.model.flat.mission import Mission

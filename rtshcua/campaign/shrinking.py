@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, fields, replace
 from typing import Final
 
-from rtshcua.campaign.written import incident_text
+from rtshcua.campaign.scenario_source import incident_text
 from rtshcua.model.faults import UNITS, Fault
 from rtshcua.model.scenario import AfterStep, AtTime, Incident, OnCondition, Scenario, Start, When
 

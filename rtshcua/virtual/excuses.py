@@ -32,7 +32,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from rtshcua.model import faults
 from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.virtual.flown import IncidentOccurrence, ScenarioFlown, TruthSample
+from rtshcua.virtual.flight_record import IncidentOccurrence, ScenarioFlown, TruthSample
 
 #: mm/s: what a multirotor of this size does not fly against, and us: how long after it counts
 STRONG_MM_S: Final = 12_000

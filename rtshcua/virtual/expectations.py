@@ -25,7 +25,7 @@ from rtshcua.model.scenario import (
     KeepsAway,
     ReactsWithin,
 )
-from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.judge import Judgement
 from rtshcua.virtual.zone_truth import inside_mm, local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP

@@ -26,8 +26,8 @@ from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import Action, BoundaryKey, Ending, Event, EvidenceSink, Interrupted
 from rtshcua.onboard.runtime.runtime import Runtime
 from rtshcua.simulation.config import SimulationConfig
+from rtshcua.virtual.boundary_in_process import Served
 from rtshcua.virtual.fitting import fitting
-from rtshcua.virtual.served import Served
 from rtshcua.virtual.vehicle import SECOND, START, TICK_US, VirtualClock, VirtualVehicle
 from rtshcua.wire import bundle as bundles
 from rtshcua.wire import cose, names

@@ -17,7 +17,7 @@ decisions are derived again; what the logs say is then held against the frames.
 | `unlogged-effect` | a frame that moves it, which carries out no command that the log has |
 | `fault` | an exception came out of the runtime, or the run did not end |
 
-What it owes besides, from supervision to the order of chains, has slugs of its own (`conduct`).
+What it owes besides, from supervision to the order of chains, has slugs of its own (`runtime_checks`).
 
 A failure that physics does not allow to prevent is an *exception* instead, with its `cause` (`excuses`).
 """
@@ -36,9 +36,9 @@ from rtshcua.ground.audit.audit import Auditor
 from rtshcua.model.faults import FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.step_number import step_words
-from rtshcua.virtual.conduct import RuntimeChecks
 from rtshcua.virtual.excuses import Excuses, JudgedFailure
-from rtshcua.virtual.flown import ScenarioFlown, SentFrame, TruthSample, records_of
+from rtshcua.virtual.flight_record import ScenarioFlown, SentFrame, TruthSample, records_of
+from rtshcua.virtual.runtime_checks import RuntimeChecks
 from rtshcua.virtual.zone_truth import airspace_mm, in_force, is_timed, local_mm
 
 SLUGS: Final = (

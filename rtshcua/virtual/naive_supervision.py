@@ -23,7 +23,7 @@ from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy, Rule, RuleKi
 from rtshcua.model.flat.signal import DRAIN, NUMBER, POSITION
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zone
-from rtshcua.virtual.flown import HeardReadings, Turn
+from rtshcua.virtual.flight_record import HeardReadings, Turn
 from rtshcua.virtual.zone_truth import Answers as Truths
 from rtshcua.virtual.zone_truth import Edge, apart_mm, both, daily, edges, exists, is_timed, level_mm, shown
 

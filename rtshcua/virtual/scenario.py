@@ -1,7 +1,8 @@
 """Flies one flight of a scenario: what goes wrong goes wrong when the scenario says so, in virtual time.
 
-The same arguments give the same flight, byte by byte. What a killed process loses, and what babble says, is drawn from
-the same source as the time of the incident (`triggers`), afterwards.
+The same arguments give the same flight, byte by byte. Where a scenario leaves a time open, incident `number` (from 0)
+happens after a delay that `Random(f"{scenario.name} {number} {seed}")` draws from its range. What a killed process
+loses, and what babble says, is drawn from the same source afterwards.
 
 What goes wrong with the vehicle, its link and its surroundings is the simulation's affair, to its tick. What goes wrong
 with our own computer and with those who hand in documents happens here, between two turns of the loop.
@@ -13,27 +14,34 @@ from functools import partial
 from heapq import heappop, heappush
 from random import Random  # noqa: TID251  seeded: the same seed draws the same
 from traceback import format_exception
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
+
+import msgspec
 
 from rtshcua.adapters.clock import StepWatch
 from rtshcua.adapters.packs import manoeuvres, packs_of
 from rtshcua.adapters.store.writer import Lateness
+from rtshcua.decision.evaluate import NO_PHASE, Condition, build
+from rtshcua.decision.prepare import PreparedPolicy
+from rtshcua.decision.situation import environment, situation
+from rtshcua.decision.values import TRUE
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.recovery import RECOVERABLE, Examination, ending
 from rtshcua.model import faults
 from rtshcua.model.faults import AgentFault, Fault, HostFault
 from rtshcua.model.flat.situation import Now
-from rtshcua.model.scenario import Scenario
+from rtshcua.model.scenario import AfterStep, AtTime, OnCondition, Scenario
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
 from rtshcua.onboard.left import left_by
-from rtshcua.onboard.ports import Action, BoundaryKey, Command, Ending, Event, Presented, Readings
+from rtshcua.onboard.ports import Action, Append, BoundaryKey, Command, Ending, Event, Presented, Readings
+from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.simulation.config import Answers, AutopilotKind, Estimate, SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from rtshcua.simulation.world import Simulation
 from rtshcua.virtual.fitting import fitting, with_room
 from rtshcua.virtual.flight import MemorySink, VirtualFlight, claimed
-from rtshcua.virtual.flown import (
+from rtshcua.virtual.flight_record import (
     HeardReadings,
     IncidentOccurrence,
     Life,
@@ -43,7 +51,6 @@ from rtshcua.virtual.flown import (
     TruthSample,
     Turn,
 )
-from rtshcua.virtual.triggers import Due, Triggers
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from rtshcua.wire import cose
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
@@ -51,8 +58,72 @@ from rtshcua.wire.boundary_chain import START as START_DIGEST
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.recall import RecallDocument, sign_recall
 from rtshcua.wire.replacement import sign_replacement
+from rtshcua.wire.request import STEP
 from rtshcua.wire.trust import MAX_ROOT
 from rtshcua.wire.untrusted import Untrusted
+
+
+class Due(NamedTuple):
+    """An incident, by its number, and when it is to happen, in us since the start of the run."""
+
+    number: int
+    at_us: int
+
+
+class Triggers:
+    """What the incidents of a scenario wait for; `chances` is the source of what each of them draws."""
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        self.chances = [Random(f"{scenario.name} {number} {seed}") for number in range(len(scenario.incidents))]
+        self._whens = dict(enumerate(each.when for each in scenario.incidents))
+
+    def begin(self, policy: PreparedPolicy) -> None:
+        """A process of the runtime begins, under this policy: what it knows, it has to hear first."""
+        self._policy = policy
+        self._monitor = StateMonitor(policy)
+        self._conditions: dict[int, Condition] = {}
+
+    def start(self) -> Iterator[Due]:
+        """What waits for nothing but the time."""
+        yield from [self._due(number, 0) for number, when in list(self._whens.items()) if isinstance(when, AtTime)]
+
+    def turned(self, now: Now, events: Sequence[Event], actions: Iterable[Action], at_us: int) -> Iterator[Due]:
+        """What waited for what came in a turn of the loop."""
+        if not self._whens:
+            return
+        for action in actions:
+            if isinstance(action, Append) and b'"event":"dispatched"' in action.line:
+                yield from self._sent(msgspec.json.decode(action.line), at_us)
+        if any(isinstance(when, OnCondition) for when in self._whens.values()):
+            yield from self._look(now, events, at_us)
+
+    def _due(self, number: int, since_us: int) -> Due:
+        when = self._whens.pop(number)
+        return Due(number, since_us + self.chances[number].randint(when.from_us, when.to_us))
+
+    def _sent(self, record: dict[str, Any], at_us: int) -> Iterator[Due]:
+        for number, when in list(self._whens.items()):
+            if isinstance(when, AfterStep) and record["kind"] == STEP and record["step"] == when.step:
+                yield self._due(number, at_us)
+
+    def _look(self, now: Now, events: Sequence[Event], at_us: int) -> Iterator[Due]:
+        """Which conditions are true in the state that the runtime knows."""
+        monitor, policy = self._monitor, self._policy
+        for event in events:
+            if isinstance(event, Readings):
+                monitor.update(event)
+        monitor.observe(now)
+        at = environment(situation(monitor.state(now.monotonic_us), policy, now), policy, (), NO_PHASE)
+        for number, when in list(self._whens.items()):
+            if not isinstance(when, OnCondition):
+                continue
+            condition = self._conditions.get(number)
+            if condition is None:
+                compiler = policy.compiler
+                condition = self._conditions[number] = build(compiler.node(when.condition), compiler.tables)
+            if condition(at) == TRUE:
+                yield self._due(number, at_us)
+
 
 #: how often what really is is noted, and the longest that the loop waits, in us
 SAMPLE_US: Final = 50_000

@@ -30,7 +30,7 @@ from rtshcua.onboard.enforcement.isolated import PART, PRESENT, Caller
 from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.onboard.ports import Event, Presented
 from rtshcua.onboard.runtime import runtime
-from rtshcua.virtual.served import Served
+from rtshcua.virtual.boundary_in_process import Served
 from rtshcua.wire import cbor, cose, response
 from rtshcua.wire.cose import MAX_PROTECTED, EnvelopeError
 

@@ -9,11 +9,10 @@ from typing import Final
 from campaign.wrong import BY_NAME, Aimed
 from rtshcua.app.programs import compile_sources
 from rtshcua.campaign.drawing import FLAVOURS, CampaignTally, FaultSpace, draw
-from rtshcua.campaign.flights import CampaignFlight, FlownMission, moments
-from rtshcua.campaign.results import CampaignResult, JudgeFinding
+from rtshcua.campaign.rounds import CampaignFlight, CampaignResult, FlownMission, JudgeFinding, moments
 from rtshcua.model.faults import KINDS
 from rtshcua.model.scenario import Scenario, Start
-from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.judge import judge
 
 ISSUED_US: Final = 1_767_225_600_000_000

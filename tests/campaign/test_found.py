@@ -6,11 +6,11 @@ import pytest
 
 from campaign.flying import SKILLS, flown
 from campaign.test_wrong import at, of, slugs
-from rtshcua.campaign.written import incident_text
+from rtshcua.campaign.scenario_source import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.scenario import AtTime, Incident
-from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.judge import judge
 
 S = 1_000_000

@@ -5,11 +5,11 @@ import pytest
 from campaign.flying import SKILLS, calm, flight_of, flown, right, space, wrong_fails, wrongly
 from campaign.wrong import BY_NAME, WRONG
 from rtshcua.campaign.drawing import CampaignTally
-from rtshcua.campaign.written import incident_text
+from rtshcua.campaign.scenario_source import incident_text
 from rtshcua.model import faults
 from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.scenario import AtTime, Incident, Scenario, Start
-from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.judge import judge
 
 S = 1_000_000

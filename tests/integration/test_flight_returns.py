@@ -12,7 +12,7 @@ from rtshcua.model import faults
 from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.scenario import AfterStep
 from rtshcua.onboard.ports import Ending
-from rtshcua.virtual.flown import ScenarioFlown, TruthSample
+from rtshcua.virtual.flight_record import ScenarioFlown, TruthSample
 from rtshcua.virtual.judge import judge
 from rtshcua.virtual.zone_truth import local_mm
 from virtual import case

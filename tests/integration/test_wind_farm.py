@@ -8,14 +8,14 @@ import pytest
 
 from rtshcua.app.programs import read_sources
 from rtshcua.app.testing.run import ISSUED_AT_US
-from rtshcua.campaign.flights import FlownMission
+from rtshcua.campaign.rounds import FlownMission
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.front.cli import app
 from rtshcua.front.cli.table import COMMANDS
 from rtshcua.ground.pipeline.suite import scenarios
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.mavlink import dialect
-from rtshcua.virtual import development
+from rtshcua.virtual import development_keys
 from rtshcua.virtual.expectations import expectations
 from rtshcua.virtual.flight import LATER_US
 from rtshcua.virtual.judge import judge
@@ -68,7 +68,7 @@ def test_it_flies_as_its_scenarios_say(farm: Path, name: str, flavour: str) -> N
     assert flavour in chosen.scenario.flavours
     policy, start = chosen.policy.lowered.policy, chosen.scenario.start
     assert start.utc_us is not None
-    mission = development.flies_at(chosen.mission, start.utc_us)
+    mission = development_keys.flies_at(chosen.mission, start.utc_us)
     was = FlownMission.of(policy, mission, mission.issued_at_us).flown(chosen.scenario, flavour, 1)
     verdict = judge(was)
     assert verdict.failures == ()

@@ -7,7 +7,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import AtTime, Expectation, Expected, Incident, Scenario, Start, When
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.fitting import fitting
-from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.scenario import Keys, fly
 from rtshcua.wire.keys import Duty
 from virtual import case

@@ -22,7 +22,7 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Event
 from rtshcua.simulation.fault_syntax import fault_words
 from rtshcua.virtual.expectations import Met, recorded
-from rtshcua.virtual.triggers import Due, Triggers
+from rtshcua.virtual.scenario import Due, Triggers
 
 Watch = Callable[[Now, Sequence[Event], Sequence[Action]], None]
 

@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from typing import Final
 
-from rtshcua.campaign.flights import FlownMission
-from rtshcua.campaign.trying import ScenarioTrial, tries
-from rtshcua.campaign.workers import Here, WorkerProcesses, FlightWorkers, cores
+from rtshcua.campaign.rounds import FlownMission
+from rtshcua.campaign.scenario_trials import ScenarioTrial, tries
+from rtshcua.campaign.workers import FlightWorkers, Here, WorkerProcesses, cores
 from rtshcua.ground.testing.reporting import FlightResult, ScenarioResult, findings
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
-from rtshcua.virtual import development
+from rtshcua.virtual import development_keys
 
 #: fewer are flown in this process
 _FEW: Final = 4
@@ -41,7 +41,7 @@ class Flying:
     def _fly(self, scenario: ScenarioFlight) -> ScenarioResult:
         policy, mission, start = scenario.policy.lowered.policy, scenario.mission, scenario.scenario.start
         if start.utc_us is not None:
-            mission = development.flies_at(mission, start.utc_us)
+            mission = development_keys.flies_at(mission, start.utc_us)
         field = FlownMission.of(policy, mission, mission.issued_at_us)
         wanted = list(tries(scenario.scenario))
         workers: FlightWorkers = Here()

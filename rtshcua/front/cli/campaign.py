@@ -17,15 +17,13 @@ from rtshcua import __version__, library
 from rtshcua.app.exit_codes import exit_code, words_of
 from rtshcua.app.programs import compile_sources, no_source
 from rtshcua.app.wording import moment
-from rtshcua.campaign.campaign import CampaignOrder, drawn, fly_rounds
+from rtshcua.campaign.campaign_folder import CampaignFolder, CampaignIdentity
+from rtshcua.campaign.campaign_report import CampaignSummary, as_json, summarise
 from rtshcua.campaign.drawing import FLAVOURS, FaultSpace, answers_of
-from rtshcua.campaign.flights import CampaignFlight, FlownMission
-from rtshcua.campaign.folder import CampaignFolder, CampaignIdentity
-from rtshcua.campaign.results import CampaignResult
+from rtshcua.campaign.rounds import CampaignFlight, CampaignOrder, CampaignResult, FlownMission, drawn, fly_rounds
+from rtshcua.campaign.scenario_source import scenario_text
 from rtshcua.campaign.shrinking import shrink
-from rtshcua.campaign.summary import CampaignSummary, as_json, summarise
 from rtshcua.campaign.workers import DaskWorkers, FlightWorkers, Here, WorkerProcesses, cores
-from rtshcua.campaign.written import scenario_text
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import nearest

@@ -8,10 +8,23 @@ from random import Random
 
 import pytest
 
-from rtshcua.campaign.campaign import FIRST, ROUND, CampaignOrder, drawn, fly_rounds, rounds
 from rtshcua.campaign.drawing import FaultSpace
-from rtshcua.campaign.flights import LOST, CampaignFlight, FlownMission
-from rtshcua.campaign.results import CampaignResult, JudgeFinding, read_results, result_line, tally
+from rtshcua.campaign.rounds import (
+    FIRST,
+    LOST,
+    ROUND,
+    CampaignFlight,
+    CampaignOrder,
+    CampaignResult,
+    FlownMission,
+    JudgeFinding,
+    drawn,
+    fly_rounds,
+    read_results,
+    result_line,
+    rounds,
+    tally,
+)
 from rtshcua.campaign.workers import Here, WorkerProcesses
 
 S = 1_000_000
@@ -39,7 +52,7 @@ class Shuffled:
         self.chance, self.left = Random(seed), most
         self.flown: list[int] = []
 
-    def fly_rounds(self, field: FlownMission, flights: Sequence[CampaignFlight]) -> Iterator[CampaignResult]:
+    def fly(self, field: FlownMission, flights: Sequence[CampaignFlight]) -> Iterator[CampaignResult]:
         assert field is FIELD
         for flight in self.chance.sample(flights, len(flights)):
             if not self.left:
@@ -117,7 +130,7 @@ class Nothing(FlownMission):
 
     __slots__ = ()
 
-    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
+    def fly(self, flight: CampaignFlight) -> CampaignResult:
         return result(flight)
 
 
@@ -126,7 +139,7 @@ class DiesOnce(Nothing):
 
     __slots__ = ()
 
-    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
+    def fly(self, flight: CampaignFlight) -> CampaignResult:
         return _dies_once(Path(self.root.decode()), flight)
 
 
@@ -135,7 +148,7 @@ class DiesAlways(Nothing):
 
     __slots__ = ()
 
-    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
+    def fly(self, flight: CampaignFlight) -> CampaignResult:
         return _dies_always(flight)
 
 
@@ -187,7 +200,7 @@ class NeverEnds(Nothing):
 
     __slots__ = ()
 
-    def fly_rounds(self, flight: CampaignFlight) -> CampaignResult:
+    def fly(self, flight: CampaignFlight) -> CampaignResult:
         while True:
             signal.pause()
 

@@ -1,8 +1,8 @@
 """A failing scenario becomes small: only what is needed is left, and what is left is round."""
 
 from rtshcua.campaign.drawing import CampaignTally, FaultSpace, Moment, draw
+from rtshcua.campaign.scenario_source import incident_text, scenario_text
 from rtshcua.campaign.shrinking import shrink
-from rtshcua.campaign.written import incident_text, scenario_text
 from rtshcua.model.faults import Fault, GpsLoss, LinkSilence, WindStep
 from rtshcua.model.scenario import AtTime, Incident, Scenario, Start
 from virtual.rows import rows

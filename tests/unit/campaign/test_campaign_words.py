@@ -2,7 +2,7 @@
 
 from dataclasses import fields
 
-from rtshcua.campaign.words import FAULTS, MARGINS, margin_told
+from rtshcua.campaign.campaign_report import FAULTS, MARGINS, margin_told
 from rtshcua.model.faults import KINDS
 from rtshcua.virtual.judge import Margins
 

@@ -15,7 +15,7 @@ from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import AREA, Zone, unproject
 from rtshcua.model.scenario import Start
-from rtshcua.virtual.flown import IncidentOccurrence, Reaction, ScenarioFlown, SentFrame, TruthSample
+from rtshcua.virtual.flight_record import IncidentOccurrence, Reaction, ScenarioFlown, SentFrame, TruthSample
 from rtshcua.virtual.judge import SLUGS, Judgement, judge, moves
 from rtshcua.virtual.zone_truth import inside_mm
 from virtual import case
@@ -29,7 +29,7 @@ S, M = case.S, case.M
 @pytest.fixture(scope="module")
 def good() -> ScenarioFlown:
     was = once("judged-flight", lambda: flown(scenario()))
-    # what really was is made by hand here: what it heard of that is not told (`conduct`)
+    # what really was is made by hand here: what it heard of that is not told (`runtime_checks`)
     return replace(was, lives=tuple(replace(life, turns=()) for life in was.lives))
 
 

@@ -21,7 +21,7 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import NUMBER, Signal
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.virtual.flown import HeardReadings, Turn
+from rtshcua.virtual.flight_record import HeardReadings, Turn
 from rtshcua.virtual.naive_supervision import (
     ConditionQuery,
     HeardState,

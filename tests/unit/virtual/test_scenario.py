@@ -24,7 +24,7 @@ from rtshcua.model.scenario import (
     Start,
 )
 from rtshcua.virtual.expectations import expectations
-from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.judge import judge, moves
 from virtual import case
 from virtual.once import once

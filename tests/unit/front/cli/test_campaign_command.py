@@ -11,9 +11,8 @@ from msgspec.structs import replace
 
 from rtshcua import library
 from rtshcua.app.testing import flying
-from rtshcua.campaign.flights import FlownMission, CampaignFlight
-from rtshcua.campaign.results import JudgeFinding, CampaignResult
-from rtshcua.campaign.trying import ScenarioTrial, Try
+from rtshcua.campaign.rounds import CampaignFlight, CampaignResult, FlownMission, JudgeFinding
+from rtshcua.campaign.scenario_trials import ScenarioTrial, Try
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.ground.testing.reporting import FlightFailure, FlightResult
@@ -93,8 +92,8 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
 def fly_one_again(line: dict[str, Any]) -> CampaignResult:
     """Flight 0 once more, in this process, from what the folder says alone."""
     from rtshcua.app.programs import compile_sources
-    from rtshcua.campaign.campaign import CampaignOrder, drawn
     from rtshcua.campaign.drawing import FLAVOURS
+    from rtshcua.campaign.rounds import CampaignOrder, drawn
     from rtshcua.front.cli.campaign import _kinds, _space
 
     begun = json.loads(Path("made/campaign.json").read_text())
@@ -179,7 +178,7 @@ def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(
     page = Path("runs/campaign-short-1/report.html").read_text()
     assert "flew into a &lt;pillar&gt;" in page
     assert "<pillar>" not in page
-    monkeypatch.setattr(flying.Trial, "fly", _failing)
+    monkeypatch.setattr(flying.ScenarioTrial, "fly", _failing)
     assert app.main(["test", "runs/campaign-short-1/failures"]) == ExitCode.TESTS
     assert "collision" in capsys.readouterr().err
 

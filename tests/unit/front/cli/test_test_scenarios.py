@@ -98,7 +98,7 @@ def not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
             flight.number, flight.flavour, flight.seed, "aborted", found, ("late: wind",), ("3.00 s x",), ()
         )
 
-    monkeypatch.setattr(flying.Trial, "fly", fly)
+    monkeypatch.setattr(flying.ScenarioTrial, "fly", fly)
     monkeypatch.setattr(flying, "cores", lambda: 1)
 
 

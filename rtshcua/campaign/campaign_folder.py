@@ -13,9 +13,8 @@ import msgspec
 
 from rtshcua.adapters.store.reading import open_regular, read_if_there
 from rtshcua.adapters.store.writing import append, make_folder, replace, write_new
-from rtshcua.campaign.page import report_page
-from rtshcua.campaign.results import CampaignResult, read_results, result_line
-from rtshcua.campaign.summary import CampaignSummary, as_json
+from rtshcua.campaign.campaign_report import CampaignSummary, as_json, report_page
+from rtshcua.campaign.rounds import CampaignResult, read_results, result_line
 from rtshcua.diagnostics.refusal import Refusal
 
 _LARGEST: Final = 1 << 16

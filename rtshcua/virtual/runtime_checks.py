@@ -28,7 +28,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import step_words
 from rtshcua.virtual.excuses import JudgedFailure
-from rtshcua.virtual.flown import Life, ScenarioFlown, SentFrame, TruthSample, records_of
+from rtshcua.virtual.flight_record import Life, ScenarioFlown, SentFrame, TruthSample, records_of
 from rtshcua.virtual.naive_supervision import DURATION, JudgedState, RunningStep, Span, WatchedStep, supervise
 from rtshcua.virtual.zone_truth import local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP

@@ -8,7 +8,7 @@ from reference.world import ROOT, VEHICLE
 from rtshcua.onboard.enforcement import isolated as calls
 from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Ending
-from rtshcua.virtual.served import Served
+from rtshcua.virtual.boundary_in_process import Served
 from virtual.flight import Flight
 from virtual.shipped import shipped, simulated
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter_ns
 
-from rtshcua.campaign.flights import DIED, LOST, FlownMission
+from rtshcua.campaign.rounds import DIED, LOST, FlownMission
 from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Flaw
@@ -17,7 +17,7 @@ from rtshcua.ground.why.recorded import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.scenario import Scenario
 from rtshcua.virtual.expectations import expectations
-from rtshcua.virtual.flown import ScenarioFlown
+from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.judge import judge
 from rtshcua.wire.request import STEP
 

@@ -1,13 +1,49 @@
-"""What a campaign found, as one object for programs, and for the page that people read."""
+"""What a campaign found: as one object for programs, and as one HTML page that needs no script, file or network."""
 
+from base64 import b64encode
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final
+from functools import cache
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any, Final, NamedTuple
 
 import msgspec
+from jinja2 import DictLoader, Environment, StrictUndefined
+from markupsafe import Markup
 
-from rtshcua.campaign.results import CampaignResult, JudgeFinding
-from rtshcua.campaign.words import FAULTS, MARGINS
+from rtshcua.campaign.rounds import CampaignResult, JudgeFinding
+from rtshcua.model.faults import KINDS
+
+
+class MarginUnit(NamedTuple):
+    """What a margin is, its unit for people, and how many of its own make one of these."""
+
+    title: str
+    unit: str
+    parts: int
+
+
+#: by the names of `rtshcua.virtual.judge.Margins`
+MARGINS: Final[Mapping[str, MarginUnit]] = {
+    "fence_mm": MarginUnit("distance inside the airspace, at its edge", "m", 1_000),
+    "obstacle_mm": MarginUnit("distance to what stands around", "m", 1_000),
+    "stop_us": MarginUnit("time from the cause of a fallback to its first frame", "s", 1_000_000),
+    "takeover_us": MarginUnit("time from a takeover to the last frame that moves the vehicle", "s", 1_000_000),
+    "ended_us": MarginUnit("time that the vehicle went on after the run had ended", "s", 1_000_000),
+}
+
+#: what sources and `--fault` call a kind of fault, by its own name; of two the longer one, which says more
+FAULTS: Final[Mapping[str, str]] = {
+    kind.__name__: word for word, kind in sorted(KINDS.items(), key=lambda each: len(each[0]))
+}
+
+
+def margin_told(name: str, value: int) -> str:
+    """A margin with its unit, to three digits."""
+    told = MARGINS[name]
+    return f"{value / told.parts:.3g} {told.unit}"
+
 
 #: bars of a histogram
 _BARS: Final = 24
@@ -138,3 +174,43 @@ def as_json(summary: CampaignSummary) -> dict[str, Any]:
     """For a program."""
     made: dict[str, Any] = msgspec.to_builtins(summary)
     return made
+
+
+_HEIGHT: Final = 48
+_WIDTH: Final = 10
+
+
+def report_page(summary: CampaignSummary) -> str:
+    """The page; the same bytes for the same summary."""
+    environment, style = _environment()
+    labels = sorted({label for counts in summary.near.values() for label in counts})
+    endings = sorted({ending for counts in summary.endings.values() for ending in counts})
+    return environment.get_template("report.html").render(
+        summary=summary,
+        labels=labels,
+        endings=endings,
+        most=max((count for counts in summary.near.values() for count in counts.values()), default=1),
+        style=Markup(style),
+        style_digest=b64encode(sha256(style.encode()).digest()).decode("ascii"),
+        bars=_bars,
+        told=margin_told,
+        hours=summary.flown_us / 3_600_000_000,
+        width=_WIDTH,
+        height=_HEIGHT,
+    )
+
+
+def _bars(counts: Sequence[int]) -> list[tuple[int, int, int]]:
+    """Left edge, top and height of each bar."""
+    most = max(counts, default=1) or 1
+    heights = [0 if count == 0 else max(1, round(count * _HEIGHT / most)) for count in counts]
+    return [(number * _WIDTH, _HEIGHT - height, height) for number, height in enumerate(heights)]
+
+
+@cache
+def _environment() -> tuple[Environment, str]:
+    folder = files("rtshcua.campaign") / "templates"
+    template = (folder / "report.html").read_text(encoding="utf-8")
+    loader = DictLoader({"report.html": template})
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment, (folder / "report.css").read_text(encoding="utf-8")

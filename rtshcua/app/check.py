@@ -12,8 +12,8 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.prove.mission_bounds import Bounds
-from rtshcua.ground.report.changes import told_changes
-from rtshcua.ground.report.model import ChangeTold
+from rtshcua.ground.report.policy_changes import describe_changes
+from rtshcua.ground.report.report_model import ChangeView
 from rtshcua.ground.versions.raised import compare
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.bundle import MAX_BUNDLE
@@ -70,7 +70,7 @@ class ComparedPolicy(NamedTuple):
     name: str
     version: int
     earlier: int
-    changes: tuple[ChangeTold, ...]
+    changes: tuple[ChangeView, ...]
 
 
 class CheckResult(NamedTuple):
@@ -118,15 +118,15 @@ def check(request: CheckRequest, progress: Progress = iter) -> CheckResult | Ref
 def draw_map(found: CheckResult, request: CheckRequest) -> int | Refusal:
     """Write the page that was asked for; gives how many missions are drawn. Raises OSError."""
     from rtshcua.adapters.store.writing import replace
-    from rtshcua.ground.report.checked import Checking, checked_page
+    from rtshcua.ground.report.mission_maps import CheckedProgram, mission_map_page
 
     assert request.map is not None
     imported = overwriting_a_source(request.map, found.sources, "a page")
     if imported is not None:
         return imported
     checked = [(each.reading.program, examine(each.reading, request.issued_at_us)) for each in found.programs]
-    checkings = [Checking(program, one.planned, one.diagnostics) for program, one in checked]
-    replace(request.map, checked_page(checkings).encode("utf-8"))
+    checkings = [CheckedProgram(program, one.planned, one.diagnostics) for program, one in checked]
+    replace(request.map, mission_map_page(checkings).encode("utf-8"))
     return sum(len(one.planned) for _, one in checked)
 
 
@@ -192,7 +192,7 @@ def check_all(
     found: dict[tuple[object, ...], Diagnostic] = {}
     sources: dict[str, Source] = {}
     missions: dict[tuple[str, str], CheckedMission] = {}
-    versions: dict[tuple[str, int, int], dict[ChangeTold, None]] = {}
+    versions: dict[tuple[str, int, int], dict[ChangeView, None]] = {}
     left_out: dict[LeftOutCounts, None] = {}
     for each in asked:
         program = each.reading.program
@@ -201,7 +201,7 @@ def check_all(
         compared = compare(checked.policies, earlier.policies, earlier.name, program.sources)
         for one in compared:
             changes = versions.setdefault((one.name, one.version, one.earlier), {})
-            changes |= dict.fromkeys(told_changes(one.old, one.new))
+            changes |= dict.fromkeys(describe_changes(one.old, one.new))
         left_out |= {_left_out(lowered.policy): None for lowered in checked.policies if lowered.policy.left_out}
         wrong = [*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)]
         for diagnostic in wrong:  # a file that two programs share has its findings once

@@ -11,13 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 777,
-    "code lines": 84_146,
-    "shared class names": 56,
-    "of them across packages": 36,
-    "shared file names": 93,
+    "modules": 764,
+    "code lines": 84_136,
+    "shared class names": 48,
+    "of them across packages": 32,
+    "shared file names": 89,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 33,
+    "modules below 80 lines with one importer": 31,
     "functions of more than 60 lines": 21,
     "functions of a complexity over 15": 143,
     "functions of a complexity over 25": 9,

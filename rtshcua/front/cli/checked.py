@@ -18,7 +18,7 @@ from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.progress import watched
 from rtshcua.front.cli.stdout import out
-from rtshcua.ground.report.model import ChangeTold
+from rtshcua.ground.report.report_model import ChangeView
 
 
 def check_sources(
@@ -103,7 +103,7 @@ def _tell(found: CheckResult, since: Path | None, now_us: int) -> None:
         out(f"{name}: in {since}, and compared with no policy here")
 
 
-def _tell_change(change: ChangeTold) -> None:
+def _tell_change(change: ChangeView) -> None:
     """One difference: which way it goes, and its words then and now."""
     out_wrapped(f"  {change.direction:<11}  ", change.what)
     for what, lines in (("before", change.before), ("now", change.after)):

@@ -26,8 +26,7 @@ from rtshcua.front.cli.stdout import out, out_rendered
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.program import Checked, compile_program
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.report.cases import Tried
-from rtshcua.ground.report.handbook import Flown, Part, called, handbook
+from rtshcua.ground.report.policy_report import CompiledMission, DecidedCases, ReportPart, distinct_names, policy_report
 from rtshcua.ground.testing.case_result import run_case
 from rtshcua.ground.versions.raised import compare
 from rtshcua.mavlink import dialect
@@ -107,7 +106,7 @@ def docs(
         help = "a policy and a vehicle make what is signed; the sources may import both"
         return findings.refuse(ExitCode.INPUT, "no-policy", "the sources have no policy with a vehicle", help)
     made_by = f"rtshcua {__version__}"
-    book = handbook(
+    book = policy_report(
         parts,
         made_at_us=made_at,
         made_by=made_by,
@@ -119,14 +118,14 @@ def docs(
         say(f"nothing in {since} is an earlier version of a policy here")
     if as_json:
         return findings.finish(ExitCode.OK, handbook=asdict(book))
-    from rtshcua.ground.report.page import page
+    from rtshcua.ground.report.html_page import page
 
     text = page(book)
     if target is None:
         out_rendered(text, end="")
         return ExitCode.OK
     replace_inside(target, text.encode("utf-8"))
-    for chapter, name in zip(book.chapters, called(book.chapters), strict=True):
+    for chapter, name in zip(book.chapters, distinct_names(book.chapters), strict=True):
         out(f"{name}: version {chapter.version}, digest {chapter.digest}")
     out(f"{len(book.chapters)} {'policies' if len(book.chapters) > 1 else 'policy'}, written to {target}")
     return ExitCode.OK
@@ -156,7 +155,7 @@ class _Trials(NamedTuple):
     of; what is wrong with the cases, and the texts that this is about.
     """
 
-    tried: dict[str, list[Tried]]
+    tried: dict[str, list[DecidedCases]]
     scenarios: dict[str, list[ScenarioDecl]]
     diagnostics: list[Diagnostic]
     sources: dict[str, Source]
@@ -180,11 +179,11 @@ def _trials(asked: Sequence[RootProgram], files: Sequence[Path]) -> _Trials:
             cases = suite(program, dialect.load())
             trials.diagnostics.extend(cases.diagnostics)
             trials.sources.update(cases.sources)
-            own.append(Tried(program, tuple(run_case(case) for case in cases.cases)))
+            own.append(DecidedCases(program, tuple(run_case(case) for case in cases.cases)))
     return trials
 
 
-def _part(asked: RootProgram, checked: Checked, trials: _Trials) -> Part:
+def _part(asked: RootProgram, checked: Checked, trials: _Trials) -> ReportPart:
     """A program with those of its missions that need no further values."""
     program = asked.reading.program
     tried, scenarios = trials.tried[asked.name], trials.scenarios[asked.name]
@@ -196,5 +195,5 @@ def _part(asked: RootProgram, checked: Checked, trials: _Trials) -> Part:
             name = mission.name.text
             compiled = compile_program(program, dialect.load(), mission=name, issued_at_us=0)
             if compiled.policy is not None and compiled.mission is not None:
-                flown.append(Flown(compiled.policy, compiled.mission, mission, checked.bounds.get(name)))
-    return Part(program, checked.policies, tuple(flown), checked.diagnostics, tuple(tried), tuple(scenarios))
+                flown.append(CompiledMission(compiled.policy, compiled.mission, mission, checked.bounds.get(name)))
+    return ReportPart(program, checked.policies, tuple(flown), checked.diagnostics, tuple(tried), tuple(scenarios))

@@ -1,5 +1,5 @@
-"""A handbook: skills and policies told in plain sentences, tables and maps, for a person who signs them off.
+"""The policy report: what a policy says, in sentences and drawings, for the person who signs it.
 
-`words` says every construct of the language in English, `drawing` draws zones and ways, `handbook` puts both together
-as one plain value (`model`), and `page` renders that as HTML.
+`policy_report` makes the report as one value (`report_model`), a chapter for each policy; `html_page` renders it.
+`prose` says things in words, `drawing` draws maps and profiles. `mission_maps` is the page of `rtshcua check --map`.
 """

@@ -1,44 +1,214 @@
-"""One policy for one vehicle, with all that it rests on."""
+"""The chapter of one policy for one vehicle: rules, skills, signals, zones as signed, and missions with their paths."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 
+from rtshcua.decision.outline import rings
 from rtshcua.ground.lower.policy_checks import applies, rule_applies
-from rtshcua.ground.report.changes import Changes, changes
-from rtshcua.ground.report.model import (
-    CaseTold,
+from rtshcua.ground.lower.zones import derived_name
+from rtshcua.ground.prove.mission_bounds import Bounds, rounded_energy, rounded_time
+from rtshcua.ground.report.permissions import asked_of, permitted_limits, rights, rule_names
+from rtshcua.ground.report.policy_changes import PolicyChanges, changes
+from rtshcua.ground.report.prose.mission_steps import (
+    describe_asker,
+    describe_otherwise,
+    describe_step,
+    describe_tighter,
+)
+from rtshcua.ground.report.prose.phrases import degrees
+from rtshcua.ground.report.prose.rules_and_skills import (
+    AS_LINK,
+    describe_airspace,
+    describe_chain,
+    describe_clause,
+    describe_evidence,
+    describe_left_out,
+    describe_members,
+    describe_motion,
+    describe_parameter,
+    describe_patterns,
+    describe_record,
+    describe_rule,
+    describe_silence,
+    describe_sources,
+    describe_timing,
+    describe_type,
+    describe_unknown,
+)
+from rtshcua.ground.report.prose.zones_and_vehicle import (
+    describe_band,
+    describe_shape,
+    describe_times,
+    describe_vehicle,
+    places_of,
+)
+from rtshcua.ground.report.report_model import (
+    CaseView,
     Chapter,
     Fact,
     FileDigest,
-    MissionTold,
-    ParameterTold,
-    PatternTold,
-    RuleTold,
-    ScenarioTold,
-    SignalTold,
-    SkillTold,
-    Start,
+    MissionView,
+    NominalView,
+    ParameterView,
+    PatternView,
+    PlaceView,
+    RuleView,
+    ScenarioView,
+    SignalView,
+    SkillView,
+    StepView,
+    ZoneOutline,
+    ZoneView,
 )
-from rtshcua.ground.report.permitted_limits import permitted
-from rtshcua.ground.report.rights import asked_of, rights, rule_names
-from rtshcua.ground.report.subject import Subject
-from rtshcua.ground.report.words.places import told_vehicle
-from rtshcua.ground.report.words.rules import told_airspace, told_evidence, told_rule, told_silence
-from rtshcua.ground.report.words.signals import told_members, told_sources, told_type, told_unknown
-from rtshcua.ground.report.words.skills import (
-    AS_LINK,
-    told_chain,
-    told_clause,
-    told_left_out,
-    told_motion,
-    told_parameter,
-    told_patterns,
-    told_record,
-    told_timing,
-)
-from rtshcua.ground.report.zones import zones
+from rtshcua.ground.report.reported_policy import ReportedPolicy, within
+from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import AfterSilence, Policy
+from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, project, unproject
+from rtshcua.model.ir.expression import Grow, Quantity
+from rtshcua.model.ir.places import Combination, GeoJson, Shape, ZoneDecl
 from rtshcua.model.ir.skills import Clause, SkillDecl
+from rtshcua.model.quantity import Dimension, display
 from rtshcua.wire.bundle import policy_digest, policy_payload
+
+ALLOWED, FORBIDDEN, OTHER = "allowed", "forbidden", ""
+
+
+def zones(subject: ReportedPolicy, changed: frozenset[str]) -> tuple[ZoneView, ...]:
+    """The declared zones in their order, then those that rules derive."""
+    policy = subject.policy
+    told = [_declared(subject, zone, changed) for zone in policy.zones[: policy.declared]]
+    grown = _grown(subject)
+    seen: set[str] = set()
+    for zone in policy.zones[policy.declared :]:
+        if zone.name in grown and zone.name not in seen:
+            seen.add(zone.name)
+            told.append(_derived(zone, grown[zone.name]))
+    return tuple(told)
+
+
+def ground_of(zone: Zone) -> ZoneOutline:
+    """The outline of a flat zone."""
+    if zone.shape == CIRCLE:
+        x, y, squared = zone.data
+        return ZoneOutline(centre=(x, y), radius_squared=squared)
+    return ZoneOutline(rings=tuple(rings(zone)))
+
+
+def _declared(subject: ReportedPolicy, zone: Zone, changed: frozenset[str]) -> ZoneView:
+    declared = subject.symbols.zones[zone.name]
+    return ZoneView(
+        name=zone.name,
+        note=subject.note(declared),
+        use=_use(subject, zone.name),
+        shape=describe_shape(declared.shape),
+        band=describe_band(declared),
+        times=describe_times(declared),
+        ground=ground_of(zone),
+        floor=None if zone.floor == LOWEST else zone.floor,
+        ceiling=None if zone.ceiling == HIGHEST else zone.ceiling,
+        places=tuple(_places(subject, declared, zone)),
+        place=subject.place(declared.span),
+        changed=zone.name in changed,
+    )
+
+
+def _derived(zone: Zone, grow: Grow) -> ZoneView:
+    margin = grow.margin.value if isinstance(grow.margin, Quantity) else 0
+    length = display(abs(margin), Dimension.LENGTH)
+    way = f"nearer than {length} to" if margin >= 0 else f"further than {length} inside of"
+    return ZoneView(
+        name=zone.name,
+        note="",
+        use=OTHER,
+        shape=f"all places {way} `{grow.zone.name}`",
+        band=f"as `{grow.zone.name}`",
+        times=f"as `{grow.zone.name}`",
+        ground=ground_of(zone),
+        floor=None if zone.floor == LOWEST else zone.floor,
+        ceiling=None if zone.ceiling == HIGHEST else zone.ceiling,
+        places=(),
+        place="",
+        changed=False,
+        derived=True,
+    )
+
+
+def _use(subject: ReportedPolicy, name: str) -> str:
+    airspace = subject.lowered.declaration.airspace
+    if airspace is None:
+        return OTHER
+    if name in {each.text for each in airspace.outside}:
+        return FORBIDDEN
+    return ALLOWED if name in {each.text for each in airspace.inside} else OTHER
+
+
+def _grown(subject: ReportedPolicy) -> dict[str, Grow]:
+    """The zones that rules grow, by the name that they have in what is signed."""
+    found = {}
+    for rule in subject.rules:
+        for node in within(rule.when):
+            if isinstance(node, Grow) and isinstance(node.margin, Quantity):
+                found[derived_name(node.zone.name, node.margin.value, smaller=False)] = node
+    return found
+
+
+def _places(subject: ReportedPolicy, declared: ZoneDecl, zone: Zone) -> Iterator[PlaceView]:
+    """The places that a zone is written by, its entry, and of an outline from a file every corner."""
+    projection = subject.policy.projection
+    written = list(places_of(declared.shape))
+    if declared.entry is not None:
+        written.append(("entry", declared.entry))
+    for what, at in written:
+        x, y = project(projection, at.latitude, at.longitude)
+        yield _place(what, at.latitude, at.longitude, x, y)
+    if _from_file(declared.shape):
+        for number, ring in enumerate(ground_of(zone).rings, 1):
+            for corner, (x, y) in enumerate(ring, 1):
+                yield _place(f"ring {number}, corner {corner}", *unproject(projection, x, y), x, y)
+
+
+def _from_file(shape: Shape) -> bool:
+    """Whether no place of a shape, or of a part of it, is written in a source."""
+    if isinstance(shape, Combination):
+        return any(map(_from_file, shape.shapes))
+    return isinstance(shape, GeoJson)
+
+
+def _place(what: str, latitude: int, longitude: int, x: int, y: int) -> PlaceView:
+    return PlaceView(what, degrees(latitude, "N", "S"), degrees(longitude, "E", "W"), x, y)
+
+
+def mission_view(mission: Mission, policy: Policy, bounds: Bounds | None, values: Mapping[str, str]) -> MissionView:
+    """A mission; `values` are those of its parameters that its way is drawn for."""
+    first = mission.invocations[0]
+    by = f"Proposed by {mission.proposer or 'a person'}, {describe_asker(first, policy)}."
+    drawn = ", ".join(f"`{name}` = {value}" for name, value in values.items())
+    return MissionView(
+        name=mission.name,
+        intent=mission.intent,
+        proposed=by,
+        bounds=() if bounds is None else tuple(_bounds(bounds)),
+        values=drawn,
+        steps=tuple(_step(step, mission, policy) for step in mission.invocations),
+    )
+
+
+def _bounds(bounds: Bounds) -> Iterator[Fact]:
+    yield Fact("Steps", f"at most {bounds.invocations}")
+    yield Fact("Time", f"at most {rounded_time(bounds.time_us)} from issue to end")
+    yield Fact("Charge", f"at most {rounded_energy(bounds.energy)} of a full one, as a sum of all that it may take")
+
+
+def _step(step: Invocation, mission: Mission, policy: Policy) -> StepView:
+    path = step.plan.path
+    return StepView(
+        number=step.step + 1,
+        phase=mission.phases[step.phase],
+        told=describe_step(step, policy),
+        otherwise=describe_otherwise(step),
+        tighter=tuple(describe_tighter(step, policy)),
+        path=tuple(zip(path[::2], path[1::2], strict=True)),
+        altitude=step.plan.altitude,
+    )
 
 
 def digest_of(policy: Policy) -> str:
@@ -47,17 +217,17 @@ def digest_of(policy: Policy) -> str:
 
 
 def chapter(
-    subject: Subject,
-    missions: Iterable[MissionTold] = (),
-    starts: Iterable[Start] = (),
-    cases: Iterable[CaseTold] = (),
-    scenarios: Iterable[ScenarioTold] = (),
+    subject: ReportedPolicy,
+    missions: Iterable[MissionView] = (),
+    starts: Iterable[NominalView] = (),
+    cases: Iterable[CaseView] = (),
+    scenarios: Iterable[ScenarioView] = (),
     old: Policy | None = None,
     since: str = "",
 ) -> Chapter:
     """The chapter of a policy; `old` is the earlier one that `since` names, if there is one."""
     policy, declaration = subject.policy, subject.lowered.declaration
-    changed = Changes() if old is None else changes(old, policy)
+    changed = PolicyChanges() if old is None else changes(old, policy)
     signals = [signal.name for signal in policy.signals]
     types = {subject.symbols.signals[name].type.text: None for name in signals}
     return Chapter(
@@ -69,28 +239,28 @@ def chapter(
         files=tuple(
             FileDigest(name, digest.hex()) for name, digest in zip(subject.files, policy.source_digests, strict=True)
         ),
-        vehicle=tuple(Fact(what, value) for what, value in told_vehicle(subject.lowered.vehicle)),
+        vehicle=tuple(Fact(what, value) for what, value in describe_vehicle(subject.lowered.vehicle)),
         home=(0, 0),
         home_within=policy.vehicle.home_within,
         return_altitude=policy.vehicle.return_altitude,
         rights=rights(subject),
         rules=tuple(_rule(subject, number, changed) for number in range(len(policy.rules))),
         rules_left_out=tuple(
-            told_rule(each, rule_names(subject, each))
+            describe_rule(each, rule_names(subject, each))
             for each in declaration.rules
             if not rule_applies(each, frozenset(policy.vehicle.without))
         ),
-        permitted=permitted(subject),
-        airspace=told_airspace(declaration.airspace),
-        contingency=told_chain(declaration.contingency, subject.names),
-        evidence=told_evidence(declaration.without_evidence),
-        silence=told_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),
+        permitted=permitted_limits(subject),
+        airspace=describe_airspace(declaration.airspace),
+        contingency=describe_chain(declaration.contingency, subject.names),
+        evidence=describe_evidence(declaration.without_evidence),
+        silence=describe_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),
         skills=tuple(
             _skill(subject, subject.symbols.skills[each.name], each.name in changed.skills) for each in policy.contracts
         ),
         signals=tuple(_signal(subject, name, name in changed.signals) for name in signals),
         states=tuple(
-            Fact(name, told_members(subject.symbols.enums[name])) for name in types if name in subject.symbols.enums
+            Fact(name, describe_members(subject.symbols.enums[name])) for name in types if name in subject.symbols.enums
         ),
         zones=zones(subject, changed.zones),
         missions=tuple(missions),
@@ -102,56 +272,56 @@ def chapter(
     )
 
 
-def _rule(subject: Subject, number: int, changed: Changes) -> RuleTold:
+def _rule(subject: ReportedPolicy, number: int, changed: PolicyChanges) -> RuleView:
     flat, rule = subject.policy.rules[number], subject.rules[number]
-    return RuleTold(
+    return RuleView(
         number=number + 1,
         kind=rule.kind,
-        told=told_rule(rule, rule_names(subject, rule)),
+        told=describe_rule(rule, rule_names(subject, rule)),
         written=flat.text,
         place=subject.place(rule.span),
         changed=number in changed.rules,
     )
 
 
-def _skill(subject: Subject, skill: SkillDecl, changed: bool) -> SkillTold:
+def _skill(subject: ReportedPolicy, skill: SkillDecl, changed: bool) -> SkillView:
     names = asked_of(subject, [skill])
 
     without = frozenset(subject.policy.vehicle.without)
     parts = (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
 
     def clauses(some: tuple[Clause, ...]) -> tuple[str, ...]:
-        return tuple(told_clause(each, names) for each in some if applies(each, without))
+        return tuple(describe_clause(each, names) for each in some if applies(each, without))
 
-    return SkillTold(
+    return SkillView(
         name=skill.name.text,
         note=subject.note(skill),
-        motion=told_motion(skill.motion),
-        patterns=tuple(PatternTold(*each) for each in told_patterns(skill)),
+        motion=describe_motion(skill.motion),
+        patterns=tuple(PatternView(*each) for each in describe_patterns(skill)),
         parameters=tuple(
-            ParameterTold(each.name.text, *told_parameter(each, subject.names)) for each in skill.parameters
+            ParameterView(each.name.text, *describe_parameter(each, subject.names)) for each in skill.parameters
         ),
-        timing=tuple(told_timing(skill)),
+        timing=tuple(describe_timing(skill)),
         require=clauses(skill.require),
         assume=clauses(skill.assume),
         maintain=clauses(skill.maintain),
         left_out=tuple(
-            told_left_out(part, each, names) for part, some in parts for each in some if not applies(each, without)
+            describe_left_out(part, each, names) for part, some in parts for each in some if not applies(each, without)
         ),
-        fallback=told_chain(skill.fallback, names),
+        fallback=describe_chain(skill.fallback, names),
         as_link=AS_LINK if skill.name.text in _last_links(subject) else "",
-        record=told_record(skill),
+        record=describe_record(skill),
         place=subject.place(skill.span),
         changed=changed,
     )
 
 
-def _last_links(subject: Subject) -> frozenset[str]:
+def _last_links(subject: ReportedPolicy) -> frozenset[str]:
     """The skills that the chains of a policy end in."""
     chains = [subject.policy.contingency, *(contract.fallback for contract in subject.policy.contracts)]
     return frozenset(subject.policy.contracts[chain[-1].skill].name for chain in chains if chain)
 
 
-def _signal(subject: Subject, name: str, changed: bool) -> SignalTold:
+def _signal(subject: ReportedPolicy, name: str, changed: bool) -> SignalView:
     signal = subject.symbols.signals[name]
-    return SignalTold(name, told_type(signal), told_sources(signal), told_unknown(signal), changed)
+    return SignalView(name, describe_type(signal), describe_sources(signal), describe_unknown(signal), changed)

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Iterator
 
-from rtshcua.ground.report.model import Chapter, Fact, Glance, Rights
-from rtshcua.ground.report.words.vocabulary import listed, name
+from rtshcua.ground.report.prose.phrases import listed, name
+from rtshcua.ground.report.report_model import Chapter, Fact, Glance, Rights
 
 #: so many things are told one by one; of more how many there are
 MANY = 6

@@ -1,13 +1,13 @@
-"""How a part of the local plane lies on a drawing, and numbers as SVG has them.
+"""The surface of a drawing: its scale, boxes and labels that do not overlap, hatching, and numbers as SVG writes them.
 
-Here are the only floats of the handbook: they say where on the page something is drawn, and decide nothing.
+Only this package uses floats: they say where on the page something is drawn, and decide nothing.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from math import isqrt
 
-from rtshcua.ground.report.model import Ground
+from rtshcua.ground.report.report_model import ZoneOutline
 
 #: px
 WIDTH, LEAST_HEIGHT, MOST_HEIGHT, MARGIN = 880, 300, 640, 34
@@ -18,7 +18,7 @@ LEAST_EXTENT = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class DrawnExtent:
     """West, south, east and north, in mm of the local plane."""
 
     west: int
@@ -26,9 +26,9 @@ class Extent:
     east: int
     north: int
 
-    def around(self, other: "Extent") -> "Extent":
+    def around(self, other: "DrawnExtent") -> "DrawnExtent":
         """What holds both."""
-        return Extent(
+        return DrawnExtent(
             min(self.west, other.west),
             min(self.south, other.south),
             max(self.east, other.east),
@@ -65,7 +65,7 @@ class Canvas:
         return f"matrix({self.scale:.9g} 0 0 {self.scale:.9g} {number(self.x0)} {number(self.y0)})"
 
 
-def canvas(extent: Extent) -> Canvas:
+def canvas(extent: DrawnExtent) -> Canvas:
     """The drawing that shows an extent whole, with a margin around it."""
     across = max(extent.east - extent.west, LEAST_EXTENT)
     along = max(extent.north - extent.south, LEAST_EXTENT)
@@ -81,26 +81,26 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def extent_of(ground: Ground) -> Extent:
+def extent_of(ground: ZoneOutline) -> DrawnExtent:
     """What an outline reaches over."""
     if ground.centre is not None:
         (x, y), r = ground.centre, radius(ground)
-        return Extent(x - r, y - r, x + r, y + r)
+        return DrawnExtent(x - r, y - r, x + r, y + r)
     return extent_of_places(corner for ring in ground.rings for corner in ring)
 
 
-def extent_of_places(places: Iterable[tuple[int, int]]) -> Extent:
+def extent_of_places(places: Iterable[tuple[int, int]]) -> DrawnExtent:
     """What places reach over; there is at least one."""
     xs, ys = zip(*places, strict=True)
-    return Extent(min(xs), min(ys), max(xs), max(ys))
+    return DrawnExtent(min(xs), min(ys), max(xs), max(ys))
 
 
-def radius(ground: Ground) -> int:
+def radius(ground: ZoneOutline) -> int:
     """The radius of a circle, mm; whole, for it is declared so."""
     return isqrt(ground.radius_squared)
 
 
-def path(ground: Ground) -> str:
+def path(ground: ZoneOutline) -> str:
     """The outline as the `d` of an SVG path, in mm, y to the south; a circle as two arcs."""
     if ground.centre is not None:
         (x, y), r = ground.centre, radius(ground)
@@ -108,7 +108,7 @@ def path(ground: Ground) -> str:
     return "".join("M" + "L".join(f"{x} {-y}" for x, y in ring) + "Z" for ring in ground.rings)
 
 
-def contains(ground: Ground, x: int, y: int) -> bool:
+def contains(ground: ZoneOutline, x: int, y: int) -> bool:
     """Whether a place lies inside of an outline, by the parity of what a ray to the east crosses."""
     if ground.centre is not None:
         return (x - ground.centre[0]) ** 2 + (y - ground.centre[1]) ** 2 < ground.radius_squared
@@ -118,3 +118,154 @@ def contains(ground: Ground, x: int, y: int) -> bool:
             if (ay > y) != (by > y) and ((bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0) == (by > ay):
                 odd = not odd
     return odd
+
+
+#: px: a line of text, the width of a letter, and what is kept free around a box
+LINE, LETTER, GAP = 16, 7.3, 2
+_STEP, _FARTHEST = 9, 420
+#: points on a circle, written out so that every machine has the same
+_CIRCLE = (
+    (0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (0.71, -0.71), (-0.71, -0.71), (0.71, 0.71), (-0.71, 0.71),
+    (0.38, -0.92), (-0.38, -0.92), (0.38, 0.92), (-0.38, 0.92), (0.92, -0.38), (-0.92, -0.38), (0.92, 0.38),
+    (-0.92, 0.38),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class LabelBox:
+    """A rectangle on the page."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def meets(self, other: "LabelBox") -> bool:
+        """Whether both share a place, or come nearer than the gap."""
+        return (
+            self.x < other.x + other.width + GAP
+            and other.x < self.x + self.width + GAP
+            and self.y < other.y + other.height + GAP
+            and other.y < self.y + self.height + GAP
+        )
+
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Points all along its sides, and its middle."""
+        right, low = self.x + self.width, self.y + self.height
+        across = [self.x + self.width * part / 8 for part in range(9)]
+        sides = (*((x, self.y) for x in across), *((x, low) for x in across))
+        return (*sides, (self.x, self.y + self.height / 2), (right, self.y + self.height / 2), self.middle)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """The middle."""
+        return self.x + self.width / 2, self.y + self.height / 2
+
+    def nearest(self, x: float, y: float) -> tuple[float, float]:
+        """The point of the box that is nearest to one of the page."""
+        return min(max(x, self.x), self.x + self.width), min(max(y, self.y), self.y + self.height)
+
+
+@dataclass(frozen=True, slots=True)
+class MapLabel:
+    """A text in its box, and a line to what it is about where that is not plain."""
+
+    text: str
+    kind: str
+    box: LabelBox
+    leader: tuple[float, float, float, float] | None
+
+
+@dataclass(slots=True)
+class Labels:
+    """Gives out places on a page of some size."""
+
+    width: int
+    height: int
+    taken: list[LabelBox] = field(default_factory=list)
+    placed: list[MapLabel] = field(default_factory=list)
+
+    def reserve(self, box: LabelBox) -> None:
+        """Keep something free."""
+        self.taken.append(box)
+
+    def place(
+        self,
+        text: str,
+        kind: str,
+        anchor: tuple[float, float],
+        own: Callable[[float, float], bool] | None = None,
+        avoid: Sequence[LabelBox] = (),
+    ) -> bool:
+        """Put a label near its anchor; false where there is no room for it.
+
+        `own` says what belongs to what the label is about: a label lies in that, or else beside it with a line to its
+        edge. `avoid` is kept free too, and the edge is not crossed, as long as there is another place.
+        """
+        width = LETTER * len(text) + 6
+        for kept, strict in (((*self.taken, *avoid), True), ((*self.taken, *avoid), False), (self.taken, False)):
+            for x, y in _around(*anchor):
+                box = LabelBox(x - width / 2, y - LINE / 2, width, LINE)
+                if not self._fits(box) or any(box.meets(other) for other in kept):
+                    continue
+                if strict and own is not None and len({own(*point) for point in box.points()}) > 1:
+                    continue
+                self.placed.append(MapLabel(text, kind, box, _leader(box, anchor, own)))
+                self.taken.append(box)
+                return True
+        return False
+
+    def _fits(self, box: LabelBox) -> bool:
+        return (
+            box.x >= GAP
+            and box.y >= GAP
+            and box.x + box.width <= self.width - GAP
+            and box.y + box.height <= self.height - GAP
+        )
+
+
+def _leader(
+    box: LabelBox, anchor: tuple[float, float], own: Callable[[float, float], bool] | None
+) -> tuple[float, float, float, float] | None:
+    """From the label to the edge of what it is about; none where it lies in that, or next to it."""
+    if own is not None and all(own(*point) for point in box.points()):
+        return None
+    x, y = box.nearest(*anchor)
+    to_x, to_y = anchor
+    if own is not None and own(*anchor):
+        inside, outside = 1.0, 0.0  # as parts of the way from the label to the anchor
+        for _ in range(12):
+            middle = (inside + outside) / 2
+            if own(x + (to_x - x) * middle, y + (to_y - y) * middle):
+                inside = middle
+            else:
+                outside = middle
+        to_x, to_y = x + (to_x - x) * inside, y + (to_y - y) * inside
+    return None if abs(x - to_x) + abs(y - to_y) < LINE / 2 else (x, y, to_x, to_y)
+
+
+def _around(x: float, y: float) -> Iterator[tuple[float, float]]:
+    """Points on growing circles around a point, from the point itself on."""
+    yield x, y
+    for ring in range(1, _FARTHEST // _STEP):
+        for across, down in _CIRCLE:
+            yield x + 1.6 * ring * _STEP * across, y + ring * _STEP * down
+
+
+#: px between two lines, across
+_SPACING = 11
+
+
+def hatching(box: LabelBox, width: float, height: float) -> str:
+    """Lines that rise to the right, over what of a box lies on a page of some size, as the `d` of an SVG path."""
+    left, right = max(box.x, 0.0), min(box.x + box.width, width)
+    top, bottom = max(box.y, 0.0), min(box.y + box.height, height)
+    if left >= right or top >= bottom:
+        return ""
+    lines = []
+    for step in range(int((left + top) // _SPACING), int((right + bottom) // _SPACING) + 1):
+        total = step * _SPACING  # x + y is the same all along a line
+        x0, x1 = max(left, total - bottom), min(right, total - top)
+        if x0 < x1:
+            lines.append(f"M{number(x0)} {number(total - x0)}L{number(x1)} {number(total - x1)}")
+    return "".join(lines)

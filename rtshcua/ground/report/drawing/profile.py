@@ -3,10 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rtshcua.ground.report.drawing.canvas import ROUND, WIDTH
-from rtshcua.ground.report.drawing.hatch import hatching
-from rtshcua.ground.report.drawing.labels import LETTER, Box
-from rtshcua.ground.report.model import Chapter, ZoneTold
+from rtshcua.ground.report.drawing.canvas import LETTER, ROUND, WIDTH, LabelBox, hatching
+from rtshcua.ground.report.report_model import Chapter, ZoneView
 from rtshcua.model.quantity import Dimension, display
 
 #: px
@@ -55,7 +53,7 @@ def profiles(chapter: Chapter) -> tuple[Profile, ...]:
     return tuple(_profile(group, lowest, highest, top, chapter.return_altitude) for group in groups)
 
 
-def _profile(zones: Sequence[ZoneTold], lowest: int, highest: int, top: int, returns: int) -> Profile:
+def _profile(zones: Sequence[ZoneView], lowest: int, highest: int, top: int, returns: int) -> Profile:
     scale = _HEIGHT / (top - lowest)
     base = _TOP + _HEIGHT
 
@@ -72,11 +70,11 @@ def _profile(zones: Sequence[ZoneTold], lowest: int, highest: int, top: int, ret
     return Profile(WIDTH, round(base) + 12 + _LINE * (most + 1), _LEFT, at(0), columns, marks, line)
 
 
-def _column(zone: ZoneTold, x: float, width: float, at: Callable[[int], float]) -> Column:
+def _column(zone: ZoneView, x: float, width: float, at: Callable[[int], float]) -> Column:
     base = _TOP + _HEIGHT
     top = _TOP if zone.ceiling is None else at(zone.ceiling)
     bottom = base if zone.floor is None else at(zone.floor)
-    box = Box(x + 8, top, width - 16, bottom - top)
+    box = LabelBox(x + 8, top, width - 16, bottom - top)
     return Column(
         x=box.x,
         width=box.width,

@@ -10,9 +10,8 @@ from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.pipeline.program import compile_program, examine_program
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.report.cases import Tried
-from rtshcua.ground.report.handbook import Flown, Part, handbook
-from rtshcua.ground.report.model import Handbook
+from rtshcua.ground.report.policy_report import CompiledMission, DecidedCases, ReportPart, policy_report
+from rtshcua.ground.report.report_model import PolicyReport
 from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 from virtual.once import once
@@ -32,7 +31,7 @@ def program_of(path: Path) -> Program:
 
 
 @cache
-def part_of(path: Path) -> Part:
+def part_of(path: Path) -> ReportPart:
     program = program_of(path)
     checked = examine_program(program, dialect.load())
     assert not has_errors(checked.diagnostics), checked.diagnostics
@@ -41,14 +40,16 @@ def part_of(path: Path) -> Part:
         compiled = compile_program(program, dialect.load(), mission=mission.name.text, issued_at_us=0)
         assert compiled.policy is not None
         assert compiled.mission is not None
-        flown.append(Flown(compiled.policy, compiled.mission, mission, checked.bounds.get(mission.name.text)))
-    tried = Tried(program, tuple(run_case(case) for case in suite(program, dialect.load()).cases))
-    return Part(program, checked.policies, tuple(flown), checked.diagnostics, (tried,), program.units[0].scenarios)
+        flown.append(CompiledMission(compiled.policy, compiled.mission, mission, checked.bounds.get(mission.name.text)))
+    tried = DecidedCases(program, tuple(run_case(case) for case in suite(program, dialect.load()).cases))
+    return ReportPart(
+        program, checked.policies, tuple(flown), checked.diagnostics, (tried,), program.units[0].scenarios
+    )
 
 
 @cache
-def book_of(path: Path) -> Handbook:
-    return once(f"handbook_{path.stem}", lambda: handbook([part_of(path)], made_at_us=AT, made_by="rtshcua"))
+def book_of(path: Path) -> PolicyReport:
+    return once(f"handbook_{path.stem}", lambda: policy_report([part_of(path)], made_at_us=AT, made_by="rtshcua"))
 
 
 @pytest.fixture(name="everything_program", scope="session")
@@ -58,18 +59,18 @@ def read_everything() -> Program:
 
 
 @pytest.fixture(name="everything", scope="session")
-def made_everything() -> Handbook:
+def made_everything() -> PolicyReport:
     """Its handbook."""
     return book_of(EVERYTHING)
 
 
 @pytest.fixture(name="standard", scope="session")
-def made_standard() -> Handbook:
+def made_standard() -> PolicyReport:
     """The handbook of the shipped policy, with a mission."""
     return book_of(STANDARD)
 
 
 @pytest.fixture(name="part", scope="session")
-def parts() -> Callable[[Path], Part]:
+def parts() -> Callable[[Path], ReportPart]:
     """The program of a file, examined."""
     return part_of

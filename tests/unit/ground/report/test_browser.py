@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from rtshcua.front.cli.app import main
-from rtshcua.ground.report.model import Handbook
-from rtshcua.ground.report.page import page
+from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.report_model import PolicyReport
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 #: a window is never narrower: a telephone's is a frame in one
@@ -64,7 +64,7 @@ def dumped(tmp_path: Path, text: str, width: int) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_page_fits_and_no_label_lies_over_another(tmp_path: Path, everything: Handbook, width: int) -> None:
+def test_the_page_fits_and_no_label_lies_over_another(tmp_path: Path, everything: PolicyReport, width: int) -> None:
     text = re.sub(r"<meta http-equiv.*?>", "", page(everything)).replace("</body>", f"<script>{PROBE}</script></body>")
     dom, _ = dumped(tmp_path, text, width)
     found = re.search(r'data-found="(.*?)"', dom)
@@ -100,6 +100,6 @@ def test_the_map_of_a_refused_mission_fits(tmp_path: Path, width: int) -> None:
     assert "CONSOLE" not in dumped(tmp_path, made, width)[1]
 
 
-def test_the_browser_has_nothing_to_complain_of(tmp_path: Path, everything: Handbook) -> None:
+def test_the_browser_has_nothing_to_complain_of(tmp_path: Path, everything: PolicyReport) -> None:
     _, said = dumped(tmp_path, page(everything), 1200)
     assert "CONSOLE" not in said

@@ -9,12 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.ground.geometry.polygons import contained
-from rtshcua.ground.report.drawing.canvas import Canvas, canvas, contains, extent_of, path
-from rtshcua.ground.report.drawing.hatch import hatching
-from rtshcua.ground.report.drawing.labels import Box
-from rtshcua.ground.report.drawing.plan import Plan, mission_plan, plans
+from rtshcua.ground.report.drawing.canvas import Canvas, LabelBox, canvas, contains, extent_of, hatching, path
 from rtshcua.ground.report.drawing.profile import profiles
-from rtshcua.ground.report.model import Chapter, Ground, Handbook, ZoneTold
+from rtshcua.ground.report.drawing.zone_map import ZoneMap, mission_map, zone_maps
+from rtshcua.ground.report.report_model import Chapter, PolicyReport, ZoneOutline, ZoneView
 
 NUMBER = r"-?\d+"
 
@@ -39,7 +37,7 @@ def drawn(d: str, x: int, y: int) -> bool:
     return around != 0
 
 
-def signed(ground: Ground, x: int, y: int) -> bool:
+def signed(ground: ZoneOutline, x: int, y: int) -> bool:
     """The exact predicate: strictly inside."""
     if ground.centre is not None:
         return (x - ground.centre[0]) ** 2 + (y - ground.centre[1]) ** 2 < ground.radius_squared
@@ -47,7 +45,7 @@ def signed(ground: Ground, x: int, y: int) -> bool:
 
 
 @given(data=st.data())
-def test_what_is_inside_of_a_zone_is_inside_of_its_drawing(everything: Handbook, data: st.DataObject) -> None:
+def test_what_is_inside_of_a_zone_is_inside_of_its_drawing(everything: PolicyReport, data: st.DataObject) -> None:
     zone = data.draw(st.sampled_from([zone.ground for zone in everything.chapters[0].zones]))
     extent = extent_of(zone)
     x = data.draw(st.integers(extent.west - 1000, extent.east + 1000))
@@ -60,7 +58,7 @@ def test_what_is_inside_of_a_zone_is_inside_of_its_drawing(everything: Handbook,
         assert not contains(zone, x, y)
 
 
-def touches(zone: Ground, x: int, y: int) -> bool:
+def touches(zone: ZoneOutline, x: int, y: int) -> bool:
     """Whether a place lies on the boundary, of which a drawing need not tell to which side it belongs."""
     if zone.centre is not None:
         return (x - zone.centre[0]) ** 2 + (y - zone.centre[1]) ** 2 == zone.radius_squared
@@ -72,12 +70,12 @@ def touches(zone: Ground, x: int, y: int) -> bool:
     return False
 
 
-def maps(book: Handbook) -> list[Plan]:
-    found = [plan for chapter in book.chapters for plan in plans(chapter)]
-    return found + [mission_plan(chapter, mission) for chapter in book.chapters for mission in chapter.missions]
+def maps(book: PolicyReport) -> list[ZoneMap]:
+    found = [plan for chapter in book.chapters for plan in zone_maps(chapter)]
+    return found + [mission_map(chapter, mission) for chapter in book.chapters for mission in chapter.missions]
 
 
-def test_labels_lie_on_the_map_and_over_nothing(everything: Handbook, standard: Handbook) -> None:
+def test_labels_lie_on_the_map_and_over_nothing(everything: PolicyReport, standard: PolicyReport) -> None:
     for plan in (*maps(everything), *maps(standard)):
         boxes = [label.box for label in plan.labels]
         assert len(boxes) > 3
@@ -92,27 +90,27 @@ def test_labels_lie_on_the_map_and_over_nothing(everything: Handbook, standard: 
 
 def crowded(chapter: Chapter, count: int) -> Chapter:
     """A chapter with many zones, some of them over each other."""
-    one = ZoneTold("", "", "", "", "", "", Ground(), None, None, (), "", changed=False)
+    one = ZoneView("", "", "", "", "", "", ZoneOutline(), None, None, (), "", changed=False)
     zones = tuple(
         replace(
             one,
             name=f"zone_with_a_name_{number}",
             use=("allowed", "forbidden", "")[number % 3],
-            ground=Ground(centre=((number % 7) * 9_000, (number // 14) * 9_000), radius_squared=5_000**2),
+            ground=ZoneOutline(centre=((number % 7) * 9_000, (number // 14) * 9_000), radius_squared=5_000**2),
         )
         for number in range(count)
     )
     return replace(chapter, zones=zones)
 
 
-def test_of_too_many_zones_the_labels_that_find_no_room_are_named(everything: Handbook) -> None:
-    for plan in plans(crowded(everything.chapters[0], 120)):
+def test_of_too_many_zones_the_labels_that_find_no_room_are_named(everything: PolicyReport) -> None:
+    for plan in zone_maps(crowded(everything.chapters[0], 120)):
         boxes = [label.box for label in plan.labels]
         assert not [pair for pair in combinations(boxes, 2) if pair[0].meets(pair[1])]
         assert len(boxes) + len(plan.unlabelled) >= 121
 
 
-def test_columns_of_a_profile_stand_side_by_side_with_their_names_beneath(everything: Handbook) -> None:
+def test_columns_of_a_profile_stand_side_by_side_with_their_names_beneath(everything: PolicyReport) -> None:
     for profile in profiles(crowded(everything.chapters[0], 40)):
         for one, other in zip(profile.columns, profile.columns[1:], strict=False):
             assert one.x + one.width < other.x
@@ -121,7 +119,9 @@ def test_columns_of_a_profile_stand_side_by_side_with_their_names_beneath(everyt
 
 
 @pytest.mark.parametrize(("floor", "ceiling"), [(None, 60_000), (20_000, None), (92_000, 192_000), (None, None)])
-def test_a_column_reaches_from_floor_to_ceiling(everything: Handbook, floor: int | None, ceiling: int | None) -> None:
+def test_a_column_reaches_from_floor_to_ceiling(
+    everything: PolicyReport, floor: int | None, ceiling: int | None
+) -> None:
     (chapter,) = everything.chapters
     zone = replace(chapter.zones[0], floor=floor, ceiling=ceiling)
     (profile,) = profiles(replace(chapter, zones=(zone, replace(zone, name="next", floor=0, ceiling=200_000))))
@@ -133,7 +133,7 @@ def test_a_column_reaches_from_floor_to_ceiling(everything: Handbook, floor: int
 
 
 @given(x=st.integers(-400_000, 400_000), y=st.integers(-400_000, 400_000))
-def test_a_place_of_the_page_is_the_place_that_is_drawn_there(everything: Handbook, x: int, y: int) -> None:
+def test_a_place_of_the_page_is_the_place_that_is_drawn_there(everything: PolicyReport, x: int, y: int) -> None:
     on: Canvas = canvas(extent_of(everything.chapters[0].zones[0].ground))
     back = on.place(*on.at(x, y))
     assert abs(back[0] - x) <= 1
@@ -141,11 +141,11 @@ def test_a_place_of_the_page_is_the_place_that_is_drawn_there(everything: Handbo
 
 
 def test_hatching_covers_a_box_and_nothing_else() -> None:
-    lines = re.findall(r"M(\S+) (\S+)L(\S+) ([^M]+)", hatching(Box(10, 20, 50, 30), 1000, 1000))
+    lines = re.findall(r"M(\S+) (\S+)L(\S+) ([^M]+)", hatching(LabelBox(10, 20, 50, 30), 1000, 1000))
     assert 5 <= len(lines) <= 10
     for line in lines:
         x0, y0, x1, y1 = map(float, line)
         assert 10 <= x0 < x1 <= 60
         assert 20 <= y1 < y0 <= 50
         assert x0 + y0 == pytest.approx(x1 + y1)
-    assert hatching(Box(-50, -50, 20, 20), 1000, 1000) == ""
+    assert hatching(LabelBox(-50, -50, 20, 20), 1000, 1000) == ""

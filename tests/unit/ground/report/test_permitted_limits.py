@@ -7,9 +7,9 @@ import pytest
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import examine_program
-from rtshcua.ground.report.model import PermittedLimit
-from rtshcua.ground.report.permitted_limits import permitted
-from rtshcua.ground.report.subject import Subject
+from rtshcua.ground.report.permissions import permitted_limits
+from rtshcua.ground.report.report_model import PermittedLimit
+from rtshcua.ground.report.reported_policy import ReportedPolicy
 from rtshcua.mavlink import dialect
 
 SOURCE = """
@@ -44,7 +44,7 @@ def limits(rules: str, require: str = "battery > 20 %") -> dict[str, PermittedLi
     checked = examine_program(program, dialect.load())
     assert not has_errors(checked.diagnostics), [each.message for each in checked.diagnostics]
     (lowered,) = checked.policies
-    return {each.parameter: each for each in permitted(Subject(program, lowered))}
+    return {each.parameter: each for each in permitted_limits(ReportedPolicy(program, lowered))}
 
 
 @pytest.mark.parametrize(

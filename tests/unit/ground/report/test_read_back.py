@@ -17,15 +17,15 @@ from msgspec import structs
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.report.chapter import chapter
-from rtshcua.ground.report.handbook import Part
-from rtshcua.ground.report.model import Handbook
-from rtshcua.ground.report.page import page
-from rtshcua.ground.report.rights import rule_names
-from rtshcua.ground.report.subject import Subject
-from rtshcua.ground.report.words.conditions import told_clauses, told_condition
-from rtshcua.ground.report.words.places import told_shape
-from rtshcua.ground.report.words.rules import told_delegation, told_rule
-from rtshcua.ground.report.words.vocabulary import Vocabulary
+from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.permissions import rule_names
+from rtshcua.ground.report.policy_report import ReportPart
+from rtshcua.ground.report.prose.condition_phrases import describe_clauses, describe_condition
+from rtshcua.ground.report.prose.phrases import Vocabulary
+from rtshcua.ground.report.prose.rules_and_skills import describe_delegation, describe_rule
+from rtshcua.ground.report.prose.zones_and_vehicle import describe_shape
+from rtshcua.ground.report.report_model import PolicyReport
+from rtshcua.ground.report.reported_policy import ReportedPolicy
 from rtshcua.model.ir.expression import Condition, ForLast, Junction, Not
 from rtshcua.model.ir.places import Combination, Shape
 from rtshcua.model.ir.policies import PolicyDecl, Rule
@@ -96,7 +96,7 @@ def tree_of(one: Condition, names: Vocabulary) -> Tree:
         return ("not", tree_of(one.operand, names))
     if isinstance(one, ForLast):
         return ("for", tree_of(one.operand, names))
-    return ("atom", told_condition(one, names))
+    return ("atom", describe_condition(one, names))
 
 
 def split(words: str, between: str) -> list[str]:
@@ -148,15 +148,15 @@ def read(words: str, atoms: frozenset[str]) -> Tree:
 
 @cache
 def atoms_of(names: Vocabulary) -> frozenset[str]:
-    return frozenset(told_condition(condition(text), names) for text in ATOMS)
+    return frozenset(describe_condition(condition(text), names) for text in ATOMS)
 
 
 @settings(max_examples=settings().max_examples * 2)
 @given(text=texts)
 def test_a_condition_reads_back_as_itself(text: str) -> None:
     one = condition(text)
-    assert read(told_condition(one, NAMES), atoms_of(NAMES)) == tree_of(one, NAMES)
-    clauses = [read(each, atoms_of(NAMES)) for each in told_clauses(one, NAMES)]
+    assert read(describe_condition(one, NAMES), atoms_of(NAMES)) == tree_of(one, NAMES)
+    clauses = [read(each, atoms_of(NAMES)) for each in describe_clauses(one, NAMES)]
     assert (clauses[0] if len(clauses) == 1 else flat(("and", *clauses))) == tree_of(one, NAMES)
 
 
@@ -170,11 +170,11 @@ def test_rules_and_delegations_with_other_conditions_have_other_words(first: str
         "degrade any when {} to hover",
     )
     told = [
-        [told_rule(rule, NAMES) for rule in policy(*(kind.format(text) for kind in kinds)).rules]
+        [describe_rule(rule, NAMES) for rule in policy(*(kind.format(text) for kind in kinds)).rules]
         for text in (first, second)
     ]
     delegated = [
-        told_delegation(policy(f"delegate goto by role a to role b when {text}").delegations[0], NAMES)
+        describe_delegation(policy(f"delegate goto by role a to role b when {text}").delegations[0], NAMES)
         for text in (first, second)
     ]
     for a, b in (*zip(*told, strict=True), delegated):
@@ -206,13 +206,13 @@ def read_shape(words: str) -> Tree:
 def shape_tree(shape: Shape) -> Tree:
     if isinstance(shape, Combination):
         return (shape.operator, *map(shape_tree, shape.shapes))
-    return told_shape(shape)
+    return describe_shape(shape)
 
 
 @given(text=shapes.filter(lambda text: "(" in text))
 def test_a_shape_reads_back_as_itself(text: str) -> None:
     shape = unit(f"zone z = {text}").zones[0].shape
-    assert read_shape(told_shape(shape)) == shape_tree(shape)
+    assert read_shape(describe_shape(shape)) == shape_tree(shape)
 
 
 def conditions(count: int) -> Iterator[str]:
@@ -243,7 +243,9 @@ def listed(words: str, names: Vocabulary) -> Tree:
 
 
 @pytest.mark.slow
-def test_every_place_of_the_page_tells_conditions_apart(everything: Handbook, part: Callable[[Path], Part]) -> None:
+def test_every_place_of_the_page_tells_conditions_apart(
+    everything: PolicyReport, part: Callable[[Path], ReportPart]
+) -> None:
     lowered = part(Path(__file__).with_name("everything.rts")).policies[0]
     program = part(Path(__file__).with_name("everything.rts")).program
     wanted = list(conditions(40))
@@ -252,11 +254,11 @@ def test_every_place_of_the_page_tells_conditions_apart(everything: Handbook, pa
     rules: tuple[Rule, ...] = policy(*(kind.format(text) for kind in kinds for text in wanted)).rules
     base = structs.replace(lowered.policy.rules[0], skills=(lowered.skills["goto"],))
     signed = structs.replace(lowered.policy, rules=(base,) * len(rules))
-    subject = Subject(program, replace(lowered, policy=signed, rules=rules))
+    subject = ReportedPolicy(program, replace(lowered, policy=signed, rules=rules))
     names = rule_names(subject, rules[0])
     trees = [tree_of(condition(text), names) for text in wanted]
     made = chapter(subject)
-    clauses = [told_clauses(condition(text), names) for text in wanted]
+    clauses = [describe_clauses(condition(text), names) for text in wanted]
     skills = tuple(replace(made.skills[0], require=each) for each in clauses)
     html = page(replace(everything, chapters=(made,)))
 

@@ -11,10 +11,10 @@ import pytest
 
 from rtshcua.front.cli.app import main
 from rtshcua.ground.report.glance import glance
-from rtshcua.ground.report.handbook import Part, handbook
-from rtshcua.ground.report.model import ChangeTold, Handbook
-from rtshcua.ground.report.page import page
-from rtshcua.ground.report.words.differences import ELSE
+from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.policy_changes import ELSE
+from rtshcua.ground.report.policy_report import ReportPart, policy_report
+from rtshcua.ground.report.report_model import ChangeView, PolicyReport
 from rtshcua.ground.testing.boundaries.draft import GENERATED
 from rtshcua.model.flat.policy import AfterSilence, WithoutEvidence
 from rtshcua.model.outcome import Reason
@@ -28,7 +28,7 @@ def words(markup: str) -> str:
 
 
 @pytest.mark.slow
-def test_the_page_begins_with_what_is_signed_on_one_page(everything: Handbook) -> None:
+def test_the_page_begins_with_what_is_signed_on_one_page(everything: PolicyReport) -> None:
     text = page(everything)
     (chapter,) = everything.chapters
     glance, sign, contents = (text.index(f'id="{each}"') for each in ("p1-glance", "p1-sign", "contents"))
@@ -44,7 +44,7 @@ def test_the_page_begins_with_what_is_signed_on_one_page(everything: Handbook) -
     assert "these missions, as it lists them, fly under it: look." in box
 
 
-def test_the_first_page_says_what_the_chapter_says(standard: Handbook) -> None:
+def test_the_first_page_says_what_the_chapter_says(standard: PolicyReport) -> None:
     (chapter,) = standard.chapters
     first = glance(chapter)
     assert {fact.what for fact in first.who} == {"role `operator`", "role `supervisor`", "everybody else"}
@@ -65,7 +65,7 @@ def test_the_first_page_says_what_the_chapter_says(standard: Handbook) -> None:
     assert any("without the sensor" in each for each in first.beyond)
 
 
-def test_what_a_policy_does_not_have_is_said(everything: Handbook) -> None:
+def test_what_a_policy_does_not_have_is_said(everything: PolicyReport) -> None:
     (chapter,) = everything.chapters
     bare = replace(
         chapter, missions=(), cases=(), scenarios=(), zones=(), contingency=(), skills=(), signals=(),
@@ -81,7 +81,7 @@ def test_what_a_policy_does_not_have_is_said(everything: Handbook) -> None:
     assert glance(many).person[-1] == "3 more: see the rules"
 
 
-def test_generated_tests_fold_away_and_others_do_not(everything: Handbook) -> None:
+def test_generated_tests_fold_away_and_others_do_not(everything: PolicyReport) -> None:
     (chapter,) = everything.chapters
     cases = (*chapter.cases, *(replace(each, generated=True) for each in chapter.cases))
     text = page(replace(everything, chapters=(replace(chapter, cases=cases),)))
@@ -93,35 +93,37 @@ def test_generated_tests_fold_away_and_others_do_not(everything: Handbook) -> No
     assert "<details" not in page(everything)
 
 
-def test_cases_of_a_file_that_was_generated_are_known_by_its_head(tmp_path: Path, part: Callable[[Path], Part]) -> None:
+def test_cases_of_a_file_that_was_generated_are_known_by_its_head(
+    tmp_path: Path, part: Callable[[Path], ReportPart]
+) -> None:
     made = tmp_path / "limits.rts"
     policy = EVERYTHING.parents[4] / "policies" / "bridge_inspection.rts"
     assert main(["test", str(policy), "--generate", "--skill", "hover", "-o", str(made)]) == 0
     assert made.read_text().startswith(GENERATED)
-    (chapter,) = handbook([part(made)], made_at_us=0, made_by="x").chapters
+    (chapter,) = policy_report([part(made)], made_at_us=0, made_by="x").chapters
     assert chapter.cases
     assert all(each.generated for each in chapter.cases)
 
 
-def test_without_missions_none_is_agreed_to(everything: Handbook) -> None:
+def test_without_missions_none_is_agreed_to(everything: PolicyReport) -> None:
     bare = replace(everything, chapters=(replace(everything.chapters[0], missions=()),))
     assert "no missions" in words(page(bare).partition('id="p1-sign"')[2])
 
 
-def test_each_policy_has_a_box(everything: Handbook) -> None:
+def test_each_policy_has_a_box(everything: PolicyReport) -> None:
     text = page(replace(everything, chapters=everything.chapters * 2))
     assert text.index('id="p1-sign"') < text.index('id="p2-sign"') < text.index('id="contents"')
 
 
 @pytest.mark.parametrize(("count", "length"), [(1, 64), (4, 64), (5, 32)])
-def test_the_printed_foot_has_the_whole_digest_if_it_fits(everything: Handbook, count: int, length: int) -> None:
+def test_the_printed_foot_has_the_whole_digest_if_it_fits(everything: PolicyReport, count: int, length: int) -> None:
     (chapter,) = everything.chapters
     foot = re.search(r'@bottom-left \{ content: "(.*?)"', page(replace(everything, chapters=(chapter,) * count)))
     assert foot is not None
     assert re.findall(r"everything 3: ([0-9a-f]+)", foot[1]) == [chapter.digest[:length]] * count
 
 
-def test_every_reason_has_a_sentence_and_links_lead_to_it(everything: Handbook) -> None:
+def test_every_reason_has_a_sentence_and_links_lead_to_it(everything: PolicyReport) -> None:
     text = page(everything)
     for reason in Reason:
         anchor = f"reason-{reason.value.replace('/', '-')}"
@@ -131,7 +133,7 @@ def test_every_reason_has_a_sentence_and_links_lead_to_it(everything: Handbook) 
     assert '<a href="#reason-authority-forbidden"><code>authority/forbidden</code></a>' in text
 
 
-def test_of_a_last_link_it_is_said_that_as_a_step_it_is_checked(everything: Handbook) -> None:
+def test_of_a_last_link_it_is_said_that_as_a_step_it_is_checked(everything: PolicyReport) -> None:
     (chapter,) = everything.chapters
     assert [skill.name for skill in chapter.skills if skill.as_link] == ["emergency_land"]
     text = words(page(everything))
@@ -140,10 +142,10 @@ def test_of_a_last_link_it_is_said_that_as_a_step_it_is_checked(everything: Hand
     )
 
 
-def changes(part: Part, **other: object) -> dict[str, ChangeTold]:
+def changes(part: ReportPart, **other: object) -> dict[str, ChangeView]:
     """What is told of an earlier policy that has other fields."""
     new = part.policies[0].policy
-    book = handbook([part], made_at_us=0, made_by="x", earlier=[replaced(new, **other)], since="old")
+    book = policy_report([part], made_at_us=0, made_by="x", earlier=[replaced(new, **other)], since="old")
     return {each.what: each for each in book.chapters[0].changes}
 
 
@@ -151,7 +153,7 @@ def replaced(flat: Any, **other: object) -> Any:
     return type(flat)(**{**{name: getattr(flat, name) for name in flat.__struct_fields__}, **other})
 
 
-def test_of_what_changed_old_and_new_words_are_told(part: Callable[[Path], Part]) -> None:
+def test_of_what_changed_old_and_new_words_are_told(part: Callable[[Path], ReportPart]) -> None:
     everything = part(EVERYTHING)
     policy = everything.policies[0].policy
     told = changes(everything, airspace=None, without_evidence=int(WithoutEvidence.LAND))
@@ -167,11 +169,13 @@ def test_of_what_changed_old_and_new_words_are_told(part: Callable[[Path], Part]
     told = changes(everything, contingency=policy.contingency[1:])
     assert told["the contingency"].before == ("`return_home`, then `emergency_land`",)
     assert told["the contingency"].after[0].startswith("`hover` with `time` 10 s for at most 10 s, then `return_home`")
-    book = handbook([everything], made_at_us=0, made_by="x", earlier=[replaced(policy, airspace=None)], since="old")
+    book = policy_report(
+        [everything], made_at_us=0, made_by="x", earlier=[replaced(policy, airspace=None)], since="old"
+    )
     assert "This policy sets no limits" in words(page(book))
 
 
-def test_figures_zones_and_skills_are_told_before_and_now(part: Callable[[Path], Part]) -> None:
+def test_figures_zones_and_skills_are_told_before_and_now(part: Callable[[Path], ReportPart]) -> None:
     everything = part(EVERYTHING)
     policy = everything.policies[0].policy
     slower = replaced(policy.vehicle, speed=5_000, return_altitude=0, braking=0, reaction_us=0)
@@ -201,7 +205,7 @@ def test_figures_zones_and_skills_are_told_before_and_now(part: Callable[[Path],
     assert told.before == ("stale: after 9 s",)
 
 
-def test_every_part_of_every_declaration_has_words(part: Callable[[Path], Part]) -> None:
+def test_every_part_of_every_declaration_has_words(part: Callable[[Path], ReportPart]) -> None:
     """Held against a policy that has none of its zones, skills and signals under the same names."""
     everything = part(EVERYTHING)
     policy = everything.policies[0].policy

@@ -9,10 +9,10 @@ import pytest
 from rtshcua.ground.checker.checks.contracts import PATTERNS as KNOWN
 from rtshcua.ground.geometry.shapes import Disc, SimplePolygon
 from rtshcua.ground.geometry.survey import survey
-from rtshcua.ground.report.drawing.patterns import drawn
-from rtshcua.ground.report.model import Handbook
-from rtshcua.ground.report.page import page
-from rtshcua.ground.report.words.skills import PATTERNS
+from rtshcua.ground.report.drawing.survey_patterns import drawn
+from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.prose.rules_and_skills import PATTERNS
+from rtshcua.ground.report.report_model import PolicyReport
 
 M = 1_000
 HOUSE = SimplePolygon(((0, 0), (120 * M, 0), (150 * M, 55 * M), (120 * M, 90 * M), (0, 90 * M)))
@@ -78,7 +78,7 @@ def test_an_orbit_is_the_largest_circle_in_the_area() -> None:
     assert min(min(y for _, y in way) - 3 * M, 87 * M - max(y for _, y in way)) < 10
 
 
-def test_the_page_draws_the_patterns_of_surveys_alone(everything: Handbook) -> None:
+def test_the_page_draws_the_patterns_of_surveys_alone(everything: PolicyReport) -> None:
     text = page(everything)
     surveys = [skill for chapter in everything.chapters for skill in chapter.skills if skill.patterns]
     assert surveys

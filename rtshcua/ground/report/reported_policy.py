@@ -1,4 +1,4 @@
-"""What a chapter is made from, and what its parts ask of it."""
+"""A policy to report on, with its program, and what the parts of its chapter ask of both."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from rtshcua.ground.language.load import Program
 from rtshcua.ground.language.paths import from_here, pack_of
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.pipeline.closure import beside
-from rtshcua.ground.report.words.vocabulary import Vocabulary
+from rtshcua.ground.report.prose.phrases import Vocabulary
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.policies import Rule
 
 
 @dataclass(frozen=True)
-class Subject:
+class ReportedPolicy:
     """A program, and one of its policies in the form that is signed."""
 
     program: Program

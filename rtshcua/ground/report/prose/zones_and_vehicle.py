@@ -6,8 +6,16 @@ from datetime import UTC, datetime, timedelta
 from rtshcua.decision.flying import MINUTE
 from rtshcua.ground.checker import time_zones
 from rtshcua.ground.lower.vehicle import speeds_of
-from rtshcua.ground.report.words.values import coordinates, on_days, quantity, time_of_day, whole_day
-from rtshcua.ground.report.words.vocabulary import listed, name, named
+from rtshcua.ground.report.prose.phrases import (
+    coordinates,
+    listed,
+    name,
+    named,
+    on_days,
+    quantity,
+    time_of_day,
+    whole_day,
+)
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import (
@@ -23,7 +31,7 @@ from rtshcua.model.ir.places import (
 from rtshcua.model.quantity import Dimension, display
 
 
-def told_shape(shape: Shape) -> str:
+def describe_shape(shape: Shape) -> str:
     """The ground plan of a zone."""
     match shape:
         case Circle():
@@ -48,7 +56,7 @@ def told_shape(shape: Shape) -> str:
 
 def _part(shape: Shape) -> str:
     """A ground plan within another one: in brackets where it is put together itself, so that it can be read back."""
-    words = told_shape(shape)
+    words = describe_shape(shape)
     return f"({words})" if isinstance(shape, Combination) else words
 
 
@@ -74,7 +82,7 @@ def places_of(shape: Shape) -> Iterator[tuple[str, Coordinates]]:
             return
 
 
-def told_band(zone: ZoneDecl) -> str:
+def describe_band(zone: ZoneDecl) -> str:
     """From which height to which a zone reaches."""
     floor = "no floor" if zone.floor is None else f"from {quantity(zone.floor)}"
     ceiling = "no ceiling" if zone.ceiling is None else f"up to {quantity(zone.ceiling)}"
@@ -83,7 +91,7 @@ def told_band(zone: ZoneDecl) -> str:
     return f"{floor}, {ceiling}"
 
 
-def told_times(zone: ZoneDecl) -> str:
+def describe_times(zone: ZoneDecl) -> str:
     """When a zone exists."""
     parts = []
     if zone.daily is not None:
@@ -108,14 +116,14 @@ def utc(us: int) -> str:
     return f"{moment:%Y-%m-%d %H:%M}{':' if seconds else ''}{seconds}{fraction} UTC"
 
 
-def told_fitted(signal: str, fitted: bool) -> str:
+def describe_fitted(signal: str, fitted: bool) -> str:
     """Whether the sensor of a signal is on the vehicle, and what follows."""
     if fitted:
         return f"The vehicle reports {name(signal)}, and every clause on it counts."
     return f"The vehicle does not report {name(signal)}: clauses that count only where it is fitted are left out."
 
 
-def told_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
+def describe_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     """The figures of a vehicle, each with what it is."""
     yield "Identity", vehicle.identity
     yield "Name in the sources", name(vehicle.name.text)

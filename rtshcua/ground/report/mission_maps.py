@@ -1,6 +1,6 @@
-"""What was checked as one HTML page: of each mission the zones, its planned way, and where that fails.
+"""Missions as checked, as one HTML page: the zones, the planned path, and where it fails.
 
-It is made of missions that are refused too, as far as their way is planned.
+The page includes missions that are refused, as far as their path is planned.
 """
 
 from base64 import b64encode
@@ -18,12 +18,11 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.program import Planned
-from rtshcua.ground.report.chapter import chapter
-from rtshcua.ground.report.drawing.plan import Plan, mission_plan
-from rtshcua.ground.report.missions import mission_told
-from rtshcua.ground.report.model import Chapter
-from rtshcua.ground.report.page import templates, visibly
-from rtshcua.ground.report.subject import Subject
+from rtshcua.ground.report.chapter import chapter, mission_view
+from rtshcua.ground.report.drawing.zone_map import ZoneMap, mission_map
+from rtshcua.ground.report.html_page import templates, visibly
+from rtshcua.ground.report.report_model import Chapter
+from rtshcua.ground.report.reported_policy import ReportedPolicy
 from rtshcua.model.flat import mission as flat
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
@@ -36,7 +35,7 @@ Point = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Failed:
+class RefusedLegs:
     """What of a map is refused: legs in mm, y to the south, as SVG paths; and marks on the page."""
 
     legs: tuple[str, ...]
@@ -44,7 +43,7 @@ class Failed:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class StepFindings:
     """A step in words, and what was found of it."""
 
     told: str
@@ -52,51 +51,52 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Drawing:
+class MissionMap:
     """A mission with its map."""
 
     name: str
     intent: str
     refused: bool
     chapter: Chapter
-    plan: Plan
-    failed: Failed
-    steps: tuple[Step, ...]
+    plan: ZoneMap
+    failed: RefusedLegs
+    steps: tuple[StepFindings, ...]
 
 
-class Checking:
+class CheckedProgram:
     """A program, the missions in it whose way is planned, and all that was found."""
 
     def __init__(self, program: Program, planned: Sequence[Planned], found: Sequence[Diagnostic]) -> None:
         self._program, self._planned, self._found = program, planned, found
         self._sources: Mapping[str, Source] = program.sources
 
-    def drawings(self) -> Iterator[Drawing]:
+    def drawings(self) -> Iterator[MissionMap]:
         """One a mission."""
         for under, mission, declaration in self._planned:
-            subject = Subject(self._program, under)
-            told, about = mission_told(mission, under.policy, None, {}), chapter(subject)
-            plan = mission_plan(about, told)
+            subject = ReportedPolicy(self._program, under)
+            told, about = mission_view(mission, under.policy, None, {}), chapter(subject)
+            plan = mission_map(about, told)
             written = [step for phase in declaration.phases for step in phase.steps]
-            of = [[each for each in self._found if _within(each, step)] for step in written]
-            errors = [any(map(_errs, some)) for some in of]
+            of = [[each for each in self._found if _is_within(each, step)] for step in written]
+            errors = [any(map(_is_error, some)) for some in of]
             failed = _failed(under.policy, [each.plan for each in mission.invocations], errors, plan)
-            yield Drawing(
+            yield MissionMap(
                 name=mission.name,
                 intent=mission.intent,
-                refused=any(errors) or any(_errs(each) for each in self._found),
+                refused=any(errors) or any(_is_error(each) for each in self._found),
                 chapter=about,
                 plan=plan,
                 failed=failed,
                 steps=tuple(
-                    Step(step.told, tuple(map(self._words, some))) for step, some in zip(told.steps, of, strict=True)
+                    StepFindings(step.told, tuple(map(self._words, some)))
+                    for step, some in zip(told.steps, of, strict=True)
                 ),
             )
 
     def others(self) -> list[str]:
         """What was found elsewhere than in a step that is drawn."""
         steps = [step for each in self._planned for phase in each.declaration.phases for step in phase.steps]
-        return [self._words(each) for each in self._found if not any(_within(each, step) for step in steps)]
+        return [self._words(each) for each in self._found if not any(_is_within(each, step) for step in steps)]
 
     def _words(self, found: Diagnostic) -> str:
         at = ""
@@ -106,7 +106,7 @@ class Checking:
         return f"{at}{found.severity.value} {found.code.id}: {found.message}{help}"
 
 
-def checked_page(checkings: Sequence[Checking]) -> str:
+def mission_map_page(checkings: Sequence[CheckedProgram]) -> str:
     """The page; the same bytes for the same sources."""
     environment, style = templates()
     drawings = [each for checking in checkings for each in checking.drawings()]
@@ -122,18 +122,18 @@ def checked_page(checkings: Sequence[Checking]) -> str:
     return visibly(text)
 
 
-def _within(found: Diagnostic, node: Node) -> bool:
+def _is_within(found: Diagnostic, node: Node) -> bool:
     span = found.span
     return (
         span is not None and span.file == node.span.file and node.span.start <= span.start and span.end <= node.span.end
     )
 
 
-def _errs(found: Diagnostic) -> bool:
+def _is_error(found: Diagnostic) -> bool:
     return found.severity is Severity.ERROR
 
 
-def _failed(policy: Policy, plans: Sequence[flat.Plan], errors: Sequence[bool], drawn: Plan) -> Failed:
+def _failed(policy: Policy, plans: Sequence[flat.Plan], errors: Sequence[bool], drawn: ZoneMap) -> RefusedLegs:
     """The legs of the steps that are refused, and where each of these first leaves the airspace."""
     keeps = _Airspace(policy)
     legs: list[str] = []
@@ -145,14 +145,16 @@ def _failed(policy: Policy, plans: Sequence[flat.Plan], errors: Sequence[bool], 
             height = plan.altitude or height
         if wrong and len(points) > 1:
             legs.append("M" + "L".join(f"{x} {-y}" for x, y in points))
-        left = next((place for leg in pairwise(points) for place in _along(*leg) if not keeps(place, height)), None)
+        left = next(
+            (place for leg in pairwise(points) for place in _points_along(*leg) if not keeps(place, height)), None
+        )
         if wrong and left is not None:
             marks.append(drawn.at(*left))
         here = points[-1]
-    return Failed(tuple(legs), tuple(marks))
+    return RefusedLegs(tuple(legs), tuple(marks))
 
 
-def _along(one: Point, other: Point) -> Iterator[Point]:
+def _points_along(one: Point, other: Point) -> Iterator[Point]:
     for part in range(_PLACES + 1):
         yield (
             one[0] + (other[0] - one[0]) * part // _PLACES,

@@ -11,23 +11,35 @@ from rtshcua.ground.checker import time_zones
 from rtshcua.ground.checker.substitution import sized
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.language.parse import parse
-from rtshcua.ground.report.cases import told_test
-from rtshcua.ground.report.subject import within
-from rtshcua.ground.report.words.cases import told_nominal
-from rtshcua.ground.report.words.conditions import told_condition
-from rtshcua.ground.report.words.places import places_of, told_band, told_shape, told_times, told_vehicle
-from rtshcua.ground.report.words.rules import told_airspace, told_delegation, told_evidence, told_rule, told_silence
-from rtshcua.ground.report.words.scenarios import told_scenario
-from rtshcua.ground.report.words.signals import told_members, told_sources, told_type, told_unknown
-from rtshcua.ground.report.words.skills import (
-    told_chain,
-    told_clause,
-    told_motion,
-    told_parameter,
-    told_record,
-    told_timing,
+from rtshcua.ground.report.policy_report import describe_test
+from rtshcua.ground.report.prose.cases_and_scenarios import describe_nominal, describe_scenario
+from rtshcua.ground.report.prose.condition_phrases import describe_condition
+from rtshcua.ground.report.prose.phrases import Vocabulary
+from rtshcua.ground.report.prose.rules_and_skills import (
+    describe_airspace,
+    describe_chain,
+    describe_clause,
+    describe_delegation,
+    describe_evidence,
+    describe_members,
+    describe_motion,
+    describe_parameter,
+    describe_record,
+    describe_rule,
+    describe_silence,
+    describe_sources,
+    describe_timing,
+    describe_type,
+    describe_unknown,
 )
-from rtshcua.ground.report.words.vocabulary import Vocabulary
+from rtshcua.ground.report.prose.zones_and_vehicle import (
+    describe_band,
+    describe_shape,
+    describe_times,
+    describe_vehicle,
+    places_of,
+)
+from rtshcua.ground.report.reported_policy import within
 from rtshcua.model.ir.expression import Condition
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import ZoneDecl
@@ -120,7 +132,7 @@ def condition(text: str) -> Condition:
     ],
 )
 def test_conditions_are_told_in_words(text: str, words: str) -> None:
-    assert told_condition(condition(text), NAMES) == words
+    assert describe_condition(condition(text), NAMES) == words
 
 
 def test_every_node_of_the_language_is_in_the_sample(everything_program: Program) -> None:
@@ -139,11 +151,11 @@ def subclasses(kind: type) -> Iterator[type]:
 def tellers(unit: Any, names: Vocabulary) -> Iterator[tuple[Node, Callable[[Any], object]]]:
     """Each declaration of a file, and all that is told of it."""
     for signal in unit.signals:
-        yield signal, lambda one: (one.name.text, told_type(one), told_sources(one), told_unknown(one))
+        yield signal, lambda one: (one.name.text, describe_type(one), describe_sources(one), describe_unknown(one))
     for enum in unit.enums:
-        yield enum, lambda one: (one.name.text, told_members(one))
+        yield enum, lambda one: (one.name.text, describe_members(one))
     for vehicle in unit.vehicles:
-        yield vehicle, lambda one: tuple(told_vehicle(one))
+        yield vehicle, lambda one: tuple(describe_vehicle(one))
     for zone in unit.zones:
         yield zone, tell_zone
     for skill in unit.skills:
@@ -152,28 +164,28 @@ def tellers(unit: Any, names: Vocabulary) -> Iterator[tuple[Node, Callable[[Any]
     for policy in unit.policies:
         yield policy, lambda one: tell_policy(one, names.asked(["altitude", "target", "area"]))
     for nominal in unit.nominals:
-        yield nominal, lambda one: (one.name.text, *told_nominal(one, names))
+        yield nominal, lambda one: (one.name.text, *describe_nominal(one, names))
     for test in unit.tests:
-        yield test, lambda one: tuple(told_test(one, "" if one.nominal is None else one.nominal.text, names))
+        yield test, lambda one: tuple(describe_test(one, "" if one.nominal is None else one.nominal.text, names))
     for scenario in unit.scenarios:
-        yield scenario, lambda one: (one.name.text, *told_scenario(one, names))
+        yield scenario, lambda one: (one.name.text, *describe_scenario(one, names))
 
 
 def tell_zone(zone: ZoneDecl) -> object:
     places = tuple((what, at.latitude, at.longitude) for what, at in places_of(zone.shape))
     entry = None if zone.entry is None else (zone.entry.latitude, zone.entry.longitude)
-    return zone.name.text, told_shape(zone.shape), places, told_band(zone), told_times(zone), entry
+    return zone.name.text, describe_shape(zone.shape), places, describe_band(zone), describe_times(zone), entry
 
 
 def tell_skill(skill: SkillDecl, names: Vocabulary) -> object:
     return (
         skill.name.text,
-        told_motion(skill.motion),
-        [(each.name.text, told_parameter(each, names)) for each in skill.parameters],
-        list(told_timing(skill)),
-        [[told_clause(each, names) for each in some] for some in (skill.require, skill.assume, skill.maintain)],
-        told_chain(skill.fallback, names),
-        told_record(skill),
+        describe_motion(skill.motion),
+        [(each.name.text, describe_parameter(each, names)) for each in skill.parameters],
+        list(describe_timing(skill)),
+        [[describe_clause(each, names) for each in some] for some in (skill.require, skill.assume, skill.maintain)],
+        describe_chain(skill.fallback, names),
+        describe_record(skill),
     )
 
 
@@ -182,14 +194,14 @@ def tell_policy(policy: PolicyDecl, names: Vocabulary) -> object:
     return (
         policy.name.text,
         policy.version,
-        [told_rule(rule, names) for rule in (*policy.rules, *uses)],
-        [told_delegation(each, names) for each in policy.delegations],
-        told_airspace(policy.airspace),
-        told_chain(policy.contingency, names),
-        told_evidence(policy.without_evidence),
+        [describe_rule(rule, names) for rule in (*policy.rules, *uses)],
+        [describe_delegation(each, names) for each in policy.delegations],
+        describe_airspace(policy.airspace),
+        describe_chain(policy.contingency, names),
+        describe_evidence(policy.without_evidence),
         None
         if policy.without_link is None
-        else told_silence(policy.without_link.limit.value, policy.without_link.then),
+        else describe_silence(policy.without_link.limit.value, policy.without_link.then),
     )
 
 
@@ -263,7 +275,7 @@ def test_whatever_is_changed_in_a_declaration_changes_what_is_told_of_it(everyth
 def test_a_zone_on_days_of_the_week(active: str, words: str) -> None:
     parsed = parse(Source("x.rts", f"zone z = circle(47.1 N, 8.1 E, 9 m) {active}"))
     assert parsed.diagnostics == ()
-    assert told_times(parsed.unit.zones[0]) == words
+    assert describe_times(parsed.unit.zones[0]) == words
 
 
 def test_a_clock_by_the_name_of_a_time_zone() -> None:
@@ -273,5 +285,5 @@ def test_a_clock_by_the_name_of_a_time_zone() -> None:
     )
     parsed = parse(Source("x.rts", text))
     assert parsed.diagnostics == ()
-    told = dict(told_vehicle(parsed.unit.vehicles[0]))
+    told = dict(describe_vehicle(parsed.unit.vehicles[0]))
     assert told["Local time"] == f"that of Asia/Kolkata, by the time-zone data {time_zones.VERSION}"

@@ -1,9 +1,10 @@
-"""Values in words."""
+"""Values, names and lists of them in words."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
-from rtshcua.ground.report.words.vocabulary import Vocabulary, listed, name
 from rtshcua.model.ir.expression import (
     Arithmetic,
     Coordinates,
@@ -17,6 +18,55 @@ from rtshcua.model.ir.expression import (
 )
 from rtshcua.model.quantity import Datum, Dimension, display
 
+#: what is closed in itself: a name, or brackets with none in them
+_CLOSED: Final = re.compile(r"`[^`]*`|\([^()`]*\)")
+_LISTS: Final = re.compile(r"[,;:]| and | or ")
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """The names of signals and zones, and the arguments of what is being told of; `places` are those of them that are
+    a place on the ground.
+    """
+
+    signals: frozenset[str] = frozenset()
+    zones: frozenset[str] = frozenset()
+    arguments: frozenset[str] = frozenset()
+    places: frozenset[str] = frozenset()
+
+    def asked(self, arguments: Iterable[str], places: Iterable[str] = ()) -> "Vocabulary":
+        """The same, within something that has these arguments, of which some are places on the ground."""
+        return replace(self, arguments=frozenset(arguments), places=frozenset(places))
+
+
+def name(text: str) -> str:
+    """A name of the sources."""
+    return f"`{text}`"
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return f"{', '.join(words[:-1])} {last} {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+def named(names: Iterable[str], last: str = "and") -> str:
+    """Several names."""
+    return listed([name(each) for each in names], last)
+
+
+def bracketed(words: str) -> str:
+    """Words that stand within others: in brackets where they list something, and could be read on into what follows."""
+    left, before = _CLOSED.sub("", words), words
+    while left != before:
+        left, before = _CLOSED.sub("", left), left
+    return f"({words})" if _LISTS.search(left) else words
+
+
+def sentence(words: str) -> str:
+    """A capital at the beginning and a full stop at the end; a name keeps its letters."""
+    return f"{words[:1].upper()}{words[1:]}."
+
+
 _OPERATORS: Final = {"+": "plus", "-": "minus", "*": "times", "/": "divided by"}
 _FUNCTIONS: Final = {"abs": "the magnitude of", "min": "the least of", "max": "the greatest of"}
 #: the references that are no names
@@ -25,7 +75,7 @@ PHASE: Final = "phase"
 _MINUTE: Final = 60_000_000
 
 
-def told_value(value: Value, names: Vocabulary) -> str:
+def describe_value(value: Value, names: Vocabulary) -> str:
     """A value, as it stands within a sentence."""
     match value:
         case Quantity():
@@ -45,7 +95,7 @@ def told_value(value: Value, names: Vocabulary) -> str:
 
 def _part(value: Value, names: Vocabulary) -> str:
     """An operand: in brackets where it is an operation itself."""
-    words = told_value(value, names)
+    words = describe_value(value, names)
     return f"({words})" if isinstance(value, Arithmetic | Function) else words
 
 
@@ -135,4 +185,4 @@ def region(one: Reference | Grow, names: Vocabulary) -> str:
 
 def between(one: Range, names: Vocabulary) -> str:
     """The two ends of a range, which belong to it."""
-    return f"{told_value(one.low, names)} and {told_value(one.high, names)}"
+    return f"{describe_value(one.low, names)} and {describe_value(one.high, names)}"

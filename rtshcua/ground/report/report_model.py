@@ -1,4 +1,4 @@
-"""What a handbook says, as one plain value: frozen, comparable, and what `rtshcua docs --json` prints.
+"""The content of a policy report as one plain value: frozen, comparable, and what `rtshcua docs --json` prints.
 
 Texts are sentences with names between backticks. Lengths are in mm, of the local plane where a place is meant: x east
 and y north of the vehicle's home.
@@ -24,7 +24,7 @@ class Fact:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class PermitView:
     """One `permit`: through which sources, and what must hold all together. `rule` is its number."""
 
     rule: int
@@ -33,7 +33,7 @@ class Way:
 
 
 @dataclass(frozen=True, slots=True)
-class Hindrance:
+class Restriction:
     """A `confirm`, `forbid` or `degrade` about a right: what it comes to, and when; `rule` is its number."""
 
     rule: int
@@ -47,9 +47,9 @@ class Right:
 
     skill: str
     answer: str  # `yes`, `on conditions`, `after approval`, `after approval, on conditions`, `something else`, `no`
-    ways: tuple[Way, ...]
-    confirmations: tuple[Hindrance, ...]
-    prohibitions: tuple[Hindrance, ...]
+    ways: tuple[PermitView, ...]
+    confirmations: tuple[Restriction, ...]
+    prohibitions: tuple[Restriction, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Rights:
 
 
 @dataclass(frozen=True, slots=True)
-class RuleTold:
+class RuleView:
     """One rule in the order in which they are signed, as a sentence, and as it is written and where."""
 
     number: int
@@ -73,7 +73,7 @@ class RuleTold:
 
 
 @dataclass(frozen=True, slots=True)
-class ParameterTold:
+class ParameterView:
     """What may be asked of a skill."""
 
     name: str
@@ -96,7 +96,7 @@ class PermittedLimit:
 
 
 @dataclass(frozen=True, slots=True)
-class PatternTold:
+class PatternView:
     """What a survey may fly: the pattern's name, and its spacing or radius, start and direction."""
 
     name: str
@@ -104,7 +104,7 @@ class PatternTold:
 
 
 @dataclass(frozen=True, slots=True)
-class SkillTold:
+class SkillView:
     """A contract; `as_link` is what is otherwise where a chain ends in it, empty for any other skill.
 
     `patterns` are those that a survey may be flown in, none of any other skill. `left_out` are the clauses that do not
@@ -114,8 +114,8 @@ class SkillTold:
     name: str
     note: str
     motion: str
-    patterns: tuple[PatternTold, ...]
-    parameters: tuple[ParameterTold, ...]
+    patterns: tuple[PatternView, ...]
+    parameters: tuple[ParameterView, ...]
     timing: tuple[str, ...]
     require: tuple[str, ...]
     assume: tuple[str, ...]
@@ -129,7 +129,7 @@ class SkillTold:
 
 
 @dataclass(frozen=True, slots=True)
-class SignalTold:
+class SignalView:
     """What the vehicle reports."""
 
     name: str
@@ -140,7 +140,7 @@ class SignalTold:
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
+class ZoneOutline:
     """An outline in the local plane, exactly as it is signed: a circle by its centre and the square of its radius, or
     else rings, outer ones counter-clockwise and holes clockwise.
     """
@@ -151,7 +151,7 @@ class Ground:
 
 
 @dataclass(frozen=True, slots=True)
-class PlaceTold:
+class PlaceView:
     """A place that a zone is written by: what it is, WGS 84, and where that is in the local plane."""
 
     what: str
@@ -162,7 +162,7 @@ class PlaceTold:
 
 
 @dataclass(frozen=True, slots=True)
-class ZoneTold:
+class ZoneView:
     """A zone. `use` says what the airspace makes of it: `allowed`, `forbidden` or empty; `floor` and `ceiling` are mm
     above home, None where there is none; `derived` is one that a rule grows out of another.
     """
@@ -173,17 +173,17 @@ class ZoneTold:
     shape: str
     band: str
     times: str
-    ground: Ground
+    ground: ZoneOutline
     floor: int | None
     ceiling: int | None
-    places: tuple[PlaceTold, ...]
+    places: tuple[PlaceView, ...]
     place: str
     changed: bool
     derived: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class StepTold:
+class StepView:
     """One step of a mission, and the way that it takes: local places, the last of which is where it ends. `tighter` is
     what it is held to beyond its skill's contract.
     """
@@ -198,7 +198,7 @@ class StepTold:
 
 
 @dataclass(frozen=True, slots=True)
-class MissionTold:
+class MissionView:
     """A mission under the policy; `bounds` is what it takes at most."""
 
     name: str
@@ -206,11 +206,11 @@ class MissionTold:
     proposed: str
     bounds: tuple[Fact, ...]
     values: str
-    steps: tuple[StepTold, ...]
+    steps: tuple[StepView, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class CaseTold:
+class CaseView:
     """A test case: what is given, what is asked, what must be decided, and what was decided when the page was made."""
 
     name: str
@@ -223,7 +223,7 @@ class CaseTold:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class NominalView:
     """What holds where tests begin, unless they say otherwise, and where that is written."""
 
     name: str
@@ -232,7 +232,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
-class ScenarioTold:
+class ScenarioView:
     """A flight on which things go wrong, and what must come of it. It is told here, and flown by `rtshcua test`."""
 
     name: str
@@ -241,7 +241,7 @@ class ScenarioTold:
 
 
 @dataclass(frozen=True, slots=True)
-class ChangeTold:
+class ChangeView:
     """What is new or other than before, and its words then and now: none where there was, or is, no such thing.
 
     `direction`: `stricter`, `looser` or `cannot tell`, of this change by itself.
@@ -283,27 +283,27 @@ class Chapter:
     home_within: int
     return_altitude: int
     rights: tuple[Rights, ...]
-    rules: tuple[RuleTold, ...]
+    rules: tuple[RuleView, ...]
     rules_left_out: tuple[str, ...]
     permitted: tuple[PermittedLimit, ...]
     airspace: str
     contingency: tuple[str, ...]
     evidence: str
     silence: str
-    skills: tuple[SkillTold, ...]
-    signals: tuple[SignalTold, ...]
+    skills: tuple[SkillView, ...]
+    signals: tuple[SignalView, ...]
     states: tuple[Fact, ...]
-    zones: tuple[ZoneTold, ...]
-    missions: tuple[MissionTold, ...]
-    starts: tuple[Start, ...]
-    cases: tuple[CaseTold, ...]
-    scenarios: tuple[ScenarioTold, ...]
+    zones: tuple[ZoneView, ...]
+    missions: tuple[MissionView, ...]
+    starts: tuple[NominalView, ...]
+    cases: tuple[CaseView, ...]
+    scenarios: tuple[ScenarioView, ...]
     since: str  # what it was compared with; empty where with nothing
-    changes: tuple[ChangeTold, ...]
+    changes: tuple[ChangeView, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class FindingTold:
+class FindingView:
     """A warning or a note of `rtshcua check`."""
 
     code: str
@@ -314,11 +314,11 @@ class FindingTold:
 
 
 @dataclass(frozen=True, slots=True)
-class Handbook:
+class PolicyReport:
     """All chapters; `made_at` is given, never read from a clock."""
 
     title: str
     made_at: str
     made_by: str
     chapters: tuple[Chapter, ...]
-    findings: tuple[FindingTold, ...]
+    findings: tuple[FindingView, ...]

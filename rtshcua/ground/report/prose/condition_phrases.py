@@ -1,9 +1,21 @@
-"""Conditions in words. The meaning of each form is in `docs/language.md`, sections "Conditions" and after."""
+"""Conditions in words. `docs/language.md` gives the meaning of each form, from section "Conditions" on."""
 
 from typing import Final, assert_never
 
-from rtshcua.ground.report.words.values import LOCAL_TIME, between, on_days, reference, region, told_value, whole_day
-from rtshcua.ground.report.words.vocabulary import Vocabulary, bracketed, listed, name, named
+from rtshcua.ground.report.prose.phrases import (
+    LOCAL_TIME,
+    Vocabulary,
+    between,
+    bracketed,
+    describe_value,
+    listed,
+    name,
+    named,
+    on_days,
+    reference,
+    region,
+    whole_day,
+)
 from rtshcua.model.ir.expression import (
     Comparison,
     Condition,
@@ -34,19 +46,21 @@ _RELATIONS: Final = {
 _TIMES: Final = _RELATIONS | {"<": "before", "<=": "not after", ">": "after", ">=": "not before"}
 
 
-def told_condition(condition: Condition, names: Vocabulary) -> str:
+def describe_condition(condition: Condition, names: Vocabulary) -> str:
     """A condition as a clause of a sentence: `battery` is above 35 %."""
     match condition:
         case Comparison():
             return _comparison(condition, names)
         case Within():
-            return f"{told_value(condition.subject, names)} is {_range(condition, names)}"
+            return f"{describe_value(condition.subject, names)} is {_range(condition, names)}"
         case OneOf():
-            return f"{told_value(condition.subject, names)} is {named([each.text for each in condition.names], 'or')}"
+            return (
+                f"{describe_value(condition.subject, names)} is {named([each.text for each in condition.names], 'or')}"
+            )
         case Inside():
             return _inside(condition, names)
         case Known():
-            return f"{told_value(condition.subject, names)} is known"
+            return f"{describe_value(condition.subject, names)} is known"
         case Not():
             return f"it is not so that {_operand(condition.operand, names)}"
         case Junction():
@@ -74,16 +88,16 @@ def conjuncts(condition: Condition | None) -> tuple[Condition, ...]:
     return (condition,)
 
 
-def told_clauses(condition: Condition | None, names: Vocabulary) -> tuple[str, ...]:
+def describe_clauses(condition: Condition | None, names: Vocabulary) -> tuple[str, ...]:
     """The parts of a condition that must all hold, in words."""
-    return tuple(told_condition(each, names) for each in conjuncts(condition))
+    return tuple(describe_condition(each, names) for each in conjuncts(condition))
 
 
 def _operand(condition: Condition, names: Vocabulary) -> str:
     """A condition within another one: in brackets, unless it cannot be misread. So at each depth of brackets there is
     one kind of list alone, of `and` or of `or`, and a sentence can be read back in one way only.
     """
-    words = told_condition(condition, names)
+    words = describe_condition(condition, names)
     simple = isinstance(condition, Comparison | Within | OneOf | Inside | Known)
     return bracketed(words) if simple else f"({words})"
 
@@ -93,7 +107,7 @@ def _inside(one: Inside, names: Vocabulary) -> str:
     side = "outside" if one.negated else "inside"
     asked = isinstance(one.subject, Reference) and one.subject.name in names.places
     height = " (on the ground, at whatever height)" if asked else ""
-    return f"{told_value(one.subject, names)} is {side} {region(one.region, names)}{height}"
+    return f"{describe_value(one.subject, names)} is {side} {region(one.region, names)}{height}"
 
 
 def _comparison(one: Comparison, names: Vocabulary) -> str:
@@ -102,7 +116,7 @@ def _comparison(one: Comparison, names: Vocabulary) -> str:
     plain = one.operator in ("==", "!=") and any(_is_member(side, names) for side in (one.left, one.right))
     if plain:  # of an enumeration or a phase, which has no more and less
         words = "" if one.operator == "==" else "not"
-    return " ".join(f"{told_value(one.left, names)} is {words} {told_value(one.right, names)}".split())
+    return " ".join(f"{describe_value(one.left, names)} is {words} {describe_value(one.right, names)}".split())
 
 
 def _range(one: Within, names: Vocabulary) -> str:
@@ -113,7 +127,7 @@ def _range(one: Within, names: Vocabulary) -> str:
         over = ", over midnight" if low.value > high.value else ""
         begins = f", beginning {on_days(one.days)}" if over else f" {on_days(one.days)}"
         return f"between {between(one.range, names)}{over}{begins if one.days else ''}"
-    return f"from {told_value(low, names)} up to {told_value(high, names)}"
+    return f"from {describe_value(low, names)} up to {describe_value(high, names)}"
 
 
 def _is_time(value: Value) -> bool:

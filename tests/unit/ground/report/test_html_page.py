@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.ground.report.handbook import Part, handbook
-from rtshcua.ground.report.model import Handbook
-from rtshcua.ground.report.page import page
+from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.policy_report import ReportPart, policy_report
+from rtshcua.ground.report.report_model import PolicyReport
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
@@ -52,7 +52,7 @@ class Outline(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def text(everything: Handbook) -> str:
+def text(everything: PolicyReport) -> str:
     return page(everything)
 
 
@@ -116,7 +116,7 @@ def test_what_a_source_says_is_text(text: str) -> None:
 
 
 @pytest.mark.parametrize("hostile", ['"><svg onload=alert(1)>', "</style><script>1</script>", "{{ 7 * 7 }}", "`<b>`"])
-def test_a_hostile_title_is_text(everything: Handbook, hostile: str) -> None:
+def test_a_hostile_title_is_text(everything: PolicyReport, hostile: str) -> None:
     text = page(replace(everything, title=hostile, made_by=hostile))
     outline = Outline(text)
     assert outline.wrong == []
@@ -125,21 +125,21 @@ def test_a_hostile_title_is_text(everything: Handbook, hostile: str) -> None:
 
 
 @pytest.mark.parametrize("hidden", ["\u202e", "\u200b", "\ufeff", "\x07", "\r", "\u2066"])
-def test_what_would_hide_or_turn_text_is_shown(everything: Handbook, hidden: str) -> None:
+def test_what_would_hide_or_turn_text_is_shown(everything: PolicyReport, hidden: str) -> None:
     text = page(replace(everything, title=f"look{hidden}here"))
     assert hidden not in text
     assert f"look&lt;U+{ord(hidden):04X}&gt;here" in text
 
 
-def test_the_same_sources_make_the_same_bytes(part: Callable[[Path], Part], standard: Handbook) -> None:
+def test_the_same_sources_make_the_same_bytes(part: Callable[[Path], ReportPart], standard: PolicyReport) -> None:
     path = Path(__file__).resolve().parents[4] / "missions" / "standard.rts"
-    again = handbook([part(path)], made_at_us=1_769_846_400_000_000, made_by="rtshcua")
+    again = policy_report([part(path)], made_at_us=1_769_846_400_000_000, made_by="rtshcua")
     assert again == standard
     assert page(again).encode() == page(standard).encode()
     assert "2026-01-31 08:00 UTC" in page(again)
 
 
-def test_the_digest_is_of_what_is_signed(part: Callable[[Path], Part], standard: Handbook) -> None:
+def test_the_digest_is_of_what_is_signed(part: Callable[[Path], ReportPart], standard: PolicyReport) -> None:
     path = Path(__file__).resolve().parents[4] / "missions" / "standard.rts"
     signed = policy_digest(policy_payload(part(path).missions[0].policy)).hex()
     assert [chapter.digest for chapter in standard.chapters] == [signed]
@@ -147,30 +147,30 @@ def test_the_digest_is_of_what_is_signed(part: Callable[[Path], Part], standard:
     assert sum(re.sub(r"<[^>]*>|\s", "", each) == signed for each in shown) == 3
 
 
-def test_a_policy_that_two_programs_have_is_one_chapter(part: Callable[[Path], Part]) -> None:
+def test_a_policy_that_two_programs_have_is_one_chapter(part: Callable[[Path], ReportPart]) -> None:
     """With the missions of both."""
     missions = Path(__file__).resolve().parents[4] / "missions"
-    book = handbook([part(missions / "standard.rts"), part(missions / "extended.rts")], made_at_us=0, made_by="x")
+    book = policy_report([part(missions / "standard.rts"), part(missions / "extended.rts")], made_at_us=0, made_by="x")
     (chapter,) = book.chapters
     assert [mission.name for mission in chapter.missions] == ["standard", "extended"]
 
 
-def test_changes_are_told_and_marked(part: Callable[[Path], Part]) -> None:
+def test_changes_are_told_and_marked(part: Callable[[Path], ReportPart]) -> None:
     everything = part(Path(__file__).with_name("everything.rts"))
     new = everything.policies[0].policy
     old = type(new)(**{**{name: getattr(new, name) for name in new.__struct_fields__}, "rules": new.rules[1:]})
-    book = handbook([everything], made_at_us=0, made_by="x", earlier=[old], since="old.bundle")
+    book = policy_report([everything], made_at_us=0, made_by="x", earlier=[old], since="old.bundle")
     (chapter,) = book.chapters
     assert chapter.since == "old.bundle"
     assert len(chapter.changes) == 1
     assert [rule.number for rule in chapter.rules if rule.changed] == [1]
     assert "old.bundle" in page(book)
-    same = handbook([everything], made_at_us=0, made_by="x", earlier=[new], since="old.bundle")
+    same = policy_report([everything], made_at_us=0, made_by="x", earlier=[new], since="old.bundle")
     assert same.chapters[0].changes == ()
     assert "It means the same" in page(same)
 
 
-def test_tests_and_missions_are_in_the_page(everything: Handbook, text: str) -> None:
+def test_tests_and_missions_are_in_the_page(everything: PolicyReport, text: str) -> None:
     (chapter,) = everything.chapters
     assert [case.name for case in chapter.cases] == [
         'an approval is "waited" for', "charge decides", "charge decides", "another policy", "too windy",

@@ -1,7 +1,7 @@
-"""The handbook as one HTML page that needs nothing else: no script, no file, no network.
+"""Renders a policy report as one HTML page that needs nothing else: no script, no file, no network.
 
-Everything that a source says is escaped where it enters the page (Jinja's autoescape); the policy of the page
-(CSP level 3) then forbids whatever is not its own style, which it names by its digest.
+Everything that a source says is escaped where it enters the page (Jinja's autoescape); the page's Content Security
+Policy (level 3) then forbids every style but its own, which it names by its digest.
 """
 
 import re
@@ -9,6 +9,7 @@ from base64 import b64encode
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
+from typing import Final, NamedTuple
 
 from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup, escape
@@ -16,15 +17,65 @@ from markupsafe import Markup, escape
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.ground.editor.keyword_help import REASONS
 from rtshcua.ground.report.drawing.canvas import number
-from rtshcua.ground.report.drawing.patterns import drawn
-from rtshcua.ground.report.drawing.plan import mission_plan, plans
 from rtshcua.ground.report.drawing.profile import profiles
+from rtshcua.ground.report.drawing.survey_patterns import drawn
+from rtshcua.ground.report.drawing.zone_map import mission_map, zone_maps
 from rtshcua.ground.report.glance import glance
-from rtshcua.ground.report.glossary import GLOSSARY
-from rtshcua.ground.report.model import Chapter, Handbook
+from rtshcua.ground.report.report_model import Chapter, PolicyReport
+
+
+class GlossaryEntry(NamedTuple):
+    """A word, and what it means here."""
+
+    word: str
+    meaning: str
+
+
+GLOSSARY: Final = (
+    GlossaryEntry("above home", "Height over the place where the vehicle starts, not over the ground below it."),
+    GlossaryEntry(
+        "agent", "A program that proposes missions. It can ask for what is permitted to it, and command nothing."
+    ),
+    GlossaryEntry("airspace", "Where the vehicle may be at all, whatever it is asked to do."),
+    GlossaryEntry(
+        "charge", "How full the battery is. What a skill may take of it is a bound that counts in the checks."
+    ),
+    GlossaryEntry("contingency", "What flies when a step is denied while the vehicle is in the air."),
+    GlossaryEntry(
+        "digest",
+        "A number computed from everything that is signed. If one letter of it is changed, the digest is another; so "
+        "two documents with the same digest say the same.",
+    ),
+    GlossaryEntry(
+        "fallback", "What flies when a step that was allowed cannot go on: the chain of its skill, in order."
+    ),
+    GlossaryEntry("forbid", "A rule that denies. It outweighs every permit."),
+    GlossaryEntry(
+        "mission", "An ordered list of steps, proposed for a role, and checked against the policy before it flies."
+    ),
+    GlossaryEntry("permit", "A rule that allows. What no permit allows is denied."),
+    GlossaryEntry("phase", "A named stretch of a mission, such as departure."),
+    GlossaryEntry(
+        "policy", "The rules of one vehicle: who may have what done, where and when. Its version only rises."
+    ),
+    GlossaryEntry("role", "On whose behalf something is asked for, such as operator or supervisor."),
+    GlossaryEntry("signal", "Something that the vehicle reports about itself or its surroundings."),
+    GlossaryEntry("skill", "Something that the vehicle can do, with its limits. Nothing else can be asked of it."),
+    GlossaryEntry("source", "What speaks for a role: a person at the controls, an agent, software on board, a reflex."),
+    GlossaryEntry(
+        "unknown",
+        "A signal that was never received, is too old, or says that it does not know. What is unknown permits nothing: "
+        "a permit that needs it does not hold, a prohibition that needs it makes the step wait, an approval that "
+        "hangs on it must be given, and a rule that would fly something else makes the step wait.",
+    ),
+    GlossaryEntry(
+        "zone", "An area on the ground with, perhaps, a floor, a ceiling and times. Its border does not belong to it."
+    ),
+)
+
 
 _TEMPLATES = (
-    "handbook.html",
+    "policy_report.html",
     "glance.html",
     "chapter.html",
     "rights.html",
@@ -34,7 +85,7 @@ _TEMPLATES = (
     "map.svg",
     "profile.svg",
     "checked.html",
-    "handbook.css",
+    "policy_report.css",
 )
 #: what a reader does not see, or what turns around the text beside it: a comment or an intent may hold any of it
 _HIDDEN = re.compile(
@@ -46,20 +97,20 @@ FOOT_LINES, FOOT_COLUMNS = 4, 116
 _UNIT = re.compile(r"(?<=\d) (?=(?:m/s|km/h|cm|mm|km|m|mV|V|%|s|ms|us|min|h|deg|N|S|E|W)\b|%)")
 
 
-def page(handbook: Handbook) -> str:
-    """The page; the same bytes for the same handbook."""
+def page(report: PolicyReport) -> str:
+    """The page; the same bytes for the same report."""
     environment, style = templates()
-    style += _footer(handbook)
-    text = environment.get_template("handbook.html").render(
-        book=handbook,
+    style += _footer(report)
+    text = environment.get_template("policy_report.html").render(
+        book=report,
         style=Markup(style),
         style_digest=b64encode(sha256(style.encode()).digest()).decode("ascii"),
         glossary=GLOSSARY,
         reasons=REASONS,
         anchor_of=_reason,
         glance=glance,
-        plans=plans,
-        mission_plan=mission_plan,
+        plans=zone_maps,
+        mission_plan=mission_map,
         profiles=profiles,
         pattern=drawn,
         anchors=_anchors,
@@ -73,15 +124,15 @@ def visibly(text: str) -> str:
     return _HIDDEN.sub(lambda found: escape(visible(found[0])), text)
 
 
-def _footer(handbook: Handbook) -> str:
+def _footer(report: PolicyReport) -> str:
     """A rule of the style that puts what is signed at the foot of every printed page: on a line each name, version and
     whole digest. Where that does not fit, of each digest the first half, one after the other.
 
     A policy's name has letters, digits and `_` only, and so it may stand in a string of CSS.
     """
-    lines = [f"{each.name} {each.version}: {each.digest}" for each in handbook.chapters]
+    lines = [f"{each.name} {each.version}: {each.digest}" for each in report.chapters]
     if len(lines) > FOOT_LINES or max(map(len, lines), default=0) > FOOT_COLUMNS:
-        lines = [", ".join(f"{each.name} {each.version}: {each.digest[:32]}" for each in handbook.chapters)]
+        lines = [", ".join(f"{each.name} {each.version}: {each.digest[:32]}" for each in report.chapters)]
     signed = "\\a ".join(lines)
     return f'@page {{ @bottom-left {{ content: "{signed}"; font: 6pt monospace; white-space: pre-wrap; }} }}\n'
 
@@ -100,7 +151,7 @@ def templates() -> tuple[Environment, str]:
         keep_trailing_newline=True,
     )
     environment.filters |= {"told": _told, "px": number}
-    return environment, texts["handbook.css"]
+    return environment, texts["policy_report.css"]
 
 
 def _told(text: str, anchors: dict[str, str] | None = None) -> Markup:

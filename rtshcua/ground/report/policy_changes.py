@@ -1,19 +1,22 @@
-"""What differs between two policies, in the words of each.
+"""What changed between two policies, in words, and which zones, skills, signals and rules a page marks.
 
-From the signed form, for of an earlier policy there may be no source left.
+It compares the signed forms, since an earlier policy may have no source left.
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from math import isqrt
 from typing import Final
 
 from rtshcua.decision.outline import rings
-from rtshcua.ground.report.words.missions import told_cells
-from rtshcua.ground.report.words.places import told_fitted, utc
-from rtshcua.ground.report.words.rules import told_evidence, told_limits, told_silence
-from rtshcua.ground.report.words.values import degrees, time_of_day, time_of_week
-from rtshcua.ground.report.words.vocabulary import listed, name, named
-from rtshcua.ground.versions.differences import Difference
+from rtshcua.ground.report.prose.mission_steps import describe_cells
+from rtshcua.ground.report.prose.phrases import degrees, listed, name, named, time_of_day, time_of_week
+from rtshcua.ground.report.prose.rules_and_skills import describe_evidence, describe_limits, describe_silence
+from rtshcua.ground.report.prose.zones_and_vehicle import describe_fitted, utc
+from rtshcua.ground.report.report_model import ChangeView
+from rtshcua.ground.versions.differences import Difference, compared
+from rtshcua.ground.versions.direction import direction
+from rtshcua.ground.versions.meaning import Fields, Meaning
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import CHOICE, QUANTITY, Contract, Link, MotionKind, Parameter, TimingClass
 from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind, Speeds, WithoutEvidence
@@ -26,29 +29,29 @@ ELSE: Final = "written alike, but what it names is another"
 _DIMENSIONS: Final = {dimension.value: dimension for dimension in Dimension}
 
 
-def told_difference(one: Difference, old: Policy, new: Policy) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def describe_difference(one: Difference, old: Policy, new: Policy) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """A line or more of what was, and of what is; none where there was, or is, no such thing."""
     if one.what == "rule":
         before, after = (
             tuple(name(" ".join(each.split())) for each in (text,) if each) for text in (one.before, one.after)
         )
     else:
-        before, after = _told(one, old), _told(one, new)
+        before, after = _described(one, old), _described(one, new)
     return before, (*after, ELSE) if before == after else after
 
 
-def _told(one: Difference, policy: Policy) -> tuple[str, ...]:
+def _described(one: Difference, policy: Policy) -> tuple[str, ...]:
     match one.what:
         case "airspace":
             return (_airspace(policy),)
         case "contingency":
             return (_chain(policy.contingency, policy),)
         case "evidence":
-            return (told_evidence(WithoutEvidence(policy.without_evidence).name.lower()),)
+            return (describe_evidence(WithoutEvidence(policy.without_evidence).name.lower()),)
         case "silence":
-            return (told_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),)
+            return (describe_silence(policy.silence_us, AfterSilence(policy.after_silence).name.lower()),)
         case "sensor":
-            return (told_fitted(one.name, one.name not in policy.vehicle.without),)
+            return (describe_fitted(one.name, one.name not in policy.vehicle.without),)
         case "order":
             kind = RuleKind[one.name.upper()]
             return tuple(name(rule.text) for rule in policy.rules if rule.kind == kind)
@@ -71,11 +74,11 @@ def _lines(fields: Iterable[str], told: Mapping[str, Callable[[], str]]) -> tupl
 
 def _airspace(policy: Policy) -> str:
     if policy.airspace is None:
-        return told_limits((), ())
+        return describe_limits((), ())
     inside, outside = (
         [policy.zones[number].name for number in side] for side in (policy.airspace.inside, policy.airspace.outside)
     )
-    return told_limits(inside, outside)
+    return describe_limits(inside, outside)
 
 
 def _chain(links: Iterable[Link], policy: Policy) -> str:
@@ -84,7 +87,7 @@ def _chain(links: Iterable[Link], policy: Policy) -> str:
 
 def _link(link: Link, policy: Policy) -> str:
     contract = policy.contracts[link.skill]
-    given = [f"{name(each.name)} {told_cells(each, link.arguments, policy)}" for each in contract.parameters]
+    given = [f"{name(each.name)} {describe_cells(each, link.arguments, policy)}" for each in contract.parameters]
     limit = f" for at most {_time(link.limit_us)}" if link.limit_us else ""
     return name(contract.name) + (f" with {listed(given)}" if given else "") + limit
 
@@ -221,3 +224,42 @@ def _length(mm: int) -> str:
 
 def _time(us: int) -> str:
     return display(us, Dimension.DURATION)
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyChanges:
+    """In words, and which zones, skills, signals and rules (by their number) are new or other than before."""
+
+    told: tuple[ChangeView, ...] = ()
+    zones: frozenset[str] = frozenset()
+    skills: frozenset[str] = frozenset()
+    signals: frozenset[str] = frozenset()
+    rules: frozenset[int] = frozenset()
+
+
+def describe_changes(old: Policy, new: Policy) -> tuple[ChangeView, ...]:
+    """What differs, in words, and which way each goes."""
+    return tuple(
+        ChangeView(each.told.removeprefix("looser: "), *describe_difference(each, old, new), direction(each, old, new))
+        for each in compared(old, new)
+    )
+
+
+def changes(old: Policy, new: Policy) -> PolicyChanges:
+    """What differs in meaning, as `check --since` counts it."""
+    common = frozenset(zone.name for zone in old.zones[: old.declared])
+    common &= {zone.name for zone in new.zones[: new.declared]}
+    moved = old.projection != new.projection
+    before, after = Meaning(old, common, moved=moved), Meaning(new, common, moved=moved)
+    known = {rule.meaning for rule in before.rules()}
+    return PolicyChanges(
+        describe_changes(old, new),
+        _changed(before.zones(), after.zones()),
+        _changed(before.skills(), after.skills()),
+        _changed(before.signals(), after.signals()),
+        frozenset(number for number, rule in enumerate(after.rules()) if rule.meaning not in known),
+    )
+
+
+def _changed(old: Mapping[str, Fields], new: Mapping[str, Fields]) -> frozenset[str]:
+    return frozenset(name for name, fields in new.items() if old.get(name) != fields)

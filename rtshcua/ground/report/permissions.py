@@ -1,44 +1,125 @@
-"""What the rules let be asked for, over all who may ask: heights, speeds and places of each skill.
+"""Who may do what under a policy, and within which limits of height, speed and place.
 
-What a skill may be asked for is no promise of the policy: a rule may permit less. Bounds are those outside of which no
-`permit` counts (`analysis/extent.py`), so nothing that is permitted lies beyond what is told.
+`rights` sorts the rules by role and skill. `permitted_limits` bounds what the rules permit over everyone who may ask:
+what a skill accepts is no promise of the policy, since a rule may permit less. Outside of these bounds no `permit`
+holds (`analysis/extent.py`), so nothing that is permitted lies beyond what is reported.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 from rtshcua.decision.prepare import Compiler
 from rtshcua.decision.tree import AtMost, Negation, Node
 from rtshcua.ground.analysis.extent import FAR, Bounds, Extents, alternatives
-from rtshcua.ground.report.model import PermittedLimit
-from rtshcua.ground.report.rights import rule_names
-from rtshcua.ground.report.subject import Subject, within
-from rtshcua.ground.report.words.conditions import conjuncts, told_condition
-from rtshcua.ground.report.words.vocabulary import listed
+from rtshcua.ground.report.prose.condition_phrases import conjuncts, describe_condition
+from rtshcua.ground.report.prose.phrases import Vocabulary, listed
+from rtshcua.ground.report.prose.rules_and_skills import approver, conditions_of, sources_of, through
+from rtshcua.ground.report.report_model import PermittedLimit, PermitView, Restriction, Right, Rights
+from rtshcua.ground.report.reported_policy import ReportedPolicy, within
 from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Contract, Parameter, SourceKind
-from rtshcua.model.flat.policy import Rule, RuleKind
+from rtshcua.model.flat.policy import Rule as FlatRule
+from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.expression import Condition, Reference
+from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension, display
+
+#: stands for every role that no rule names
+EVERYBODY_ELSE: Final = ""
+YES, CONDITIONS, APPROVAL, REPLACED, NO = "yes", "on conditions", "after approval", "something else", "no"
+
+
+def rights(subject: ReportedPolicy) -> tuple[Rights, ...]:
+    """The rights of every role of the policy, and of everybody else."""
+    skills = [contract.name for contract in subject.policy.contracts]
+    return tuple(
+        Rights(role, tuple(_right(subject, role, skill) for skill in skills))
+        for role in (*subject.policy.roles, EVERYBODY_ELSE)
+    )
+
+
+def _right(subject: ReportedPolicy, role: str, skill: str) -> Right:
+    ways: list[PermitView] = []
+    confirmations: list[Restriction] = []
+    prohibitions: list[Restriction] = []
+    about = [(number, rule) for number, rule in enumerate(subject.rules, 1) if _about(rule, role, skill)]
+    for number, rule in about:
+        conditions = conditions_of(rule, rule_names(subject, rule))
+        match rule.kind:
+            case "permit":
+                ways.append(PermitView(number, through(sources_of(rule)), conditions))
+            case "confirm":
+                confirmations.append(Restriction(number, approver(rule), conditions))
+            case "forbid":
+                asked = f"asked through {through(sources_of(rule))}" if rule.through else ""
+                prohibitions.append(Restriction(number, asked, conditions))
+            case _:
+                pass
+    answer = _answer(skill, [rule for _, rule in about])
+    return Right(skill, answer, tuple(ways), tuple(confirmations), tuple(prohibitions))
+
+
+def _answer(skill: str, about: list[Rule]) -> str:
+    """In short, for those sources that some permit names and that are not always forbidden; what is forbidden to others
+    is no condition. `yes`: through one of them at least nothing is asked besides.
+    """
+    never = _sources(rule for rule in about if rule.kind == "forbid" and rule.when is None)
+    if not _sources(rule for rule in about if rule.kind == "permit") - never:
+        return NO
+    if any(rule.target is not None and rule.target.skill.text != skill and rule.when is None for rule in about):
+        return REPLACED
+    sometimes = _sources(rule for rule in about if rule.kind == "forbid")
+    plainly = _sources(rule for rule in about if rule.kind == "permit" and rule.when is None) - sometimes
+    confirms = [rule for rule in about if rule.kind == "confirm"]
+    if any(rule.when is None for rule in confirms):
+        return APPROVAL if plainly else f"{APPROVAL}, {CONDITIONS}"
+    return YES if plainly and not confirms else CONDITIONS
+
+
+def _sources(rules: Iterable[Rule]) -> frozenset[str]:
+    return frozenset(source for rule in rules for source in sources_of(rule))
+
+
+def _about(rule: Rule, role: str, skill: str) -> bool:
+    """Whether a rule says something of a skill asked for by a role; a `confirm` is about all roles."""
+    if rule.skills and skill not in {name.text for name in rule.skills}:
+        return False
+    return not rule.roles or role in {name.text for name in rule.roles}
+
+
+def rule_names(subject: ReportedPolicy, rule: Rule) -> Vocabulary:
+    """What the names in a rule stand for: it may read those arguments that all of its skills have."""
+    own = [name.text for name in rule.skills] or [contract.name for contract in subject.policy.contracts]
+    return asked_of(subject, [subject.symbols.skills[name] for name in own])
+
+
+def asked_of(subject: ReportedPolicy, skills: Sequence[SkillDecl]) -> Vocabulary:
+    """The names within what is about some skills."""
+    types = [{each.name.text: each.type.text for each in skill.parameters} for skill in skills]
+    shared = frozenset.intersection(*map(frozenset, types)) if types else frozenset()
+    places = [name for name in shared if all(each[name] == "position" for each in types)]
+    return subject.names.asked(shared, places)
+
 
 _ALWAYS: Final = AtMost((), 0)
 #: the quantities that are told, and what a figure of them is measured from
 _FROM: Final = {Dimension.ALTITUDE: " above home", Dimension.SPEED: ""}
 
 
-class _Way(NamedTuple):
+class _PermitForAsker(NamedTuple):
     """A `permit`, for some who ask, and the prohibitions about them; all by their numbers."""
 
     permit: int
     forbids: tuple[int, ...]
 
 
-def permitted(subject: Subject) -> tuple[PermittedLimit, ...]:
+def permitted_limits(subject: ReportedPolicy) -> tuple[PermittedLimit, ...]:
     """What is permitted of every height, speed and place that some step may be asked for."""
-    return tuple(_Permitted(subject).every())
+    return tuple(_LimitFinder(subject).every())
 
 
-class _Permitted:
-    def __init__(self, subject: Subject) -> None:
+class _LimitFinder:
+    def __init__(self, subject: ReportedPolicy) -> None:
         self._subject, self._policy = subject, subject.policy
         compiler = Compiler(subject.policy)
         self._nodes = [compiler.when(rule) or _ALWAYS for rule in self._policy.rules]
@@ -56,7 +137,7 @@ class _Permitted:
                 elif parameter.kind in (PLACE, ZONE):
                     yield self._place(contract, parameter, ways)
 
-    def _ways(self, skill: int) -> Iterator[_Way]:
+    def _ways(self, skill: int) -> Iterator[_PermitForAsker]:
         """Each `permit` of a skill for each who may ask, where nothing forbids it to them always."""
         about = [(at, rule) for at, rule in enumerate(self._policy.rules) if not rule.skills or skill in rule.skills]
         for at, rule in about:
@@ -68,9 +149,11 @@ class _Permitted:
                         other for other, each in about if each.kind == RuleKind.FORBID and _meets(each, role, source)
                     )
                     if all(self._policy.rules[each].when is not None for each in forbids):
-                        yield _Way(at, forbids)
+                        yield _PermitForAsker(at, forbids)
 
-    def _quantity(self, contract: Contract, parameter: Parameter, ways: Sequence[_Way]) -> Iterator[PermittedLimit]:
+    def _quantity(
+        self, contract: Contract, parameter: Parameter, ways: Sequence[_PermitForAsker]
+    ) -> Iterator[PermittedLimit]:
         cell = (True, parameter.cell)
         reaches = [each[cell] for way in ways for each in self._reaches(contract, way)]
         if not reaches:
@@ -83,7 +166,7 @@ class _Permitted:
             limits = f"exactly {display(low, dimension)}{_FROM[dimension]}"
         yield PermittedLimit(contract.name, parameter.name, parameter.dimension, limits, not plain)
 
-    def _reaches(self, contract: Contract, way: _Way) -> list[Bounds]:
+    def _reaches(self, contract: Contract, way: _PermitForAsker) -> list[Bounds]:
         """What may be asked for by one way: the skill's own ranges within what the rules and its `require` leave."""
         parts: list[Bounds] = [
             {(True, each.cell): (each.low, each.high) for each in contract.parameters if each.kind != PLACE}
@@ -101,7 +184,7 @@ class _Permitted:
         """What a condition says of what is asked for."""
         return [{cell: ends for cell, ends in part.items() if cell[0]} for part in self._extents.parts(node)]
 
-    def _plain(self, way: _Way, cell: tuple[bool, int], low: int, high: int) -> bool:
+    def _plain(self, way: _PermitForAsker, cell: tuple[bool, int], low: int, high: int) -> bool:
         """Whether all from `low` to `high` is permitted whatever else is so."""
         return all(
             any(
@@ -115,7 +198,7 @@ class _Permitted:
             if node is not _ALWAYS
         )
 
-    def _place(self, contract: Contract, parameter: Parameter, ways: Sequence[_Way]) -> PermittedLimit:
+    def _place(self, contract: Contract, parameter: Parameter, ways: Sequence[_PermitForAsker]) -> PermittedLimit:
         """What the rules say of a place in their own words; what one says of other things too is under conditions."""
         told: dict[str, None] = {}
         everywhere, plain = False, False
@@ -136,7 +219,7 @@ class _Permitted:
         return when is not None and _reads(when, parameter)
 
     def _words(self, number: int, condition: Condition) -> str:
-        return told_condition(condition, rule_names(self._subject, self._subject.rules[number]))
+        return describe_condition(condition, rule_names(self._subject, self._subject.rules[number]))
 
     def _whole(self, number: int) -> str:
         when = self._subject.rules[number].when
@@ -147,7 +230,7 @@ def _reads(condition: Condition, parameter: str) -> bool:
     return any(isinstance(each, Reference) and each.name.split(".")[0] == parameter for each in within(condition))
 
 
-def _meets(rule: Rule, role: int, source: int) -> bool:
+def _meets(rule: FlatRule, role: int, source: int) -> bool:
     return (not rule.roles or role in rule.roles) and (not rule.sources or source in rule.sources)
 
 

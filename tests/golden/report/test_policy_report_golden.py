@@ -11,7 +11,7 @@ from typing import Any
 
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import examine_program
-from rtshcua.ground.report.handbook import Part, handbook
+from rtshcua.ground.report.policy_report import ReportPart, policy_report
 from rtshcua.mavlink import dialect
 
 CHECKOUT = Path(__file__).resolve().parents[3]
@@ -40,8 +40,8 @@ def lines(value: Any, depth: int = 0, name: str = "") -> Iterator[str]:
 def test_the_shipped_policy_is_told_word_for_word() -> None:
     program = load([str(POLICY)], lambda name: Path(name).read_bytes(), str(CHECKOUT))
     checked = examine_program(program, dialect.load())
-    part = Part(program, checked.policies, (), checked.diagnostics)
-    found = "\n".join(lines(asdict(handbook([part], made_at_us=0, made_by="")))) + "\n"
+    part = ReportPart(program, checked.policies, (), checked.diagnostics)
+    found = "\n".join(lines(asdict(policy_report([part], made_at_us=0, made_by="")))) + "\n"
     if os.environ.get("UPDATE_GOLDENS"):
         GOLDEN.write_text(found, encoding="utf-8")
     assert found == GOLDEN.read_text(encoding="utf-8")

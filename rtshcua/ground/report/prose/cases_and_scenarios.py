@@ -1,15 +1,32 @@
-"""Tests and the nominals that they start from, in words."""
+"""Tests, the nominals that they start from, and scenarios in words."""
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, assert_never
 
-from rtshcua.ground.report.words.conditions import told_condition
-from rtshcua.ground.report.words.places import utc
-from rtshcua.ground.report.words.skills import told_argument
-from rtshcua.ground.report.words.values import quantity, told_value
-from rtshcua.ground.report.words.vocabulary import Vocabulary, listed, name, named
+from rtshcua.ground.report.prose.condition_phrases import describe_condition
+from rtshcua.ground.report.prose.phrases import Vocabulary, describe_value, listed, name, named, quantity
+from rtshcua.ground.report.prose.rules_and_skills import describe_argument
+from rtshcua.ground.report.prose.zones_and_vehicle import utc
 from rtshcua.model.decision import Decision
 from rtshcua.model.ir.expression import Quantity, Reference
+from rtshcua.model.ir.scenarios import (
+    AfterStep,
+    AtTime,
+    Begins,
+    Charge,
+    Decides,
+    Delay,
+    Demand,
+    Ends,
+    FaultCall,
+    Flies,
+    Incident,
+    Keeps,
+    Lands,
+    OnCondition,
+    Reacts,
+    ScenarioDecl,
+)
 from rtshcua.model.ir.tests import (
     Answer,
     Asker,
@@ -34,10 +51,10 @@ _OUTCOMES: Final = {
 }
 
 
-def told_premises(premises: Premises, names: Vocabulary) -> Iterator[str]:
+def describe_premises(premises: Premises, names: Vocabulary) -> Iterator[str]:
     """What holds when the request is decided on, one line each."""
     for each in premises.given:
-        yield told_assignment(each, names)
+        yield describe_assignment(each, names)
     if premises.instant is not None:
         yield _instant(premises.instant)
     if premises.phase is not None:
@@ -62,27 +79,27 @@ def _deed(kind: str) -> str:
     return "the request was used before" if kind == "replayed" else "what was presented is not what was signed"
 
 
-def told_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
+def describe_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
     """Where tests start from."""
     yield f"under the policy {name(nominal.policy.text)}"
     yield f"on the vehicle {name(nominal.vehicle.text)}"
     if nominal.asker is not None:
-        yield told_asker(nominal.asker)
-    yield from told_premises(nominal.premises, names)
+        yield describe_asker(nominal.asker)
+    yield from describe_premises(nominal.premises, names)
 
 
-def told_assignment(one: Assignment, names: Vocabulary) -> str:
+def describe_assignment(one: Assignment, names: Vocabulary) -> str:
     """`battery` is 20 %."""
-    return told_given(one.subject, one.cell, names)
+    return describe_given(one.subject, one.cell, names)
 
 
-def told_given(subject: Subject, cell: Cell, names: Vocabulary) -> str:
+def describe_given(subject: Subject, cell: Cell, names: Vocabulary) -> str:
     """What is given of a signal, a parameter, or a condition over time."""
     words = _cell(cell, names)
     if isinstance(subject, Named):
         known = subject.name.text in names.signals
         return f"{'' if known else 'the asked '}{name(subject.name.text)} is {words}"
-    return f"it is {words} that {told_condition(subject.condition, names)}"
+    return f"it is {words} that {describe_condition(subject.condition, names)}"
 
 
 def _cell(cell: Cell, names: Vocabulary) -> str:
@@ -93,7 +110,7 @@ def _cell(cell: Cell, names: Vocabulary) -> str:
     elif isinstance(cell.value, Reference) and cell.value.name in ("true", "false"):
         words = cell.value.name
     else:
-        words = told_value(cell.value, names)
+        words = describe_value(cell.value, names)
     return words if cell.measured is None else f"{words}, measured {_ago(cell.measured)}"
 
 
@@ -116,23 +133,23 @@ def _ago(one: Quantity) -> str:
     return f"{quantity(one)} ago"
 
 
-def told_asker(asker: Asker) -> str:
+def describe_asker(asker: Asker) -> str:
     """Who asks."""
     role = "" if asker.role is None else f"the role {name(asker.role.text)}"
     source = "" if asker.source is None else f"through {name(asker.source.text)}"
     return f"asked {' '.join(part for part in (f'by {role}' if role else '', source) if part)}"
 
 
-def told_request(request: Request | None, names: Vocabulary) -> str:
+def describe_request(request: Request | None, names: Vocabulary) -> str:
     """What is asked for, and by whom."""
     if request is None:
         return ""
-    given = listed([told_argument(each, names) for each in request.arguments])
+    given = listed([describe_argument(each, names) for each in request.arguments])
     words = name(request.skill.text) + (f" with {given}" if given else "")
-    return words if request.asker is None else f"{words}, {told_asker(request.asker)}"
+    return words if request.asker is None else f"{words}, {describe_asker(request.asker)}"
 
 
-def told_expectation(expectation: Expectation | None) -> str:
+def describe_expectation(expectation: Expectation | None) -> str:
     """What must be decided, and why."""
     if expectation is None:
         return ""
@@ -146,7 +163,7 @@ def told_expectation(expectation: Expectation | None) -> str:
     return words
 
 
-def told_decision(decision: Decision, skills: Sequence[str]) -> str:
+def describe_decision(decision: Decision, skills: Sequence[str]) -> str:
     """What was decided, and why; `skills` are the names of the policy's, by number."""
     words = _OUTCOMES[decision.outcome.name.lower()]
     if decision.target is not None:
@@ -157,3 +174,71 @@ def told_decision(decision: Decision, skills: Sequence[str]) -> str:
     if decision.clause is not None:
         words += f", decided by {name(decision.clause.text.replace('`', ''))}"
     return words
+
+
+def describe_scenario(scenario: ScenarioDecl, names: Vocabulary) -> Iterator[str]:
+    """What is flown, what goes wrong and what must come of it, one line each."""
+    yield f"the mission {name(scenario.mission.text)} is flown on the simulated vehicle"
+    if scenario.flavours:
+        yield f"with the autopilot {named([each.text for each in scenario.flavours])}"
+    if scenario.seeds is not None:
+        yield f"once for each seed from {quantity(scenario.seeds.first)} to {quantity(scenario.seeds.last)}"
+    for beginning in scenario.start:
+        yield f"it starts with {_beginning(beginning, names)}"
+    for incident in scenario.incidents:
+        yield _incident(incident, names)
+    for demand in scenario.demands:
+        yield _demand(demand)
+
+
+def _beginning(one: Charge | FaultCall | Begins, names: Vocabulary) -> str:
+    if isinstance(one, Begins):
+        return f"the time at {utc(one.utc_us)}"
+    return f"{name(one.name.text)} at {quantity(one.value)}" if isinstance(one, Charge) else _fault(one, names)
+
+
+def _fault(fault: FaultCall, names: Vocabulary) -> str:
+    given = [describe_argument(each, names) for each in fault.arguments]
+    return name(fault.name.text) + (f" with {listed(given)}" if given else "")
+
+
+def _incident(incident: Incident, names: Vocabulary) -> str:
+    moment = incident.moment
+    match moment:
+        case AtTime():
+            when = f"{_delay(moment.delay)} after the start"
+        case AfterStep():
+            which = "" if moment.number is None else f" number {quantity(moment.number)}"
+            when = f"{_later(moment.delay)}the step {name(moment.skill.text)}{which} was sent"
+        case OnCondition():
+            when = f"{_later(moment.delay)}for the first time {describe_condition(moment.condition, names)}"
+        case _:
+            assert_never(moment)
+    return f"{when}: {_fault(incident.fault, names)}"
+
+
+def _later(delay: Delay | None) -> str:
+    return "when " if delay is None else f"{_delay(delay)} after "
+
+
+def _delay(delay: Delay) -> str:
+    low, high = quantity(delay.low), quantity(delay.high)
+    return low if low == high else f"{low} to {high}"
+
+
+def _demand(demand: Demand) -> str:
+    match demand:
+        case Decides():
+            return f"of some decision: {describe_expectation(demand.decision)}"
+        case Ends():
+            return f"it ends {' or '.join(name(each.text) for each in demand.endings)}"
+        case Flies():
+            return f"{name(demand.skill.text)} {'never flies' if demand.never else 'flies'}"
+        case Reacts():
+            return f"a breach is answered within {quantity(demand.most)}"
+        case Keeps():
+            return f"it is never nearer to {name(demand.place.text)} than {quantity(demand.least)}"
+        case Lands():
+            return f"it comes down inside {name(demand.zone.text)}"
+        case _:
+            assert_never(demand)

@@ -9,10 +9,9 @@ from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.report.cases import Tried
-from rtshcua.ground.report.handbook import Part, handbook
-from rtshcua.ground.report.model import Chapter, Handbook
-from rtshcua.ground.report.page import page
+from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.policy_report import DecidedCases, ReportPart, policy_report
+from rtshcua.ground.report.report_model import Chapter, PolicyReport
 from rtshcua.ground.testing.case_result import run_case
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
@@ -30,7 +29,7 @@ nominal NAME { under POLICY on quad by role operator through agent at "2026-06-0
 """
 
 
-def book(**files: str) -> Handbook:
+def book(**files: str) -> PolicyReport:
     """The handbook of the first file, with its tests decided."""
 
     def read(path: str) -> bytes:
@@ -39,8 +38,8 @@ def book(**files: str) -> Handbook:
     program = load([f"{next(iter(files))}.rts"], read, str(CHECKOUT))
     checked = examine_program(program, dialect.load())
     assert not has_errors(checked.diagnostics), checked.diagnostics
-    tried = Tried(program, tuple(run_case(case) for case in suite(program, dialect.load()).cases))
-    return handbook([Part(program, checked.policies, (), (), (tried,))], made_at_us=0, made_by="x")
+    tried = DecidedCases(program, tuple(run_case(case) for case in suite(program, dialect.load()).cases))
+    return policy_report([ReportPart(program, checked.policies, (), (), (tried,))], made_at_us=0, made_by="x")
 
 
 def chapter(rules: str) -> Chapter:
@@ -95,7 +94,7 @@ def test_what_flies_instead_is_told_of_others_than_itself() -> None:
     assert "`hover` is flown instead of any other skill, if `battery` is below 25 %." in told
 
 
-def test_brackets_of_what_is_flown_instead_are_kept(everything: Handbook) -> None:
+def test_brackets_of_what_is_flown_instead_are_kept(everything: PolicyReport) -> None:
     rule = "degrade goto when (battery < 40 % or gps.accuracy > 5 m) and height > 50 m to return_home"
     made = chapter(f"permit goto by role operator\n{rule}")
     text = page(replace(everything, chapters=(made,)))
@@ -104,7 +103,7 @@ def test_brackets_of_what_is_flown_instead_are_kept(everything: Handbook) -> Non
     assert words in re.sub("<[^>]*>", "", section)
 
 
-def test_the_page_says_what_becomes_of_what_is_not_known(everything: Handbook) -> None:
+def test_the_page_says_what_becomes_of_what_is_not_known(everything: PolicyReport) -> None:
     """As `decide` has it: a permit does not hold, a prohibition waits, an approval is asked for, a `degrade` waits."""
     text = page(everything)
     for words in (

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from rtshcua.ground.report.words.values import degrees
-from rtshcua.ground.report.words.vocabulary import listed, name, named
+from rtshcua.ground.report.prose.phrases import degrees, listed, name, named
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter, SourceKind
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.policy import Policy
@@ -19,24 +18,24 @@ _OTHERWISE = {
 }
 
 
-def told_step(step: Invocation, policy: Policy) -> str:
+def describe_step(step: Invocation, policy: Policy) -> str:
     """The skill of a step with all its arguments."""
     contract = step.contract
-    given = [f"{name(each.name)} {told_cells(each, step.arguments, policy)}" for each in contract.parameters]
+    given = [f"{name(each.name)} {describe_cells(each, step.arguments, policy)}" for each in contract.parameters]
     return name(contract.name) + (f" with {listed(given)}" if given else "")
 
 
-def told_otherwise(step: Invocation) -> str:
+def describe_otherwise(step: Invocation) -> str:
     """What follows where a step may not begin when its turn comes."""
     return _OTHERWISE[OnInadmissible(step.on_inadmissible)]
 
 
-def told_asker(step: Invocation, policy: Policy) -> str:
+def describe_asker(step: Invocation, policy: Policy) -> str:
     """In which role and through which source a step is asked for."""
     return f"for the role {name(policy.roles[step.role])} through {name(SourceKind(step.source).name.lower())}"
 
 
-def told_tighter(step: Invocation, policy: Policy) -> Iterator[str]:
+def describe_tighter(step: Invocation, policy: Policy) -> Iterator[str]:
     """What a step is held to beyond its skill's contract; conditions as they are written."""
     own, skill = step.contract, policy.contracts[step.skill]
     for words, mine, theirs in (
@@ -63,7 +62,7 @@ def told_tighter(step: Invocation, policy: Policy) -> Iterator[str]:
         yield f"recorded too: {named(more)}"
 
 
-def told_cells(parameter: Parameter, cells: tuple[int, ...], policy: Policy) -> str:
+def describe_cells(parameter: Parameter, cells: tuple[int, ...], policy: Policy) -> str:
     """An argument in its bound form."""
     value = cells[parameter.cell]
     if parameter.kind == CHOICE:

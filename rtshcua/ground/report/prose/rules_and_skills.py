@@ -1,0 +1,365 @@
+"""The rules of a policy, the contracts of skills and the signals of a vehicle in words."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from rtshcua.ground.geometry.survey import DEFAULT_PATTERN
+from rtshcua.ground.report.prose.condition_phrases import describe_clauses, describe_condition
+from rtshcua.ground.report.prose.phrases import Vocabulary, between, describe_value, listed, name, named, sentence
+from rtshcua.model.durability import WORDS as DURABILITIES
+from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.policies import Airspace, Delegation, Rule, Use
+from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SignalSource
+from rtshcua.model.ir.skills import ArgumentValue, Clause, LinkDecl, Motion, Parameter, SkillDecl
+from rtshcua.model.quantity import Dimension, display
+
+_TYPES: Final = {
+    "zone": "a zone",
+    "position": "a place on the ground",
+    "altitude": "a height above home",
+    "length": "a length",
+    "speed": "a speed",
+    "duration": "a duration",
+    "ratio": "a part of a whole",
+    "angle": "an angle",
+    "voltage": "a voltage",
+    "count": "a number",
+    "role": "a role",
+}
+_CLASSES: Final = {
+    "semantic": "Planned: there is time to think about it.",
+    "tactical": "Tactical: it begins within seconds, or not at all.",
+    "reflex": "Reflex: it begins at once, and only the vehicle itself may ask for it.",
+}
+#: of a skill that a chain ends in (decision/fallbacks.py and decision/decide.py)
+AS_LINK: Final = (
+    "As the last link of a chain it needs nothing: neither rules nor charge are asked. Asked for as a step, it is held "
+    "against the rules (`degrade` too) and the charge as any other."
+)
+#: when a clause of each kind counts
+_PARTS: Final = {
+    "require": "before it begins",
+    "assume": "before it begins, and all the while it runs",
+    "maintain": "for the whole planned path, and all the while it runs",
+}
+#: what a survey flies (ground/geometry/survey.py)
+PATTERNS: Final = {
+    "grid": "back and forth on parallel lines along the longest edge, evenly spaced and no further apart than it flies "
+    "high, or 5 m where it flies lower, in at most 256 lines; the first and the last are half a spacing inside. It "
+    "begins at the end that is nearer to the entry of the area, where it has one, and goes around holes",
+    "perimeter": "once around along the outer edge, counter-clockwise, from its westernmost corner; of a round area on "
+    "16 straight legs, from the east. Holes are not gone around",
+    "orbit": "once around the middle of the area, counter-clockwise, on 16 straight legs from the east, on the largest "
+    "circle that lies in it and keeps clear of its edge; an area with a hole in the way has none",
+}
+#: docs/log-format.md, section 4
+_DURABLE: Final = {
+    "buffered": "its record is handed to the writer before it begins",
+    "written": "its record is written to the file before it begins",
+    "synced": "its record is written before it begins, and on the disk within a second",
+    "synced_first": "its record is on the disk before it begins",
+}
+
+
+def describe_motion(motion: Motion | None) -> str:
+    """Where a skill takes the vehicle."""
+    if motion is None:
+        return "It does not say where it takes the vehicle."
+    target, altitude = _given(motion.target), _given(motion.altitude)
+    match motion.kind:
+        case "climb":
+            words = f"climbs straight up to {altitude}"
+        case "fly":
+            words = f"flies in a straight line to {target} at {altitude}"
+        case "cover":
+            words = f"flies a survey path over {target} at {altitude}"
+        case "home":
+            words = "flies home and lands there"
+        case "hold":
+            words = "stays where it is"
+        case "land":
+            words = "lands where it is"
+    if motion.pattern is not None:
+        words += f", in {_given(motion.pattern)}"
+    if motion.speed is not None:
+        words += f", with {_given(motion.speed)}"
+    if motion.time is not None:
+        words += f" for {_given(motion.time)}"
+    return f"The vehicle {words}."
+
+
+def describe_patterns(skill: SkillDecl) -> Iterator[tuple[str, str]]:
+    """The patterns that a survey may be flown in, each with what it flies; none where the skill flies no survey."""
+    motion = skill.motion
+    if motion is None or motion.kind != "cover":
+        return
+    wanted = None if motion.pattern is None else motion.pattern.text
+    choices = [choice.text for each in skill.parameters if each.name.text == wanted for choice in each.choices]
+    for pattern in choices or [DEFAULT_PATTERN]:
+        yield pattern, PATTERNS[pattern]
+
+
+def _given(parameter: object) -> str:
+    text = getattr(parameter, "text", "")
+    return f"the {name(text)} asked for" if text else "a place"
+
+
+def describe_parameter(parameter: Parameter, names: Vocabulary) -> tuple[str, str, str]:
+    """What may be asked of a parameter, its limits, and what holds where nothing is said."""
+    kind = parameter.type.text
+    what = "a choice" if parameter.choices else _TYPES.get(kind, f"a value of {name(kind)}")
+    limits = ""
+    if parameter.choices:
+        limits = named([choice.text for choice in parameter.choices], "or")
+    elif parameter.range is not None:
+        limits = f"between {between(parameter.range, names)}"
+    default = "" if parameter.default is None else describe_value(parameter.default, names)
+    return what, limits, default
+
+
+def describe_timing(skill: SkillDecl) -> Iterator[str]:
+    """When a skill may begin, how long a request for it is good, and how long it may last."""
+    if skill.timing_class is not None:
+        yield _CLASSES.get(skill.timing_class.text, sentence(f"of the class {name(skill.timing_class.text)}"))
+    if skill.deadline is not None:
+        yield f"It begins within {_duration(skill.deadline.value)} of its turn, or not at all."
+    if skill.validity is not None:
+        during = f", and only in the phase {named([each.text for each in skill.phases], 'or')}" if skill.phases else ""
+        yield f"A request for it is good for {_duration(skill.validity.value)} after it was issued{during}."
+    if skill.duration is not None:
+        yield f"It lasts at most {_duration(skill.duration.value)}."
+    if skill.grace is not None:
+        yield f"While it runs, what must hold may be unknown for at most {_duration(skill.grace.value)}."
+    if skill.energy is not None:
+        yield f"It takes at most {display(skill.energy.value, skill.energy.dimension)} of a full charge."
+
+
+def describe_record(skill: SkillDecl) -> str:
+    """What of it is recorded, and how durably."""
+    kinds = [each.text for each in skill.record if each.text not in DURABILITIES]
+    durable = [_DURABLE[each.text] for each in skill.record if each.text in DURABILITIES]
+    words = f"Recorded are {listed([name(each) for each in kinds])}" if kinds else "Everything about it is recorded"
+    return "; ".join([words, *durable]) + "."
+
+
+def describe_clause(clause: Clause, names: Vocabulary) -> str:
+    """One condition of a contract."""
+    words = describe_condition(clause.condition, names)
+    return f"{words} (where the vehicle has the sensors for it)" if clause.where_fitted else words
+
+
+def describe_left_out(part: str, clause: Clause, names: Vocabulary) -> str:
+    """A condition that does not count for the vehicle, and when it would count for another."""
+    return f"{describe_condition(clause.condition, names)} ({_PARTS[part]})"
+
+
+def describe_link(link: LinkDecl, names: Vocabulary) -> str:
+    """One link of a chain."""
+    given = f" with {listed([describe_argument(each, names) for each in link.arguments])}" if link.arguments else ""
+    limit = "" if link.limit is None else f" for at most {_duration(link.limit.value)}"
+    return f"{name(link.skill.text)}{given}{limit}"
+
+
+def describe_argument(argument: ArgumentValue, names: Vocabulary) -> str:
+    """A value, and the parameter that it is for where that is written."""
+    value = describe_value(argument.value, names)
+    return value if argument.name is None else f"{name(argument.name.text)} {value}"
+
+
+def describe_chain(links: tuple[LinkDecl, ...], names: Vocabulary) -> tuple[str, ...]:
+    """What happens, in order: the first that can begin flies, then the next."""
+    told = []
+    for number, link in enumerate(links):
+        words = describe_link(link, names)
+        before = "First" if number == 0 else "If that cannot begin, fails or its time is over"
+        last = "; this needs nothing and always ends" if number == len(links) - 1 and number else ""
+        told.append(f"{before}: {words}{last}.")
+    return tuple(told)
+
+
+def _duration(us: int) -> str:
+    return display(us, Dimension.DURATION)
+
+
+def describe_type(signal: SignalDecl) -> str:
+    """What a signal measures."""
+    return _TYPES.get(signal.type.text, f"one of the states of {name(signal.type.text)}")
+
+
+def describe_sources(signal: SignalDecl) -> str:
+    """The MAVLink fields that it is read from."""
+    words = listed([_source(each) for each in signal.sources], "or")
+    return words if len(signal.sources) == 1 else f"{words}, whichever is newer"
+
+
+def _source(source: SignalSource) -> str:
+    where = listed([f"{name(each.field.text)} is {name(each.value.text)}" for each in source.where])
+    words = f"{name(source.message.text)} field {listed([name(field.text) for field in source.fields])}"
+    return f"{words}, where {where}" if where else words
+
+
+def describe_unknown(signal: SignalDecl) -> str:
+    """When its value counts as not known."""
+    stale = f"when older than {display(signal.stale_after.value, Dimension.DURATION)}"
+    if not signal.unknown_at:
+        return stale
+    return f"{stale}, and when it reads {listed([name(each.text) for each in signal.unknown_at], 'or')}"
+
+
+def describe_members(enum: EnumDecl) -> str:
+    """The states of an enumeration in their order, with the numbers that stand for them."""
+    return ", ".join(
+        f"{name(each.name.text)} ({each.value})" for each in sorted(enum.members, key=lambda one: one.value)
+    )
+
+
+#: how each source that may speak for a role is told
+SOURCES: Final = {
+    "agent": "an agent",
+    "operator": "a person at the controls",
+    "onboard": "software on board",
+    "reflex": "a reflex on board",
+}
+ANYONE: Final = "anyone"
+
+
+def sources_of(rule: Rule) -> tuple[str, ...]:
+    """The sources that a rule is about: those written, or what leaving them out means."""
+    if rule.through:
+        return tuple(source.text for source in rule.through)
+    narrow = rule.kind == "permit" and rule.roles
+    return ("operator",) if narrow else tuple(SOURCES)
+
+
+def through(sources: Sequence[str]) -> str:
+    """The sources, in words."""
+    if set(SOURCES) <= set(sources):
+        return "any source"
+    return listed([SOURCES.get(source, name(source)) for source in sources], "or")
+
+
+def describe_rule(rule: Rule, names: Vocabulary) -> str:
+    """A rule as a sentence of its own; one that a template or a delegation brought about says so."""
+    words = _rule(rule, names)
+    if rule.where_fitted:
+        words = f"{words} (where the vehicle has the sensors for it)"
+    for origin in reversed(rule.origin):
+        words = f"{_origin(origin, names)}, {words}"
+    return sentence(words)
+
+
+def _rule(rule: Rule, names: Vocabulary) -> str:
+    skills = skills_of(rule.skills)
+    when = "" if rule.when is None else f", if {describe_condition(rule.when, names)}"
+    match rule.kind:
+        case "permit":
+            return f"{_whom(rule.roles)} may have {skills} done, asking through {through(sources_of(rule))}{when}"
+        case "forbid":
+            asked = f", asking through {through(sources_of(rule))}" if rule.through else ""
+            whom = "nobody" if not rule.roles else f"the role {named(_texts(rule.roles), 'or')}"
+            return f"{whom} may{' not' if rule.roles else ''} have {skills} done{asked}{when}"
+        case "confirm":
+            return f"{skills} must be approved by {approver(rule)}{when}"
+        case "degrade":
+            instead = "" if rule.target is None else describe_link(rule.target, names)
+            return f"{instead} is flown instead of {_replaced(rule)}{when}"
+
+
+def approver(rule: Rule) -> str:
+    """Who confirms, and how long is waited."""
+    who = "somebody" if rule.approver is None else f"a person of the role {name(rule.approver.text)}"
+    if rule.another is not None:
+        who += f" and by another person of the role {name(rule.another.text)}"
+    if rule.within is None:
+        return who
+    return f"{who} (within {display(rule.within.value, Dimension.DURATION)}, or it is denied)"
+
+
+def skills_of(skills: Sequence[Name]) -> str:
+    """The skills of a rule; none stand for all of them."""
+    return named(_texts(skills), "or") if skills else "any skill"
+
+
+def _replaced(rule: Rule) -> str:
+    """The skills that a `degrade` is about: never what it flies itself (`decision/prepare.py`)."""
+    target = "" if rule.target is None else rule.target.skill.text
+    left = [skill for skill in rule.skills if skill.text != target]
+    if not rule.skills:
+        return "any other skill"
+    return skills_of(left) if left else "nothing else"
+
+
+def describe_airspace(airspace: Airspace | None) -> str:
+    """Where the vehicle may be at all."""
+    if airspace is None:
+        return describe_limits((), ())
+    return describe_limits(_texts(airspace.inside), _texts(airspace.outside))
+
+
+def describe_limits(inside: Sequence[str], outside: Sequence[str]) -> str:
+    """Where the vehicle may be at all, by the names of zones."""
+    if not inside and not outside:
+        return "This policy sets no limits to where the vehicle may be, beyond those of its rules and skills."
+    parts = []
+    if inside:
+        parts.append(f"inside of {_all(inside)}")
+    if outside:
+        parts.append(f"outside of {_all(outside)}")
+    return f"The vehicle may only be {' and '.join(parts)}: for every planned path, and at every moment in flight."
+
+
+def _all(zones: Sequence[str]) -> str:
+    return named(zones) if len(zones) == 1 else f"each of ({named(zones)})"
+
+
+def describe_evidence(without: str) -> str:
+    """What becomes of a flight whose records are not kept."""
+    if without == "refuse":
+        return "If the records of a flight cannot be kept, what runs may finish, and no further step begins."
+    return "If the records of a flight cannot be kept, the mission is given up and the vehicle comes down."
+
+
+def describe_silence(limit_us: int, then: str) -> str:
+    """What follows after a long silence of the vehicle."""
+    again = "when it is heard again and its state is fresh"
+    if then == "continue":
+        follows = f"the step goes on {again}, as long as all that it needs holds"
+    else:
+        follows = f"the mission is given up {again}, and the contingency flies"
+    limit = display(limit_us, Dimension.DURATION)
+    return f"If the vehicle was silent for longer than {limit}, {follows}. A shorter silence ends nothing."
+
+
+def _origin(origin: Node, names: Vocabulary) -> str:
+    match origin:
+        case Use():
+            given = [
+                f"{'' if each.name is None else f'{name(each.name.text)} = '}{describe_value(each.value, names)}"
+                for each in origin.arguments
+            ]
+            return f"by the template {name(origin.template.text)}" + (f" ({', '.join(given)})" if given else "")
+        case Delegation():
+            return describe_delegation(origin, names)
+        case _:
+            return "by what is used here"
+
+
+def describe_delegation(one: Delegation, names: Vocabulary) -> str:
+    """A delegation, as it stands before what it brings about."""
+    asked = f" through {through(_texts(one.through))}" if one.through else ""
+    when = "" if one.when is None else f" (if {describe_condition(one.when, names)})"
+    grantor, grantee = name(one.grantor.text), name(one.grantee.text)
+    return f"by delegation of {skills_of(one.skills)} from {grantor} to {grantee}{asked}{when}"
+
+
+def conditions_of(rule: Rule, names: Vocabulary) -> tuple[str, ...]:
+    """What must hold for a rule, one line each."""
+    return describe_clauses(rule.when, names)
+
+
+def _whom(roles: Sequence[Name]) -> str:
+    return f"the role {named(_texts(roles), 'or')}" if roles else ANYONE
+
+
+def _texts(names: Sequence[Name]) -> list[str]:
+    return [each.text for each in names]

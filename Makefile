@@ -52,8 +52,7 @@ fuzz: setup ## look for inputs that break parser, checker, compiler or boundary:
 	@MINUTES="$(MINUTES)" .make/fuzz $(TARGETS)
 
 mutate: setup ## change one thing at a time in what decides, and list what no test notices (docs/mutation.md)
-	@$(BIN)/python .make/mutate $(or $(TARGETS),rtshcua/decision) --tests $(or $(TESTS),tests/unit/decision) \
-	    --jobs $(JOBS) --one-in $(or $(ONE_IN),10)
+	@.make/mutate "$(or $(TARGETS),rtshcua/decision)" "$(or $(TESTS),tests/unit/decision)" $(JOBS) "$(or $(MUTANTS),*_1)"
 
 wrong: setup ## fly campaigns against wrong runtimes, and count the flights that find them (docs/flying/wrong-runtimes.md)
 	@$(BIN)/python .make/wrong $(TARGETS) --flights $(or $(FLIGHTS),120) --seeds $(or $(SEEDS),1) --jobs $(JOBS)

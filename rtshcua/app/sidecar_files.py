@@ -9,7 +9,7 @@ from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.adapters.store.runs import BUNDLE, LOG, SUMMARY, TELEMETRY
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.report import LogReport
-from rtshcua.ground.audit.frames import OTHERS, Frames
+from rtshcua.ground.audit.frames import OTHERS, FrameAudit
 from rtshcua.mavlink import tlog
 from rtshcua.wire.bundle import MAX_BUNDLE
 
@@ -61,7 +61,7 @@ class RawFrames:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._damaged: int | None = None
-        self.frames = Frames(self._entries())
+        self.frames = FrameAudit(self._entries())
 
     def _entries(self) -> Iterator[tuple[int, bytes]]:
         if not self._path.exists():

@@ -11,7 +11,7 @@ from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.records import AnyRecord, Effect
 from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
 from rtshcua.ground.audit.audit import Audit
-from rtshcua.ground.audit.revoked import RevokedKeys
+from rtshcua.ground.audit.revoked_keys import RevokedKeys
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
 from rtshcua.wire.request import STEP
 

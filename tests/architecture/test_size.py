@@ -11,15 +11,15 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 764,
+    "modules": 754,
     "code lines": 84_136,
-    "shared class names": 48,
-    "of them across packages": 32,
-    "shared file names": 89,
+    "shared class names": 36,
+    "of them across packages": 22,
+    "shared file names": 82,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 31,
+    "modules below 80 lines with one importer": 29,
     "functions of more than 60 lines": 21,
-    "functions of a complexity over 15": 143,
+    "functions of a complexity over 15": 141,
     "functions of a complexity over 25": 9,
 }
 

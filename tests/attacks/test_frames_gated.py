@@ -12,9 +12,8 @@ from reference.kept_frames import kept
 from reference.verifiers import ROOT_KEY
 from rtshcua.evidence.finding import Finding
 from rtshcua.ground.audit.audit import Auditor
-from rtshcua.ground.audit.frames import OURS, Frames
-from rtshcua.ground.audit.sent import Nature, nature
-from rtshcua.ground.audit.sent import read as read_frame
+from rtshcua.ground.audit.frame_meaning import FrameNature, nature, read_frame
+from rtshcua.ground.audit.frames import OURS, FrameAudit
 from virtual import case
 from virtual.flight import Flight
 
@@ -31,7 +30,7 @@ def flown() -> tuple[tuple[bytes, ...], Entries]:
 
 def found(entries: Iterable[tuple[int, bytes]]) -> Finding | None:
     """What the audit says of the flight with these frames."""
-    frames = Frames(iter(entries))
+    frames = FrameAudit(iter(entries))
     auditor = Auditor(ROOT_KEY, frames=frames)
     for line in flown()[0]:
         auditor.take(line)
@@ -43,7 +42,7 @@ def commands() -> list[int]:
     numbers = []
     for number, (_, octets) in enumerate(flown()[1]):
         frame = read_frame(octets)
-        if frame is not None and frame.component == OURS and nature(frame) is Nature.COMMAND:
+        if frame is not None and frame.component == OURS and nature(frame) is FrameNature.COMMAND:
             numbers.append(number)
     return numbers
 

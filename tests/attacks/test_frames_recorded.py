@@ -15,9 +15,8 @@ from reference.kept_frames import Entries, kept
 from rtshcua.codec.frames import Codec
 from rtshcua.evidence.finding import Finding
 from rtshcua.ground.audit.audit import Auditor
-from rtshcua.ground.audit.frames import OURS, Frames
-from rtshcua.ground.audit.sent import Nature, nature
-from rtshcua.ground.audit.sent import read as read_frame
+from rtshcua.ground.audit.frame_meaning import FrameNature, nature, read_frame
+from rtshcua.ground.audit.frames import OURS, FrameAudit
 from virtual import case
 from virtual.flight import Flight
 from virtual.rows import rows
@@ -46,7 +45,7 @@ def from_us(octets: bytes) -> bool:
 
 
 def judged(lines: list[bytes] | tuple[bytes, ...], entries: Entries) -> Finding | None:
-    frames = Frames(iter(entries))
+    frames = FrameAudit(iter(entries))
     auditor = Auditor(ROOT_KEY, frames=frames)
     for line in lines:
         auditor.take(line)
@@ -156,7 +155,7 @@ def test_a_command_just_before_its_record(kind: str) -> None:
 
 def is_command(octets: bytes) -> bool:
     frame = read_frame(octets)
-    return frame is not None and frame.component == OURS and nature(frame) is Nature.COMMAND
+    return frame is not None and frame.component == OURS and nature(frame) is FrameNature.COMMAND
 
 
 @pytest.mark.parametrize("kind", ["px4", "ardupilot"])

@@ -34,7 +34,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.front.cli.app import main
 from rtshcua.ground.audit.audit import Auditor
-from rtshcua.ground.audit.revoked import RevokedKeys
+from rtshcua.ground.audit.revoked_keys import RevokedKeys
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted

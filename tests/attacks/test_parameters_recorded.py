@@ -12,7 +12,7 @@ from reference.kept_frames import Entries, kept
 from rtshcua.codec.frames import Codec
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.audit.audit import Auditor
-from rtshcua.ground.audit.frames import OURS, Frames
+from rtshcua.ground.audit.frames import OURS, FrameAudit
 from rtshcua.ground.audit.preparations import ListedParameters
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.onboard.enforcement.preparation import SETTABLE, unsettable
@@ -36,7 +36,7 @@ def flown(*, attested: bool = True) -> tuple[tuple[bytes, ...], Entries]:
 
 def found(lines: Sequence[bytes], entries: Sequence[tuple[int, bytes]]) -> str | None:
     """The slug of what an audit finds."""
-    frames = Frames(iter(entries))
+    frames = FrameAudit(iter(entries))
     auditor = Auditor(case.KEYS[Duty.ROOT].kid, frames=frames)
     for line in lines:
         auditor.take(line)

@@ -26,9 +26,8 @@ from rtshcua.adapters.vehicle.flavour import Stage
 from rtshcua.evidence.reading import read as decoded
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.audit.audit import Auditor
-from rtshcua.ground.audit.frames import OURS, Frames
-from rtshcua.ground.audit.sent import Nature, nature
-from rtshcua.ground.audit.sent import read as read_frame
+from rtshcua.ground.audit.frame_meaning import FrameNature, nature, read_frame
+from rtshcua.ground.audit.frames import OURS, FrameAudit
 from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.onboard.enforcement.isolated import AHEAD, WITHDRAW
 from rtshcua.onboard.enforcement.load import EnforcementMode
@@ -185,7 +184,7 @@ def test_no_link_and_no_other_step_is_called_unsent(of: dict[str, int]) -> None:
 
 def judged(lines: Lines, entries: Entries) -> str | None:
     """What is found in the frames beside a log."""
-    frames = Frames(iter(entries))
+    frames = FrameAudit(iter(entries))
     auditor = Auditor(ROOT_KEY, frames=frames)
     for line in lines:
         auditor.take(line)
@@ -222,14 +221,16 @@ def test_a_frame_that_may_be_the_step_before_is_held_against_none() -> None:
     """Two dispatches of one target in one microsecond, of which the first ended then: its frame may be either's."""
     lines, entries = tried_twice(False)
     up, (failed,), (unsent,) = where(lines, "dispatched")[0], where(lines, "failed"), where(lines, "refused")
-    frames = Frames(iter(()))
+    frames = FrameAudit(iter(()))
     auditor = Auditor(ROOT_KEY, frames=frames)
     for line in lines:
         auditor.take(line)
     dispatched, ended, withdrawn = (effect(lines[number]) for number in (up, failed, unsent))
     sent = next(octets for at_us, octets in entries if at_us >= dispatched.utc_us and is_motion(octets))
     for first, slug in ((True, None), (False, "frames/was-sent")):
-        beside = Frames(iter([*(each for each in entries if each[0] < dispatched.utc_us), (dispatched.utc_us, sent)]))
+        beside = FrameAudit(
+            iter([*(each for each in entries if each[0] < dispatched.utc_us), (dispatched.utc_us, sent)])
+        )
         beside.begin(frames._basis)  # type: ignore[arg-type]
         if first:
             beside.happened(replace(dispatched, utc_us=dispatched.utc_us - 1, token=7))
@@ -248,4 +249,4 @@ def effect(line: bytes) -> Effect:
 
 def is_motion(octets: bytes) -> bool:
     frame = read_frame(octets)
-    return frame is not None and frame.component == OURS and nature(frame) is Nature.COMMAND
+    return frame is not None and frame.component == OURS and nature(frame) is FrameNature.COMMAND

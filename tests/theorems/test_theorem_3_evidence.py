@@ -37,7 +37,7 @@ from reference.verifiers import ROOT_KEY
 from rtshcua.evidence import note
 from rtshcua.evidence import seal_verification as seals
 from rtshcua.evidence.report import LogVerdict
-from rtshcua.ground.audit import meaning
+from rtshcua.ground.audit import record_audit
 from rtshcua.ground.audit.audit import audit
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -177,5 +177,5 @@ def test_an_auditor_that_does_not_derive_is_noticed(monkeypatch: pytest.MonkeyPa
     number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
     forged = signed([*lines[:number], edit(lines[number], reason="state/violated"), *lines[number + 1 :]])
     assert not accepted(forged)
-    monkeypatch.setattr(meaning.Deriver, "check", lambda *_: None)
+    monkeypatch.setattr(record_audit.DecisionAudit, "check", lambda *_: None)
     assert accepted(forged)

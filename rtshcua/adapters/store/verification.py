@@ -16,7 +16,7 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.quick_verification import LONGEST_SEGMENT, LogOutline, Octets, SegmentPart, outline, quick, scan
 from rtshcua.evidence.records import AnyRecord
 from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of, trusted
-from rtshcua.ground.audit.frames import Frames
+from rtshcua.ground.audit.frames import FrameAudit
 from rtshcua.ground.audit.trust import establish
 
 #: octets of a log that is worth more than one process
@@ -43,7 +43,7 @@ def verify_carefully(
     asked: VerificationInputs,
     *,
     derive: bool,
-    frames: Frames | None = None,
+    frames: FrameAudit | None = None,
     each: Callable[[AnyRecord], None] | None = None,
     progress: Progress = lambda _: None,
 ) -> Audit:

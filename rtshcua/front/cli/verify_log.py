@@ -21,7 +21,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import distrust, fail, of_each, say
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.front.cli.verdict import as_object, as_text
-from rtshcua.ground.audit.revoked import RevokedKeys
+from rtshcua.ground.audit.revoked_keys import RevokedKeys
 from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)

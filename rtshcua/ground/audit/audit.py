@@ -4,11 +4,11 @@
 9. the bundle is the one that the caller knows of, if there is one
 10. anchors: what witnesses cosigned is what the log holds (`rtshcua.evidence.witnessing.anchors`)
 11. what the records tell of is what the boundary made and signed for (`rtshcua.evidence.attested`)
-12. each decision is derived again (`derive`), under the mode of the genesis; what the temporal monitors said is not
-    ruled out by the states that the records hold (`observed`)
+12. each decision is derived again (`decisions`), under the mode of the genesis; what the temporal monitors said is not
+    ruled out by the states that the records hold
 13. documents: each approval, recall, replacement and cancellation is verified again, and no decision read another
     (`documents`)
-14. evidence before effect: each dispatch follows a record that permits it (`cover`), in its turn (`turns`); not in mode
+14. evidence before effect: each dispatch follows a record that permits it, in its turn (`dispatches`); not in mode
     `none`
 
 Of several flaws the first of these is told: of the genesis and its trust, of the log itself, of its anchors, of the
@@ -28,10 +28,62 @@ from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis
 from rtshcua.evidence.report import LogReport, claims, with_anchors, with_boundary
 from rtshcua.evidence.verify import LogVerifier
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
-from rtshcua.ground.audit.frames import Frames
-from rtshcua.ground.audit.meaning import Meaning
-from rtshcua.ground.audit.told import of_meaning, of_trust
+from rtshcua.ground.audit.frames import FrameAudit
+from rtshcua.ground.audit.record_audit import UNENFORCED, RecordAudit
 from rtshcua.ground.audit.trust import Basis, establish
+
+Claims = tuple[tuple[Claim, ...], tuple[Claim, ...]]
+
+
+def trust_claims(genesis: Genesis, basis: Basis) -> Claims:
+    """What the pinned key vouches for, and what it does not."""
+    bundle = basis.bundle
+    kind = "development root" if basis.root.development else "trust root"
+    proven = (
+        Claim("trust", f"the {kind} is signed by the pinned key, and gives log key {genesis.log_kid} its duty"),
+        Claim(
+            "bundle",
+            f"mission `{bundle.mission.name}` under `{bundle.policy.name}@{bundle.policy.version}` on "
+            f"`{genesis.vehicle}`, both signed by keys that the root trusts for them",
+        ),
+    )
+    if not basis.root.development:
+        return proven, ()
+    text = "development keys lie unencrypted where they were made: whoever can read them can sign anything"
+    return proven, (Claim("development", text),)
+
+
+def record_claims(basis: Basis, meaning: RecordAudit) -> Claims:
+    """What deriving again proved."""
+    proven = [Claim("decisions", f"{_many(meaning.derived, 'decision')} derived again, each with the same answer")]
+    documents = [
+        f"{_many(count, kind)}{_signed_by(meaning.people[kind])}" for kind, count in meaning.documents.items() if count
+    ]
+    if documents:
+        text = f"{', '.join(documents)}, each signed by a key that the root trusts for it, and good when it came"
+        proven.append(Claim("documents", text))
+    if meaning.preparations.count:
+        text = f"{_many(meaning.preparations.count, 'parameter')} listed to be set or put back, none while it flew"
+        proven.append(Claim("preparations", text))
+    unproven = [Claim("state", "that the recorded state is what the vehicle's sensors saw")]
+    if basis.policy.monitors:
+        text = "what the temporal monitors said between the records: only that no recorded state rules it out"
+        unproven.append(Claim("monitors", text))
+    if meaning.mode == UNENFORCED:
+        unproven.append(Claim("enforcement", "mode `none`: nothing was enforced, so dispatches needed no permit"))
+    else:
+        text = f"{_many(meaning.dispatches, 'dispatch', 'dispatches')}, each after a record that permits it"
+        proven.append(Claim("dispatches", text))
+    return tuple(proven), tuple(unproven)
+
+
+def _signed_by(people: list[str]) -> str:
+    return f" by {' and '.join(people)}" if people else ""
+
+
+def _many(count: int, one: str, more: str | None = None) -> str:
+    return f"{count} {one if count == 1 else more or one + 's'}"
+
 
 _NOT_DERIVED = "that decisions follow from what they record, and commands from them: `--audit` without `--no-derive`"
 
@@ -55,7 +107,7 @@ class Auditor:
 
     def __init__(
         self, pinned: bytes, *, bundle: bytes | None = None, derive: bool = True, anchors: Iterable[str] = (),
-        frames: Frames | None = None,
+        frames: FrameAudit | None = None,
     ) -> None:  # fmt: skip
         self.record: AnyRecord | None = None  # the last line's, if it is sound in itself and in its place
         self._pinned = pinned
@@ -65,7 +117,7 @@ class Auditor:
         self._frames = frames
         self._verifier = LogVerifier()
         self._basis: Basis | None = None
-        self._meaning: Meaning | None = None
+        self._meaning: RecordAudit | None = None
         self._anchors: Anchors | None = None
         self._untrusted: Finding | None = None
         self._contradicted: Finding | None = None
@@ -99,7 +151,7 @@ class Auditor:
         self._basis = basis
         self._boundary = BoundaryEvidence(basis.root, genesis)
         if self._derive:
-            self._meaning = Meaning(basis, genesis.mode, self._frames)
+            self._meaning = RecordAudit(basis, genesis.mode, self._frames)
         self._anchors = anchors_of(basis, genesis)
         for note in self._given:
             flaw = self._anchors.anchor(note)
@@ -162,7 +214,7 @@ class Auditor:
         if self._meaning is None:
             unproven = (*report.unproven, Claim("decisions", _NOT_DERIVED))
             return trusted(report._replace(unproven=unproven), self._basis)
-        proven, but = of_meaning(self._basis, self._meaning)
+        proven, but = record_claims(self._basis, self._meaning)
         report = report._replace(proven=(*report.proven, *proven), unproven=(*report.unproven, *but))
         return trusted(report, self._basis)
 
@@ -170,7 +222,7 @@ class Auditor:
 def trusted(report: LogReport, basis: Basis) -> LogReport:
     """The report with what the pinned key vouches for, of a log that was trusted."""
     assert report.genesis is not None
-    proven, unproven = of_trust(report.genesis, basis)
+    proven, unproven = trust_claims(report.genesis, basis)
     return report._replace(proven=(*proven, *report.proven), unproven=(*report.unproven, *unproven))
 
 

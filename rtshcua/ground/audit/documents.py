@@ -14,12 +14,12 @@ from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, REPLACEMENT
 from rtshcua.wire.trust import TrustRoot
 
 #: the documents of a flight, by the event that records one
-KINDS: Final = {
+DOCUMENT_KINDS: Final = {
     "approval": APPROVAL, "recall": RECALL, "replacement": REPLACEMENT, "cancellation": CANCELLATION,
 }  # fmt: skip
 
 
-class Documents:
+class DocumentAudit:
     """Follows the documents that a log says were accepted. `counts` has how many there were of each kind, and `people`
     who of the trust root's persons signed some of each, in the order in which they did.
     """
@@ -27,12 +27,12 @@ class Documents:
     def __init__(self, session: Session, root: TrustRoot) -> None:
         self._session = session
         self._persons = {key.kid: key.person for key in root.keys if key.person}
-        self.people: dict[str, list[str]] = {kind: [] for kind in KINDS}
-        self.counts = dict.fromkeys(KINDS, 0)
+        self.people: dict[str, list[str]] = {kind: [] for kind in DOCUMENT_KINDS}
+        self.counts = dict.fromkeys(DOCUMENT_KINDS, 0)
 
     def check(self, record: Effect) -> Flaw | None:
         """What is wrong with an effect, if it is a document."""
-        kind = KINDS.get(record.event)
+        kind = DOCUMENT_KINDS.get(record.event)
         if kind is None:
             return None
         document = octets(record.detail)

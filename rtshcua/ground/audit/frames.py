@@ -3,7 +3,7 @@
 A frame of ours is one that the companion's component sent in a system of which an autopilot was heard; before any was
 heard, in every system. For whoever reaches the link can send the heartbeat of another system, nothing follows from one:
 frames of a companion like ours in another vehicle's system, heard over the same link, count as ours too. Each that is
-not harmless (`sent`) must be part (`obeyed`) of a command whose `dispatched` record is earlier and whose end is not.
+not harmless must be part of a command (`frame_meaning`) whose `dispatched` record is earlier and whose end is not.
 One that sets a parameter must be listed by a record before it, with its value, and the vehicle stand on the ground.
 Frames of others, which came over the same link, are theirs to answer for.
 
@@ -22,12 +22,22 @@ from typing import Final, NamedTuple
 
 from rtshcua.evidence.finding import Finding, Flaw
 from rtshcua.evidence.records import Effect
-from rtshcua.ground.audit.cover import DISPATCHED
-from rtshcua.ground.audit.named import is_withdrawn
-from rtshcua.ground.audit.obeyed import Home, Target, obeyed, of_link, of_step
+from rtshcua.ground.audit.dispatches import DISPATCHED, is_withdrawn
+from rtshcua.ground.audit.frame_meaning import (
+    AuditedFrame,
+    FrameNature,
+    HomeHeights,
+    MotionTarget,
+    frame_words,
+    is_part_of,
+    nature,
+    parameter_write,
+    read_frame,
+    switches_fence_on,
+    target_of_link,
+    target_of_step,
+)
 from rtshcua.ground.audit.preparations import Listed
-from rtshcua.ground.audit.sent import Frame, Nature, name, nature, read, switches_fence_on
-from rtshcua.ground.audit.sent import parameter as setting
 from rtshcua.ground.audit.trust import Basis
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.framing import unsigned
@@ -55,7 +65,7 @@ class _Entry(NamedTuple):
 class _Suspect(NamedTuple):
     """The first frame that nothing covers. `record` is the last record before it."""
 
-    frame: Frame
+    frame: AuditedFrame
     number: int
     at_us: int
     record: int
@@ -63,11 +73,11 @@ class _Suspect(NamedTuple):
 
 
 class _Running(NamedTuple):
-    targets: tuple[Target, ...]
+    targets: tuple[MotionTarget, ...]
     token: int
     since_us: int
     record: int
-    before: tuple[Target, ...]  # what was allowed until that very moment
+    before: tuple[MotionTarget, ...]  # what was allowed until that very moment
 
 
 class _Allowed(NamedTuple):
@@ -75,7 +85,7 @@ class _Allowed(NamedTuple):
     those of the `fence`.
     """
 
-    targets: tuple[Target, ...] = ()
+    targets: tuple[MotionTarget, ...] = ()
     listed: tuple[Listed, ...] = ()
     fence: bool = False
 
@@ -147,7 +157,7 @@ class _Passed:
         return None
 
 
-class Frames:
+class FrameAudit:
     """Follows a log and the frames that lie beside it, in step. `entries` are (UTC us, frame) as they were kept.
 
     `count` is how many frames of ours were commands, `begun` whether the log has any that was sent.
@@ -162,7 +172,7 @@ class Frames:
         self._basis: Basis | None = None
         self._autopilots: dict[int, int] = {}  # of each system that has one
         self._kinds: dict[int, tuple[int, int]] = {}  # and its MAV_TYPE with that
-        self._homes: dict[int, Home] = {}
+        self._homes: dict[int, HomeHeights] = {}
         self._flying: dict[int, bool] = {}  # armed, as its last heartbeat said,
         self._aloft: dict[int, bool] = {}  # or not on the ground
         self._types: dict[int, float] = {}  # FENCE_TYPE
@@ -239,7 +249,7 @@ class Frames:
         self._latest, self._left = self._running, None
         self.begun = True
 
-    def _targets(self, record: Effect) -> tuple[Target, ...]:
+    def _targets(self, record: Effect) -> tuple[MotionTarget, ...]:
         """What the dispatch may have the vehicle do; several only for degrade rules, of which the record names none."""
         assert self._basis is not None
         policy, invocations = self._basis.policy.policy, self._basis.invocations
@@ -249,13 +259,15 @@ class Frames:
                 return ()
             invocation = invocations[record.step].invocation
             if record.kind == STEP:
-                return (of_step(invocation, policy),) if invocation.contract.name == record.detail else ()
+                return (target_of_step(invocation, policy),) if invocation.contract.name == record.detail else ()
             links = invocation.contract.fallback
         if record.link == DEGRADE:
             chosen = [rule.target for rule in policy.rules if rule.target is not None]
         else:
             chosen = list(links[record.link : record.link + 1]) if record.link >= 0 else []
-        return tuple(of_link(link, policy) for link in chosen if policy.contracts[link.skill].name == record.detail)
+        return tuple(
+            target_of_link(link, policy) for link in chosen if policy.contracts[link.skill].name == record.detail
+        )
 
     def _until(self, utc_us: int | None) -> None:
         """Judges the frames before a moment; all that are left, if there is none."""
@@ -275,7 +287,7 @@ class Frames:
         return None if found is None else _Entry(found[0], *found[1])
 
     def _judge(self, entry: _Entry) -> None:
-        frame = read(entry.octets)
+        frame = read_frame(entry.octets)
         if frame is None:
             return  # nothing that an autopilot would take for a frame
         if frame.component == enums.MAV_COMP_ID_AUTOPILOT1:
@@ -283,12 +295,12 @@ class Frames:
         if frame.component != OURS or (self._autopilots and frame.system not in self._autopilots):
             return
         what = nature(frame)
-        if what is Nature.HARMLESS:
+        if what is FrameNature.HARMLESS:
             return
         allowed = self._allowed(entry.at_us)
-        if what is Nature.FENCE and allowed.fence:
+        if what is FrameNature.FENCE and allowed.fence:
             return
-        if what is Nature.SETTING:
+        if what is FrameNature.SETTING:
             self._set(frame, entry, allowed)
             return
         self.count += 1
@@ -304,16 +316,16 @@ class Frames:
         elif self._left is None and self._carries_out_the_latest(frame, entry.at_us):
             self._left = suspect
 
-    def _carries_out_the_latest(self, frame: Frame, at_us: int) -> bool:
+    def _carries_out_the_latest(self, frame: AuditedFrame, at_us: int) -> bool:
         """Whether a frame is part of what was dispatched last, and of nothing that was allowed until that moment."""
         latest = self._latest
         if latest is None or not self._any(frame, latest.targets):
             return False
         return at_us > latest.since_us or (at_us == latest.since_us and not self._any(frame, latest.before))
 
-    def _set(self, frame: Frame, entry: _Entry, allowed: _Allowed) -> None:
+    def _set(self, frame: AuditedFrame, entry: _Entry, allowed: _Allowed) -> None:
         """Judges a write of a parameter: it is listed, and the vehicle stands; or it switches a fence on, before."""
-        parameter, value = setting(frame, self._autopilots.get(frame.system, 0))
+        parameter, value = parameter_write(frame, self._autopilots.get(frame.system, 0))
         is_listed = any((each.name, bits_of(each.value)) == (parameter, bits_of(value)) for each in allowed.listed)
         if not is_listed and allowed.fence and switches_fence_on(parameter, value, self._types.get(frame.system)):
             return
@@ -328,7 +340,7 @@ class Frames:
             text = "a parameter was set of a vehicle that was armed, or not on the ground"
             self._finding = Flaw("frames/parameter-in-flight", text, found).at(self._record)
 
-    def _heard(self, frame: Frame) -> None:
+    def _heard(self, frame: AuditedFrame) -> None:
         """The first heartbeat in a system settles what its autopilot is; its positions tell how high home lies, other
         messages whether it flies, and what its fence is.
         """
@@ -343,18 +355,18 @@ class Frames:
         elif frame.message == EXTENDED_SYS_STATE and fields:
             self._aloft[system] = _landed(fields) != enums.MAV_LANDED_STATE_ON_GROUND
         elif frame.message == PARAM_VALUE and fields:
-            name, value = setting(frame, self._autopilots.get(system, 0))
+            name, value = parameter_write(frame, self._autopilots.get(system, 0))
             if name == "FENCE_TYPE":
                 self._types[system] = value if isfinite(value) else 0.0
         elif frame.message == GLOBAL_POSITION_INT and system in self._autopilots and fields:
             above_sea, above_home = _heights(fields)
             height = above_sea - above_home  # mm
-            home = self._homes.get(system, Home(height, height))
-            self._homes[system] = Home(min(home.low, height), max(home.high, height))
+            home = self._homes.get(system, HomeHeights(height, height))
+            self._homes[system] = HomeHeights(min(home.low, height), max(home.high, height))
 
-    def _any(self, frame: Frame, targets: tuple[Target, ...]) -> bool:
+    def _any(self, frame: AuditedFrame, targets: tuple[MotionTarget, ...]) -> bool:
         autopilot, home = self._autopilots.get(frame.system, 0), self._homes.get(frame.system)
-        return any(obeyed(frame, target, autopilot, home) for target in targets)
+        return any(is_part_of(frame, target, autopilot, home) for target in targets)
 
 
 def _early(suspect: _Suspect, utc_us: int, record: int) -> Finding:
@@ -371,4 +383,4 @@ def _unrecorded(suspect: _Suspect) -> Finding:
 
 
 def _found(suspect: _Suspect) -> str:
-    return f"{name(suspect.frame)} at {suspect.at_us} us, frame {suspect.number}"
+    return f"{frame_words(suspect.frame)} at {suspect.at_us} us, frame {suspect.number}"

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import Effect
-from rtshcua.ground.audit.cover import DISPATCHED
+from rtshcua.ground.audit.dispatches import DISPATCHED
 from rtshcua.mavlink.parameters import bits_of
 
 PREPARATION: Final = "preparation"
@@ -69,7 +69,7 @@ class ListedParameters:
         if self._running is not None:
             text = "parameters were to be set while a command was under way"
             return Flaw("preparation/in-flight", text, record.detail)
-        restoring, writes = _read(record.detail)
+        restoring, writes = _listed_writes(record.detail)
         if not writes:
             return Flaw("preparation/malformed", "it lists no parameters as such a record does", record.detail)
         flaw = next(filter(None, (self._flaw(each, restoring=restoring) for each in writes)), None)
@@ -95,7 +95,7 @@ class ListedParameters:
         return Flaw("preparation/value", "a parameter was to be set to what it is never set to", f"{name} {value:g}")
 
 
-def _read(detail: str) -> tuple[bool, tuple[Listed, ...]]:
+def _listed_writes(detail: str) -> tuple[bool, tuple[Listed, ...]]:
     found = _LISTED.fullmatch(detail)
     if found is None:
         return False, ()

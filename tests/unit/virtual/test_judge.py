@@ -584,10 +584,10 @@ def test_a_log_that_does_not_verify(good: ScenarioFlown) -> None:
 
 def test_a_decision_that_is_not_derived(good: ScenarioFlown, monkeypatch: pytest.MonkeyPatch) -> None:
     from rtshcua.evidence.finding import Flaw
-    from rtshcua.ground.audit.meaning import Meaning
+    from rtshcua.ground.audit.record_audit import RecordAudit
 
     flaw = Flaw("decision/differs", "it decides otherwise")
-    monkeypatch.setattr(Meaning, "check", lambda self, record: flaw if record.seq == 4 else None)
+    monkeypatch.setattr(RecordAudit, "check", lambda self, record: flaw if record.seq == 4 else None)
     assert slugs(judge(good)) == ["derive"]
 
 

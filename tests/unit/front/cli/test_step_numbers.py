@@ -16,7 +16,7 @@ from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.live.lines import as_json, plain
 from rtshcua.front.mcp.server import TOOLS
-from rtshcua.ground.audit.named import ref_words
+from rtshcua.ground.audit.dispatches import ref_words
 from rtshcua.model.step_number import index_of, number_of, step_words
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from reference.kinds_of_flight import recorded
-from rtshcua.ground.audit.obeyed import Home, Target, obeyed
-from rtshcua.ground.audit.sent import Frame, Nature, nature, read
+from rtshcua.ground.audit.frame_meaning import AuditedFrame, FrameNature, HomeHeights, MotionTarget, is_part_of, nature
+from rtshcua.ground.audit.frame_meaning import read_frame as read
 from rtshcua.mavlink.layouts import LAYOUTS
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.contract import MotionKind
@@ -25,11 +25,11 @@ HOME = 488_000
 def commands(kind: str) -> tuple[Shape, ...]:
     """The commands among the frames of a flight."""
     entries = recorded("none", kind).entries
-    frames = [read_frame(octets) for _, octets in entries if nature_of(octets) is Nature.COMMAND]
+    frames = [read_frame(octets) for _, octets in entries if nature_of(octets) is FrameNature.COMMAND]
     return tuple(dict.fromkeys(frame for frame in frames if frame is not None))
 
 
-def nature_of(octets: bytes) -> Nature | None:
+def nature_of(octets: bytes) -> FrameNature | None:
     frame = read(octets)
     return nature(frame) if frame is not None and frame.component == 191 else None
 
@@ -58,12 +58,12 @@ def test_the_same_frames_carry_out_the_same_commands(kind: str, data: some.DataO
     path = data.draw(some.sampled_from(((), there, (*POINTS[0], *there))))
     geo = tuple(int(each) for each in path)
     command = Command(1, "x", int(motion), geo, geo, altitude, speed)
-    target = Target(int(motion), frozenset(zip(geo[::2], geo[1::2], strict=True)), altitude, speed)
+    target = MotionTarget(int(motion), frozenset(zip(geo[::2], geo[1::2], strict=True)), altitude, speed)
     shape = frame._replace(fields=tuple(fields))
-    mine = Frame(frame.system, frame.component, frame.message, tuple(fields))
+    mine = AuditedFrame(frame.system, frame.component, frame.message, tuple(fields))
     home = data.draw(some.sampled_from((None, HOME, HOME + 1_500)))
     autopilot = data.draw(some.sampled_from((PX4, ARDUPILOT)))
-    said = obeyed(mine, target, autopilot, None if home is None else Home(home, home))
+    said = is_part_of(mine, target, autopilot, None if home is None else HomeHeights(home, home))
     assert said == carries_out(shape, command, autopilot, home)
 
 
@@ -81,7 +81,9 @@ def test_whatever_the_octets_reading_them_does_not_fail(payload: bytes, message:
             nature(frame)
             for autopilot in (PX4, ARDUPILOT):
                 for motion in MotionKind:
-                    obeyed(frame, Target(int(motion), frozenset(), 10_000, 1_000), autopilot, Home(0, 0))
+                    is_part_of(
+                        frame, MotionTarget(int(motion), frozenset(), 10_000, 1_000), autopilot, HomeHeights(0, 0)
+                    )
 
 
 @given(some.sampled_from(sorted(LAYOUTS)), some.binary(min_size=60, max_size=60))

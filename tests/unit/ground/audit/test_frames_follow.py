@@ -11,7 +11,7 @@ from reference.kept_frames import Entries, kept
 from reference.kinds_of_flight import FAULTS, recorded
 from rtshcua.evidence.finding import Finding
 from rtshcua.ground.audit.audit import Auditor
-from rtshcua.ground.audit.frames import Frames
+from rtshcua.ground.audit.frames import FrameAudit
 from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Event, Interrupted
 from rtshcua.wire.keys import Duty
@@ -20,8 +20,8 @@ from virtual.flight import Flight
 from virtual.sampling import each_once
 
 
-def joined(lines: Sequence[bytes], entries: Entries) -> tuple[Finding | None, Frames]:
-    frames = Frames(iter(entries))
+def joined(lines: Sequence[bytes], entries: Entries) -> tuple[Finding | None, FrameAudit]:
+    frames = FrameAudit(iter(entries))
     auditor = Auditor(case.KEYS[Duty.ROOT].kid, frames=frames)
     for line in lines:
         auditor.take(line)

@@ -14,9 +14,8 @@ from reference.kept_frames import Entries
 from reference.kinds_of_flight import fallen_back
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Effect, Genesis
-from rtshcua.ground.audit.frames import OURS, Frames
-from rtshcua.ground.audit.sent import Nature, nature
-from rtshcua.ground.audit.sent import read as read_frame
+from rtshcua.ground.audit.frame_meaning import FrameNature, nature, read_frame
+from rtshcua.ground.audit.frames import OURS, FrameAudit
 from rtshcua.ground.audit.trust import Basis, establish
 from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
@@ -78,7 +77,7 @@ def flown(kind: str) -> Case:
 
 def is_command(octets: bytes) -> bool:
     frame = read_frame(octets)
-    return frame is not None and frame.component == OURS and nature(frame) is Nature.COMMAND
+    return frame is not None and frame.component == OURS and nature(frame) is FrameNature.COMMAND
 
 
 def covered(of: Case, octets: bytes, at_us: int, autopilot: int) -> bool:
@@ -101,7 +100,7 @@ def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:
     octets = data.draw(some.sampled_from(of.commands))
     entries = list(of.entries)
     insort(entries, (at_us, octets), key=lambda entry: entry[0])
-    frames = Frames(iter(entries))
+    frames = FrameAudit(iter(entries))
     frames.begin(of.basis)
     for effect in of.effects:
         frames.happened(effect)
@@ -118,7 +117,7 @@ def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:
 def test_a_clock_that_stands_still_for_a_while_makes_no_sound_flight_unsound(kind: str, bits: int) -> None:
     """A paced clock does, so that records and frames that follow one another are of one microsecond."""
     of = flown(kind)
-    frames = Frames((at_us >> bits << bits, octets) for at_us, octets in of.entries)
+    frames = FrameAudit((at_us >> bits << bits, octets) for at_us, octets in of.entries)
     frames.begin(of.basis)
     for effect in of.effects:
         frames.happened(msgspec.structs.replace(effect, utc_us=effect.utc_us >> bits << bits))

@@ -1,22 +1,79 @@
-"""Each decision once more: from the inputs that its record holds, by the same rules that decided on board."""
+"""Each decision once more: from the inputs that its record holds, by the same rules that decided on board; and what the
+temporal monitors said, against what the log knows of their past.
+
+Each decision record holds the state of one observation, and what the monitors said there. The observations in between
+are not recorded, so nobody can work out again what a monitor said; but each record tells the truth of its condition at
+that moment, and a monitor must not say what these truths rule out: not TRUE `for the last 3 s` with a FALSE in them.
+"""
+
+from typing import Final
 
 from msgspec.structs import astuple
 
 from rtshcua.decision.durability import durability_of
+from rtshcua.decision.evaluate import NO_PHASE
+from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.session import Session
-from rtshcua.decision.situation import SINGLE
+from rtshcua.decision.situation import SINGLE, environment, situation
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN, Truth
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import DECIDED, DecisionRecord, in_words
-from rtshcua.ground.audit.named import ref_words
-from rtshcua.ground.audit.observed import Observed
+from rtshcua.ground.audit.dispatches import ref_words
 from rtshcua.ground.audit.trust import Basis
 from rtshcua.model.decision import Decision as Decided
 from rtshcua.model.durability import WORDS, WRITTEN
+from rtshcua.model.flat.policy import MonitorKind
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.model.step_number import step_words
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP, Ref
 from rtshcua.wire.response import Status
+
+_WORDS: Final = {TRUE: "true", FALSE: "false", UNKNOWN: "unknown"}
+_ALL: Final = TRUE | FALSE | UNKNOWN
+_NEVER: Final = -(1 << 62)
+
+
+class MonitorHistory:
+    """Follows the decisions of one log; what it keeps is bounded by the policy: when each truth was last recorded."""
+
+    def __init__(self, policy: PreparedPolicy) -> None:
+        self._policy = policy
+        self._last = [{TRUE: _NEVER, FALSE: _NEVER, UNKNOWN: _NEVER} for _ in policy.monitors]
+
+    def check(self, state: State, now: Now) -> Flaw | None:
+        """What is wrong with what the monitors said at a recorded moment, given those before, or None."""
+        at_us = now.monotonic_us
+        at = environment(situation(state, self._policy, now), self._policy, (), NO_PHASE)
+        flaw: Flaw | None = None
+        for monitor, last, said, flat in zip(
+            self._policy.monitors, self._last, state.monitors, self._policy.policy.monitors, strict=True
+        ):
+            found = monitor.condition(at)
+            truth = found if found in SINGLE else UNKNOWN  # as `decision.temporal` has it
+            last[truth] = at_us
+            may = _allowed_truths(monitor.kind, truth, {one for one in last if last[one] >= at_us - monitor.window_us})
+            if flaw is None and not said & may:
+                text = (
+                    f"a monitor of `{flat.when.text}` said what its condition rules out, in this record or one before"
+                )
+                expected = " or ".join(word for one, word in _WORDS.items() if one & may)
+                flaw = Flaw("decision/monitor", text, _WORDS[said], expected)
+        return flaw
+
+
+def _allowed_truths(kind: int, now: Truth, recorded: set[Truth]) -> Truth:
+    """What a monitor may say, by the truth of its condition now, and those that were recorded in its window."""
+    match kind:
+        case MonitorKind.FOR_LAST:  # the least of more truths than these
+            return FALSE if FALSE in recorded else FALSE | UNKNOWN if UNKNOWN in recorded else _ALL
+        case MonitorKind.WITHIN_LAST:  # the greatest of more truths than these
+            return TRUE if TRUE in recorded else TRUE | UNKNOWN if UNKNOWN in recorded else _ALL
+        case MonitorKind.RISING:
+            return FALSE if now == FALSE else FALSE | UNKNOWN if now == UNKNOWN else _ALL
+        case _:
+            return FALSE if now == TRUE else FALSE | UNKNOWN if now == UNKNOWN else _ALL
+
 
 #: what the fields `DECIDED` of a record are called
 _WHAT = (
@@ -31,13 +88,13 @@ _WHAT = (
 )
 
 
-class Deriver:
-    """Derives the decisions of one log in their order, in the session that it was; remembers what `Observed` does."""
+class DecisionAudit:
+    """Derives the decisions of one log in their order, in the session that it was, with what the monitors said."""
 
     def __init__(self, basis: Basis, session: Session) -> None:
         self._basis = basis
         self._session = session
-        self._observed = Observed(basis.policy)
+        self._observed = MonitorHistory(basis.policy)
 
     def check(self, record: DecisionRecord) -> Flaw | None:
         """What is wrong with a decision, or None when it derives again."""
@@ -62,7 +119,7 @@ class Deriver:
         if record.durability == asked:
             return None
         text = "its record was not as durable as the contract and the risk ask, or more"
-        return Flaw("decision/durability", text, _class(record.durability), _class(asked))
+        return Flaw("decision/durability", text, _durability_words(record.durability), _durability_words(asked))
 
     def _derived(self, record: DecisionRecord) -> Decided | Flaw:
         state = State(record.state.values, record.state.ages, record.state.monitors)
@@ -152,7 +209,7 @@ class Deriver:
         return self._session.decide_step(record.step, state, context, now)
 
 
-def _class(durability: int) -> str:
+def _durability_words(durability: int) -> str:
     return WORDS[durability] if 0 <= durability < len(WORDS) else str(durability)
 
 

@@ -1,17 +1,99 @@
-"""The order of dispatches: what the executor refuses whatever was decided, no log may hold (design 4.5).
+"""The dispatches of a log: evidence before effect, and their order (design 4.5, 6).
 
-One step runs at a time and none comes back, but for one that was withdrawn, of which nothing was sent; no step follows
-a return or a landing that a fallback began; chains go forward only, and a chain lapses when another step was sent. A
-dispatch names a skill of the bundle, where it stands.
+Nothing was dispatched without an earlier record that permits it; and what the executor refuses whatever was decided, no
+log may hold. One step runs at a time and none comes back, but for one that was withdrawn, of which nothing was sent; no
+step follows a return or a landing that a fallback began; chains go forward only, and a chain lapses when another step
+was sent. A dispatch names a skill of the bundle, where it stands.
 """
 
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.records import Effect
-from rtshcua.ground.audit.cover import DISPATCHED
-from rtshcua.ground.audit.named import ref_words
+from rtshcua.evidence.records import DecisionRecord, Effect
 from rtshcua.ground.audit.trust import Basis
 from rtshcua.model.flat.contract import Link, MotionKind
+from rtshcua.model.step_number import step_words
+from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP, Ref
+
+
+def ref_words(ref: Ref) -> str:
+    """A step or link in words; the fields of the record where they are about neither."""
+    match ref:
+        case Ref(kind=kind, step=step, link=-1) if kind == STEP and step >= 0:
+            return step_words(step)
+        case Ref(kind=kind, step=step, link=link) if kind == FALLBACK_LINK and step >= 0 and link >= 0:
+            return f"link {link + 1} of the fallback of {step_words(step)}"
+        case Ref(kind=kind, step=step, link=link) if kind == FALLBACK_LINK and step >= 0 and link == DEGRADE:
+            return f"the target of a degrade rule, at {step_words(step)}"
+        case Ref(kind=kind, step=-1, link=link) if kind == CONTINGENCY_LINK and link >= 0:
+            return f"link {link + 1} of the contingency"
+        case _:
+            return f"neither a step nor a link: kind {ref.kind}, index {ref.step}, link {ref.link}"
+
+
+def is_withdrawn(record: Effect) -> bool:
+    """Whether an effect says that nothing was sent of a step that was admitted, so that it may come again."""
+    return record.event == "refused" and record.detail == WITHDRAWN
+
+
+DISPATCHED = "dispatched"
+
+
+class DispatchCover:
+    """Follows permits through a log. What is kept is bounded by the steps and links of the bundle.
+
+    An `allow` covers one dispatch of what it was asked for, up to its `valid_until_us`. The `allow` of a step covers
+    the links of its fallback chain and of the contingency too: these are standing permits.
+    """
+
+    def __init__(self) -> None:
+        self.recalled = False  # no step may be sent any more,
+        self.cancelled = False  # nor then
+        self.dispatches = 0
+        self._until_us: dict[Ref, int] = {}
+        self._standing: set[int] = set()
+
+    def decided(self, record: DecisionRecord) -> None:
+        """Takes note of a decision that was derived again."""
+        key = record.ref
+        if record.outcome != "allow":
+            self._until_us.pop(key, None)
+            return
+        self._until_us[key] = record.valid_until_us
+        if record.kind == STEP:
+            self._standing.add(record.step)
+
+    def withdrawn(self, record: Effect) -> None:
+        """Takes note of a step of which nothing was sent: its permit is good for nothing any more."""
+        self._until_us.pop(record.ref, None)
+        self._standing.discard(record.step)
+
+    def check(self, record: Effect) -> Flaw | None:
+        """What is wrong with an effect, or None."""
+        if record.event != DISPATCHED:
+            return None
+        self.dispatches += 1
+        if self.recalled and record.kind == STEP:
+            return Flaw("dispatch/recalled", "a step was sent after the mission was recalled", step_words(record.step))
+        if self.cancelled and record.kind == STEP:
+            return Flaw(
+                "dispatch/cancelled", "a step was sent after the mission was cancelled", step_words(record.step)
+            )
+        until_us = self._until_us.pop(record.ref, None)
+        if until_us is not None:
+            if record.at_us <= until_us or self._stands(record):
+                return None
+            text = "it was sent when its permit was over"
+            return Flaw("dispatch/late", text, f"{record.at_us} us", f"at most {until_us} us")
+        if self._stands(record):
+            return None
+        text = "it was sent without an earlier record that permits it"
+        return Flaw("dispatch/not-permitted", text, ref_words(record.ref))
+
+    def _stands(self, record: Effect) -> bool:
+        if record.kind == FALLBACK_LINK:
+            return record.step in self._standing and record.link != DEGRADE
+        return record.kind == CONTINGENCY_LINK and bool(self._standing)
+
 
 #: effects that show that a command was sent
 _SHOWS = ("obeyed", "succeeded")
@@ -19,7 +101,7 @@ _REPLACED = "replaced"  # how a command ends in whose place another is sent; no 
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 
 
-class Turns:
+class DispatchOrder:
     """Follows the commands of one log; what it keeps does not grow."""
 
     def __init__(self, basis: Basis) -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from rtshcua.evidence.records import DecisionRecord, Effect, RecordedContext, RecordedState
-from rtshcua.ground.audit.cover import Cover
+from rtshcua.ground.audit.dispatches import DispatchCover
 from virtual.rows import rows
 
 STEP, FALLBACK, CONTINGENCY = 0, 1, 2
@@ -21,7 +21,7 @@ def sent(kind: int, step: int, link: int, at_us: int = 50, event: str = "dispatc
     return Effect("0" * 64, at_us, "", 1, event, kind, link, 2, step, 1, "effect", 0, 0)
 
 
-def slug(cover: Cover, effect: Effect) -> str | None:
+def slug(cover: DispatchCover, effect: Effect) -> str | None:
     flaw = cover.check(effect)
     return None if flaw is None else flaw.slug
 
@@ -31,13 +31,13 @@ KEYS = [(STEP, 0, -1), (FALLBACK, 0, 1), (FALLBACK, 0, DEGRADE), (CONTINGENCY, -
 
 @pytest.mark.parametrize("key", KEYS)
 def test_nothing_covers_what_nobody_decided(key: tuple[int, int, int]) -> None:
-    assert slug(Cover(), sent(*key)) == "dispatch/not-permitted"
+    assert slug(DispatchCover(), sent(*key)) == "dispatch/not-permitted"
 
 
 @rows("key", KEYS)
 @rows("outcome", ["deny", "defer", "fallback"])
 def test_only_allow_covers(key: tuple[int, int, int], outcome: str) -> None:
-    cover = Cover()
+    cover = DispatchCover()
     cover.decided(decision(*key, outcome=outcome))
     assert slug(cover, sent(*key)) == "dispatch/not-permitted"
     cover.decided(decision(*key))
@@ -48,7 +48,7 @@ def test_only_allow_covers(key: tuple[int, int, int], outcome: str) -> None:
 
 @pytest.mark.parametrize("key", KEYS)
 def test_an_allow_covers_one_dispatch_in_time(key: tuple[int, int, int]) -> None:
-    cover = Cover()
+    cover = DispatchCover()
     cover.decided(decision(*key, until_us=50))
     assert slug(cover, sent(*key, at_us=50)) is None
     assert slug(cover, sent(*key, at_us=50)) == "dispatch/not-permitted"
@@ -60,7 +60,7 @@ def test_an_allow_covers_one_dispatch_in_time(key: tuple[int, int, int]) -> None
 @pytest.mark.parametrize("key", KEYS)
 def test_an_allow_covers_nothing_else(key: tuple[int, int, int]) -> None:
     kind, step, link = key
-    cover = Cover()
+    cover = DispatchCover()
     cover.decided(decision(*key))
     for other in {(kind, step + 1, link), (kind, step, link + 1), ((kind + 1) % 3, step, link)}:
         if kind == STEP and other[0] in (FALLBACK, CONTINGENCY):
@@ -69,7 +69,7 @@ def test_an_allow_covers_nothing_else(key: tuple[int, int, int]) -> None:
 
 
 def test_the_allow_of_a_step_stands_for_its_chain_and_the_contingency() -> None:
-    cover = Cover()
+    cover = DispatchCover()
     cover.decided(decision(STEP, 3, -1))
     assert slug(cover, sent(FALLBACK, 3, 0, at_us=10_000)) is None
     assert slug(cover, sent(FALLBACK, 3, 1, at_us=10_000)) is None
@@ -81,11 +81,11 @@ def test_the_allow_of_a_step_stands_for_its_chain_and_the_contingency() -> None:
 
 
 def test_a_standing_permit_covers_when_the_own_one_is_over() -> None:
-    cover = Cover()
+    cover = DispatchCover()
     cover.decided(decision(STEP, 3, -1))
     cover.decided(decision(FALLBACK, 3, 0, until_us=50))
     assert slug(cover, sent(FALLBACK, 3, 0, at_us=51)) is None
 
 
 def test_other_effects_need_no_permit() -> None:
-    assert slug(Cover(), sent(STEP, 0, -1, event="succeeded")) is None
+    assert slug(DispatchCover(), sent(STEP, 0, -1, event="succeeded")) is None

@@ -13,7 +13,7 @@ from reference.forgery import signed as signed_by_the_simulator
 from reference.world import LOG_KEY, ROOT_KEY, Run
 from reference.world import loaded as in_force
 from rtshcua.ground.audit.audit import audit
-from rtshcua.ground.audit.observed import Observed
+from rtshcua.ground.audit.decisions import MonitorHistory
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import Now
@@ -56,7 +56,7 @@ SAID = clause("wind.speed < 8 m/s for the last 3 s", (Op.MONITOR, 0, 0))
 )
 def test_by_hand(kind: int, wind: str, said: str, refused: int | None) -> None:
     window_us = 0 if kind in (RISING, FALLING) else 3 * S - S // 2
-    observed = Observed(loaded(replace(POLICY, monitors=(Monitor(kind, window_us, CALM),))))
+    observed = MonitorHistory(loaded(replace(POLICY, monitors=(Monitor(kind, window_us, CALM),))))
     found = []
     for number, (letter, claim) in enumerate(zip(wind, said, strict=True)):
         state = replace(flat.state({WIND: WINDS[letter]}), monitors=(LETTERS[claim],))
@@ -66,7 +66,7 @@ def test_by_hand(kind: int, wind: str, said: str, refused: int | None) -> None:
 
 
 def test_a_claim_that_is_ruled_out_is_told_with_what_would_not_be() -> None:
-    observed = Observed(loaded(replace(POLICY, monitors=(Monitor(FOR, S, CALM), Monitor(WITHIN, S, CALM)))))
+    observed = MonitorHistory(loaded(replace(POLICY, monitors=(Monitor(FOR, S, CALM), Monitor(WITHIN, S, CALM)))))
     flaw = observed.check(replace(flat.state({WIND: None}), monitors=(1, 2)), flat.NOW)
     assert flaw is not None
     assert "wind.speed < 8 m/s" in flaw.text

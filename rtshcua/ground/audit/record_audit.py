@@ -3,33 +3,31 @@
 from rtshcua.decision.session import Session
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect
-from rtshcua.ground.audit.cover import Cover
-from rtshcua.ground.audit.derive import Deriver
-from rtshcua.ground.audit.documents import Documents
-from rtshcua.ground.audit.frames import Frames
-from rtshcua.ground.audit.named import is_withdrawn, ref_words
+from rtshcua.ground.audit.decisions import DecisionAudit
+from rtshcua.ground.audit.dispatches import DispatchCover, DispatchOrder, is_withdrawn, ref_words
+from rtshcua.ground.audit.documents import DocumentAudit
+from rtshcua.ground.audit.frames import FrameAudit
 from rtshcua.ground.audit.preparations import ListedParameters
 from rtshcua.ground.audit.trust import Basis
-from rtshcua.ground.audit.turns import Turns
 
 UNENFORCED = "none"
 
 
-class Meaning:
+class RecordAudit:
     """Takes the records of one log after its genesis, in order, in memory that the bundle bounds, not the log."""
 
-    def __init__(self, basis: Basis, mode: str, frames: Frames | None = None) -> None:
+    def __init__(self, basis: Basis, mode: str, frames: FrameAudit | None = None) -> None:
         self.mode = mode
         self._frames = frames
         if frames is not None:
             frames.begin(basis)
         self.derived = 0
         session = self._session = Session(basis.in_force, enforced=mode != UNENFORCED)
-        self._deriver = Deriver(basis, session)
-        self._documents = Documents(session, basis.root)
-        self._cover = Cover()
+        self._deriver = DecisionAudit(basis, session)
+        self._documents = DocumentAudit(session, basis.root)
+        self._cover = DispatchCover()
         self.preparations = ListedParameters()
-        self._turns = Turns(basis)
+        self._turns = DispatchOrder(basis)
 
     @property
     def dispatches(self) -> int:

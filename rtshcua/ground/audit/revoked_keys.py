@@ -22,7 +22,7 @@ from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Effect, Genesis
 from rtshcua.evidence.report import LogReport, utc_of
 from rtshcua.ground.audit.audit import Audit, failing
-from rtshcua.ground.audit.documents import KINDS
+from rtshcua.ground.audit.documents import DOCUMENT_KINDS
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, envelopes
 from rtshcua.wire.document import MAX_DOCUMENT
@@ -40,7 +40,7 @@ class Revocation(NamedTuple):
     late_us: int
 
 
-class Use(NamedTuple):
+class KeyUse(NamedTuple):
     """What a key signed, in which record, and between which times that was here; `document`: in flight."""
 
     what: str
@@ -59,22 +59,22 @@ class RevokedKeys:
 
     def __init__(self, roots: Iterable[bytes]) -> None:
         self._roots = {signed: _opened(signed) for signed in roots}
-        self._documents: list[Use] = []
-        self._statements: dict[bytes, Use] = {}  # of each boundary key the last
+        self._documents: list[KeyUse] = []
+        self._statements: dict[bytes, KeyUse] = {}  # of each boundary key the last
         self._read = False
 
     def take(self, record: AnyRecord) -> None:
         """One sound record. Whether a document or a statement in it is one is for the audit to say."""
         self._read = True
-        if not self._roots or not isinstance(record, Effect) or record.event not in (*KINDS, BOUNDARY):
+        if not self._roots or not isinstance(record, Effect) or record.event not in (*DOCUMENT_KINDS, BOUNDARY):
             return
         with suppress(Untrusted):
             kid = _signer(octets(record.detail) or b"", MAX_DOCUMENT)
             times = _between(record.utc_us, record.utc_error_us)
             if record.event == BOUNDARY:
-                self._statements[kid] = Use("what the boundary made", kid, record.seq, *times)
+                self._statements[kid] = KeyUse("what the boundary made", kid, record.seq, *times)
                 return
-            self._documents.append(Use(f"the {record.event}", kid, record.seq, *times, document=True))
+            self._documents.append(KeyUse(f"the {record.event}", kid, record.seq, *times, document=True))
 
     def judged(self, audit: Audit) -> Audit:
         """The audit, with what was revoked since. One that failed stays as it is."""
@@ -101,16 +101,16 @@ class RevokedKeys:
             told = told._replace(shortfall=report.shortfall or doubts[0], unproven=(*told.unproven, *others))
         return audit._replace(report=told)
 
-    def _uses(self, genesis: Genesis) -> list[Use]:
+    def _uses(self, genesis: Genesis) -> list[KeyUse]:
         """What the keys of a log that was trusted signed; that of the log's own comes first."""
         data = octets(genesis.bundle)
         assert data is not None
         policy, mission = envelopes(data)
         times = _between(genesis.utc_us, genesis.utc_error_us)
         return [
-            Use("the log", bytes.fromhex(genesis.log_kid), 0, *times),
-            Use("the policy", _signer(policy, MAX_BUNDLE), 0, *times),
-            Use("the mission", _signer(mission, MAX_BUNDLE), 0, *times),
+            KeyUse("the log", bytes.fromhex(genesis.log_kid), 0, *times),
+            KeyUse("the policy", _signer(policy, MAX_BUNDLE), 0, *times),
+            KeyUse("the mission", _signer(mission, MAX_BUNDLE), 0, *times),
             *self._statements.values(),
             *self._documents,
         ]
@@ -184,7 +184,7 @@ def _revocations(roots: Sequence[TrustRoot], own: TrustRoot) -> dict[bytes, Revo
     return found
 
 
-def _after(uses: Iterable[Use], revoked: Mapping[bytes, Revocation]) -> Iterator[Finding]:
+def _after(uses: Iterable[KeyUse], revoked: Mapping[bytes, Revocation]) -> Iterator[Finding]:
     """What was signed by a key that was revoked already."""
     for use in uses:
         by = revoked.get(use.kid)

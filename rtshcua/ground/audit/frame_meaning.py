@@ -1,0 +1,266 @@
+"""What a frame that we sent would have an autopilot do, and whether that is part of flying a command of the bundle: the
+auditor's own reading, written apart from the gate's.
+
+Both read the same layouts and numbers, which tests compare with the dialect. Everything counts as a command that is not
+known to be harmless, so that a message nobody thought of is not overlooked. By autopilot and motion:
+
+| motion | PX4 | ArduCopter |
+|---|---|---|
+| climb | mode Hold, arm, take off to the height above sea | mode GUIDED, arm, take off to the height above home |
+| fly, cover | reposition to a point of the path, at its height | mode GUIDED, speed, position target on the path |
+| hold | reposition to no place, height or heading, which stops it | mode BRAKE |
+| home | mode Return | mode RTL |
+| land | mode Land | mode LAND |
+
+Heights above sea are judged by what the vehicle reported of its home.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum, auto
+from math import isfinite, isnan
+from typing import Any, Final, NamedTuple
+
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.framing import HEAD, HEADER, MARKER
+from rtshcua.mavlink.layouts import (
+    COMMAND_INT,
+    COMMAND_LONG,
+    LAYOUTS,
+    MISSION_ITEM_INT,
+    PARAM_SET,
+    SET_POSITION_TARGET_GLOBAL_INT,
+)
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
+from rtshcua.mavlink.parameters import decode, is_bytewise
+from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.zone import unproject
+
+_QUESTIONS: Final = frozenset((
+    layouts.PARAM_REQUEST_READ, layouts.PARAM_REQUEST_LIST, layouts.MISSION_REQUEST, layouts.MISSION_REQUEST_LIST,
+    layouts.MISSION_REQUEST_INT, layouts.MISSION_ACK, layouts.TIMESYNC, layouts.STATUSTEXT,
+))  # fmt: skip
+#: commands that only ask
+_ASKS: Final = frozenset(
+    {enums.MAV_CMD_RUN_PREARM_CHECKS, enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE}
+)
+_AREAS: Final = 4  # a bit of FENCE_TYPE
+
+
+_number: Final = LAYOUTS[COMMAND_LONG].getter("command")
+_parameters: Final = {
+    message: LAYOUTS[message].getter("param_id param_value param_type") for message in (PARAM_SET, layouts.PARAM_VALUE)
+}
+_current: Final = LAYOUTS[MISSION_ITEM_INT].getter("current")
+_mission_types: Final = {
+    message: LAYOUTS[message].getter("mission_type")
+    for message in (layouts.MISSION_COUNT, layouts.MISSION_CLEAR_ALL, MISSION_ITEM_INT)
+}
+
+
+class FrameNature(Enum):
+    """What kind of thing a frame is."""
+
+    HARMLESS = auto()
+    FENCE = auto()  # harmless before the first command
+    SETTING = auto()  # a parameter, which a record has to list
+    COMMAND = auto()
+
+
+class AuditedFrame(NamedTuple):
+    """A frame. `fields` are in the order of the wire, empty where its message is none of those that are read."""
+
+    system: int
+    component: int
+    message: int
+    fields: tuple[Any, ...]
+
+
+def read_frame(octets: bytes) -> AuditedFrame | None:
+    """What a frame says; None if the octets are no whole frame of MAVLink 2."""
+    if len(octets) < HEADER or octets[0] != MARKER or len(octets) < HEADER + octets[1]:
+        return None
+    _, length, _, _, _, system, component, low, high = HEAD.unpack_from(octets)
+    message = low | high << 16
+    layout = LAYOUTS.get(message)
+    fields = () if layout is None or length > layout.fields.size else layout.read(octets)
+    return AuditedFrame(system, component, message, fields)
+
+
+def nature(frame: AuditedFrame) -> FrameNature:
+    """What kind of thing a frame of ours is."""
+    fields = frame.fields
+    if frame.message in _QUESTIONS:
+        return FrameNature.HARMLESS
+    if not fields:
+        return FrameNature.COMMAND
+    if frame.message == layouts.HEARTBEAT:
+        return FrameNature.HARMLESS
+    if frame.message == COMMAND_LONG:
+        return FrameNature.HARMLESS if _number(fields) in _ASKS else FrameNature.COMMAND
+    if frame.message == PARAM_SET:
+        return FrameNature.SETTING
+    kind = _mission_types.get(frame.message)
+    if kind is None or kind(fields) != enums.MAV_MISSION_TYPE_FENCE:
+        return FrameNature.COMMAND
+    if frame.message == MISSION_ITEM_INT and _current(fields) != 0:
+        return FrameNature.COMMAND  # 2 and 3 are ArduPilot's "go there now"
+    return FrameNature.FENCE
+
+
+def parameter_write(frame: AuditedFrame, autopilot: int) -> tuple[str, float]:
+    """Name and value in a PARAM_SET or PARAM_VALUE, as this autopilot has them."""
+    name, raw, kind = _parameters[frame.message](frame.fields)
+    return name.rstrip(b"\0").decode("latin-1"), decode(raw, kind, bytewise=is_bytewise(autopilot))
+
+
+def switches_fence_on(name: str, value: float, types: float | None) -> bool:
+    """Whether this setting switches ArduPilot's fence on, and takes nothing from what its owner has in it: `types` is
+    the FENCE_TYPE that was told last, None before.
+    """
+    if name == "FENCE_TYPE":
+        return isfinite(value) and value == (int(value) if types is None else int(types)) | _AREAS
+    return (name, value) == ("FENCE_ENABLE", 1)
+
+
+def frame_words(frame: AuditedFrame) -> str:
+    """A frame in words, for a finding."""
+    if frame.fields and frame.message in (COMMAND_LONG, COMMAND_INT):
+        return f"command {frame.fields[LAYOUTS[frame.message].at('command')]}"
+    return f"message {frame.message}"
+
+
+_TRAVELS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
+#: the modes (as parameters 2 and 3 of DO_SET_MODE) that an autopilot is put in, and for which motions
+_MODES: Final = {
+    (PX4, *Px4Mode.HOLD.parameters): frozenset({MotionKind.CLIMB}),
+    (PX4, *Px4Mode.RETURN.parameters): frozenset({MotionKind.HOME}),
+    (PX4, *Px4Mode.LAND.parameters): frozenset({MotionKind.LAND}),
+    (ARDUPILOT, *CopterMode.GUIDED.parameters): frozenset({MotionKind.CLIMB}) | _TRAVELS,
+    (ARDUPILOT, *CopterMode.BRAKE.parameters): frozenset({MotionKind.HOLD}),
+    (ARDUPILOT, *CopterMode.RTL.parameters): frozenset({MotionKind.HOME}),
+    (ARDUPILOT, *CopterMode.LAND.parameters): frozenset({MotionKind.LAND}),
+}
+_ROUNDING: Final = 2  # mm, mm/s: what a 32-bit float loses
+_DATUM: Final = 2_000  # mm: by how much home's height above sea may have moved since it was last reported
+#: a DO_REPOSITION: its number, heights above the sea; and its flags: to Hold, or where it is in Hold
+_REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
+_FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
+
+
+class MotionTarget(NamedTuple):
+    """What a step or link of the bundle has the vehicle do.
+
+    `points` in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s, 0 where it is the vehicle's own.
+    """
+
+    kind: int
+    points: frozenset[tuple[int, int]]
+    altitude: int
+    speed: int
+
+
+class HomeHeights(NamedTuple):
+    """The lowest and the highest height above sea that home was reported at, in mm."""
+
+    low: int
+    high: int
+
+
+def target_of_step(invocation: Invocation, policy: Policy) -> MotionTarget:
+    """What a step does."""
+    plan = invocation.plan
+    return MotionTarget(plan.kind, _points(plan.path, policy), plan.altitude, plan.speed)
+
+
+def target_of_link(link: Link, policy: Policy) -> MotionTarget:
+    """What a link of a chain, or the target of a degrade rule, does."""
+    contract = policy.contracts[link.skill]
+    motion = contract.motion
+    altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
+    path = _link_place(contract, link) if motion.kind == MotionKind.FLY else ()
+    return MotionTarget(motion.kind, _points(path, policy), altitude, speed)
+
+
+def is_part_of(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
+    """Whether an autopilot that obeys the frame does what the target is, or a part of it."""
+    if not frame.fields:
+        return False
+    if frame.message == COMMAND_LONG:
+        *parameters, number = layouts.of_command_long(frame.fields)
+        obeys = _COMMANDS.get(number)
+        return obeys is not None and obeys(parameters, target, autopilot, home)
+    if frame.message == COMMAND_INT and autopilot == PX4:
+        return _repositions(frame.fields, target, home)
+    if frame.message == SET_POSITION_TARGET_GLOBAL_INT and autopilot == ARDUPILOT and target.kind in _TRAVELS:
+        x, y, z, mask, reference = layouts.of_position_target(frame.fields)
+        alone = mask == enums.POSITION_ONLY and reference == enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+        return alone and (x, y) in target.points and _is_near(z, target.altitude)
+    return False
+
+
+def _repositions(fields: tuple[Any, ...], target: MotionTarget, home: HomeHeights | None) -> bool:
+    speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
+    if (number, reference, radius) != (*_REPOSITION, 0) or flags not in _FLAGS or not isnan(yaw):
+        return False  # it is another command, or has a circle or a heading of its own
+    if target.kind == MotionKind.HOLD:
+        return bool(x == y == enums.NO_PLACE and isnan(z) and speed == -1)
+    wanted = _is_near(speed, target.speed) if target.speed else speed == -1
+    return target.kind in _TRAVELS and wanted and (x, y) in target.points and _above_sea(z, target, home)
+
+
+def _sets_mode(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
+    custom = values[0] == enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    return custom and target.kind in _MODES.get((autopilot, values[1], values[2]), ()) and not any(values[3:])
+
+
+def _arms(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
+    return target.kind == MotionKind.CLIMB and values[0] == 1 and not any(values[1:])  # to arm, and not by force
+
+
+def _takes_off(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
+    pitch, height = values[0], values[6]
+    if target.kind != MotionKind.CLIMB:
+        return False
+    if autopilot == PX4:  # where it is, turned as it is
+        here = (isnan(pitch) or not pitch) and not any(values[1:3]) and all(map(isnan, values[3:6]))
+        return here and _above_sea(height, target, home)
+    return not any(values[:6]) and _is_near(height, target.altitude)
+
+
+def _changes_speed(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
+    wanted = target.kind in _TRAVELS and target.speed > 0 and _is_near(values[1], target.speed)
+    over_ground = values[0] == enums.SPEED_TYPE_GROUNDSPEED  # and the throttle as it is
+    return wanted and over_ground and values[2] == -1 and not any(values[3:])
+
+
+#: by the number of a COMMAND_LONG: whether it, with its parameters, is part of a motion
+_COMMANDS: Final[Mapping[int, Callable[[Sequence[Any], MotionTarget, int, HomeHeights | None], bool]]] = {
+    enums.MAV_CMD_DO_SET_MODE: _sets_mode,
+    enums.MAV_CMD_COMPONENT_ARM_DISARM: _arms,
+    enums.MAV_CMD_NAV_TAKEOFF: _takes_off,
+    enums.MAV_CMD_DO_CHANGE_SPEED: _changes_speed,
+}
+
+
+def _above_sea(metres: float, target: MotionTarget, home: HomeHeights | None) -> bool:
+    if home is None or not isfinite(metres):
+        return False
+    above_home = round(metres * 1_000) - target.altitude
+    return home.low - _DATUM <= above_home <= home.high + _DATUM
+
+
+def _is_near(metres: float, millimetres: int) -> bool:
+    return isfinite(metres) and abs(round(metres * 1_000) - millimetres) <= _ROUNDING
+
+
+def _link_place(contract: Contract, link: Link) -> tuple[int, ...]:
+    cell = next(parameter.cell for parameter in contract.parameters if parameter.kind == PLACE)
+    return link.arguments[cell : cell + 2]
+
+
+def _points(path: tuple[int, ...], policy: Policy) -> frozenset[tuple[int, int]]:
+    """Points that are local, in mm, as they are sent."""
+    local = zip(path[::2], path[1::2], strict=True)
+    return frozenset(unproject(policy.projection, x, y) for x, y in local)

@@ -7,7 +7,7 @@ from pathlib import Path
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.file_patterns import matches
-from rtshcua.ground.project.settings import NAMES, SHARED, ProjectSettings, misconfigured, parse_settings
+from rtshcua.ground.project.project_settings import NAMES, SHARED, ProjectSettings, misconfigured, parse_settings
 
 #: a configuration is a page or two; more than this of it is not read
 LARGEST = 1 << 20

@@ -16,7 +16,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.lint.filter import Linted, Suppressed, agreed, filter_findings
-from rtshcua.ground.project.settings import IgnoredCode
+from rtshcua.ground.project.project_settings import IgnoredCode
 
 
 class LintFindings(NamedTuple):

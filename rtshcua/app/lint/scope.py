@@ -13,7 +13,7 @@ from rtshcua.adapters.store.project import Project, Projects
 from rtshcua.app.files import SOURCE, source_files
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.project.settings import IgnoredCode, misconfigured
+from rtshcua.ground.project.project_settings import IgnoredCode, misconfigured
 
 FORMATS = ("human", "json", "sarif", "github", "junit")
 

@@ -16,7 +16,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import listed, nearest
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.project.settings import LEVELS
+from rtshcua.ground.project.project_settings import LEVELS
 
 _FROM: dict[str, int] = {"error": 1, "warning": 2, "note": 3, "never": 0}
 _ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)

@@ -16,7 +16,7 @@ from rtshcua.front.lsp.session import Session
 from rtshcua.front.lsp.texts import ITEMS, SYMBOLS, Spot, Texts, diagnostic, place, range_of
 from rtshcua.ground.editor import document_structure as coloured
 from rtshcua.ground.editor import document_structure as outlined
-from rtshcua.ground.editor.actions import actions, all_safe
+from rtshcua.ground.editor.code_actions import actions, all_safe
 from rtshcua.ground.editor.code_completion import complete, signature
 from rtshcua.ground.editor.hover import hover
 from rtshcua.ground.editor.navigation import definitions, imported_at, importers, references, targets

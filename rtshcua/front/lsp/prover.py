@@ -27,7 +27,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.front.lsp.disk import desk
 from rtshcua.ground.editor.workspace import ProgramView, Workspace
 from rtshcua.ground.lint.filter import filter_findings
-from rtshcua.ground.project.settings import IgnoredCode
+from rtshcua.ground.project.project_settings import IgnoredCode
 
 LENGTH = 8  # bytes, in front of each message
 PATIENCE = 10.0

@@ -20,7 +20,7 @@ from rtshcua.ground.editor.incremental_parse import ParsedText
 from rtshcua.ground.editor.positions import Encoding, LineIndex, TextPosition
 from rtshcua.ground.editor.workspace import ProgramView, Workspace
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.project.settings import FormatSettings
+from rtshcua.ground.project.project_settings import FormatSettings
 from rtshcua.mavlink.dialect import Dialect
 
 SOURCE = "rtshcua"

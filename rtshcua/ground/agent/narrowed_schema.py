@@ -175,13 +175,7 @@ def narrowed(lowered: LoweredPolicy, units: Sequence[Unit], path: str | None) ->
     known = {zone.name for zone in policy.zones[: policy.declared]}
     zones = [zone for unit in units for zone in unit.zones if zone.name.text in known]
     skills = permitted_skills(lowered, [f"{zone.name.text}.entry" for zone in zones if zone.entry is not None])
-    defaults = frozenset(
-        (skill.name.text, parameter.name.text)
-        for unit in units
-        for skill in unit.skills
-        for parameter in skill.parameters
-        if parameter.default is not None
-    )
+    defaults = _with_defaults(units)
     roles = sorted({role for skill in skills for role in skill.roles})
     name = {"type": "string", "pattern": name_but(RESERVED), "maxLength": 200}
     imports: Schema = {"type": "array", "items": {"type": "string", "enum": [path]}, "maxItems": 1} if path else {
@@ -225,6 +219,17 @@ def narrowed(lowered: LoweredPolicy, units: Sequence[Unit], path: str | None) ->
             optional=("imports", "intent"),
         ),
     }
+
+
+def _with_defaults(units: Sequence[Unit]) -> frozenset[tuple[str, str]]:
+    """The skills and the names of their parameters that have a default."""
+    skills = [skill for unit in units for skill in unit.skills]
+    return frozenset(
+        (skill.name.text, parameter.name.text)
+        for skill in skills
+        for parameter in skill.parameters
+        if parameter.default is not None
+    )
 
 
 def _phases(skills: Sequence[PermittedSkill]) -> str:

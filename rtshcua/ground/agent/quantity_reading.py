@@ -61,8 +61,7 @@ def read_quantity(text: str, dimension: Dimension) -> ReadQuantity:
         return ReadQuantity(
             None, f"`{number}` can be read in two ways: use a decimal point, and `_` between groups of digits"
         )
-    value = Fraction(number.replace(",", ".").replace("_", "")) * (-1 if sign == "-" else 1)
-    value *= Fraction(10) ** int(exponent or 0)
+    value = _value(sign, number, exponent)
     written, datum = _unit_and_datum(rest or "")
     if datum in _GROUND or datum in _SEA:
         above = "ground" if datum in _GROUND else "sea"
@@ -81,6 +80,11 @@ def read_quantity(text: str, dimension: Dimension) -> ReadQuantity:
         usual = plain == text.strip() and sign != "+" and exponent is None and "," not in number and not datum
         return ReadQuantity(value, "" if usual else "this is how the language writes the same value")
     return ReadQuantity(value, f"`{written}` is no unit here, and {plain} is {decimal(value, dimension)}")
+
+
+def _value(sign: str, number: str, exponent: str | None) -> Fraction:
+    value = Fraction(number.replace(",", ".").replace("_", "")) * Fraction(10) ** int(exponent or 0)
+    return -value if sign == "-" else value
 
 
 def _ascii(text: str) -> str:

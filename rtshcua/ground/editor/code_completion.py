@@ -69,18 +69,24 @@ def import_paths(workspace: Workspace, view: ProgramView, path: ImportPath, file
     written = f"{folder}/" if folder else ""
     pack = pack_of(path.text)
     if pack is not None:
-        place, inside = workspace.folder(pack), folder.removeprefix(f"{pack}:")
-        if place is not None and ".." not in inside.split("/"):
-            known = workspace.names_in(posixpath.join(place, inside))
-            shelves = [each for each in known if inside or pack != "lib" or each in SHELVES]
-            yield from _continued_paths(written or f"{pack}:", shelves, endings)
+        names = _names_in_pack(workspace, pack, folder.removeprefix(f"{pack}:"))
+        yield from _continued_paths(written or f"{pack}:", names, endings)
         return
     if not folder and path.word == "import":
         yield from (f"{LIBRARY}{shelf}/" for shelf in SHELVES)
-    names = workspace.names_in(posixpath.join(posixpath.dirname(file) or ".", written) or ".")
-    yield from _continued_paths(written, [each for each in names if each != posixpath.basename(file)], endings)
+    beside = workspace.names_in(posixpath.join(posixpath.dirname(file) or ".", written) or ".")
+    yield from _continued_paths(written, [each for each in beside if each != posixpath.basename(file)], endings)
     if not folder:
         yield "../"
+
+
+def _names_in_pack(workspace: Workspace, pack: str, folder: str) -> list[str]:
+    root = workspace.folder(pack)
+    if root is None or ".." in folder.split("/"):
+        return []
+    return [
+        each for each in workspace.names_in(posixpath.join(root, folder)) if folder or pack != "lib" or each in SHELVES
+    ]
 
 
 def _continued_paths(written: str, names: list[str], endings: tuple[str, ...]) -> Iterator[str]:
@@ -188,7 +194,7 @@ class _Proposals:
             NameUse.ROLE: (OPERATOR, *symbols.roles), NameUse.PHASE: self._all(NameKind.PHASE), NameUse.MESSAGE:
             self.dialect.messages, NameUse.DIALECT_ENUM: self.dialect.enums, NameUse.TYPE: (*TYPES, *symbols.enums),
             NameUse.MISSION: symbols.missions, NameUse.AUTOPILOT: FLAVOURS, NameUse.ENDING: ENDS,
-            NameUse.DAY: DAYS,
+            NameUse.DAY: DAYS, NameUse.NOTHING: (),
             NameUse.NOMINAL: [each.name.text for unit in self.view.units.values() for each in unit.nominals],
         }  # fmt: skip
         match what:
@@ -205,8 +211,6 @@ class _Proposals:
                 yield from self._arguments(call)
             case NameUse.PARAMETER:
                 yield from (CompletionItem(each.name, "parameter", each.kind) for each in self._own())
-            case NameUse.NOTHING:
-                return
             case _:
                 yield from (CompletionItem(name, what.value, KEYWORDS.get(name, "")) for name in tables[what])
                 if what is NameUse.ZONE:

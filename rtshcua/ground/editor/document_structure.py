@@ -97,23 +97,18 @@ def folds(cut: ParsedText) -> tuple[Fold, ...]:
     text = cut.source.text
     found: list[Fold] = []
     opened: list[int] = []
-    note: tuple[int, int] | None = None  # comments, line after line
+    note_end = -1  # where comments of a line each end, the last of which was just read
     for token in tokens(text):
-        if token.kind == "comment" and token.text.startswith("//"):
-            follows = note is not None and text[note[1] : token.start].count("\n") == 1
-            note = (note[0] if follows and note is not None else token.start, token.end)
-            continue
-        if note is not None:
-            found.append(Fold(*note, "comment"))
-            note = None
-        if token.kind == "comment":
+        of_a_line = token.text.startswith("//")
+        if of_a_line and note_end >= 0 and text[note_end : token.start].count("\n") == 1:
+            found[-1] = found[-1]._replace(end=token.end)
+        elif token.kind == "comment":
             found.append(Fold(token.start, token.end, "comment"))
         elif token.text in ("{", "("):
             opened.append(token.end)
         elif token.text in ("}", ")") and opened:
             found.append(Fold(opened.pop(), token.start))
-    if note is not None:
-        found.append(Fold(*note, "comment"))
+        note_end = token.end if of_a_line else -1
     imports = cut.parsed.unit.imports
     if len(imports) > 1:
         found.append(Fold(imports[0].span.start, imports[-1].span.end, "imports"))

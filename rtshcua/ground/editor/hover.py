@@ -11,7 +11,7 @@ from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import WORDS, Declaration
 from rtshcua.ground.editor.keyword_help import KEYWORDS, REASONS, TYPES
-from rtshcua.ground.editor.occurrences import NameKind, Occurrence, Target, at
+from rtshcua.ground.editor.occurrences import NameKind, NameTarget, Occurrence, at
 from rtshcua.ground.editor.syntax import nodes_in, note_before, path_to, token_at
 from rtshcua.ground.editor.workspace import ProgramView
 from rtshcua.ground.geometry.polygons import doubled_area
@@ -136,7 +136,7 @@ def _hover_word(view: ProgramView, file: str, offset: int, found: tuple[Occurren
     return None if meaning is None else Hover(f"`{word}`: {meaning}", span)
 
 
-def describe(view: ProgramView, target: Target, dialect: Dialect) -> str | None:
+def describe(view: ProgramView, target: NameTarget, dialect: Dialect) -> str | None:
     """A target in words."""
     match target.sort:
         case NameKind.DECLARED:
@@ -157,21 +157,23 @@ def describe(view: ProgramView, target: Target, dialect: Dialect) -> str | None:
         case NameKind.ROLE:
             return f"role `{target.name}`. {KEYWORDS['role']}"
         case NameKind.REASON:
-            meaning = REASONS.get(target.name)
-            return f"`{target.name}`" + ("" if meaning is None else f": {meaning}")
+            return _explained(f"`{target.name}`", REASONS.get(target.name))
         case NameKind.TYPE:
             return f"`{target.name}`: {TYPES[target.name]}" if target.name in TYPES else None
         case NameKind.FIELD | NameKind.MESSAGE | NameKind.DIALECT_ENUM:
             return _dialect(target, dialect)
         case NameKind.SOURCE | NameKind.CLASS | NameKind.RECORD | NameKind.WORD:
-            meaning = KEYWORDS.get(target.name)
-            return f"{target.sort.value} `{target.name}`" + ("" if meaning is None else f": {meaning}")
+            return _explained(f"{target.sort.value} `{target.name}`", KEYWORDS.get(target.name))
         case NameKind.FAULT:
             return _fault(target.name)
         case NameKind.IMPORT:
             return _import(view, target)
         case _:
             return f"{target.sort.value} `{target.name}`"
+
+
+def _explained(name: str, meaning: str | None) -> str:
+    return name if meaning is None else f"{name}: {meaning}"
 
 
 def parameter_of(view: ProgramView, owner: str, name: str) -> Parameter | None:
@@ -258,7 +260,7 @@ def _parameter(view: ProgramView, parameter: Parameter, owner: str) -> str:
     return "\n\n".join(parts)
 
 
-def _dialect(target: Target, dialect: Dialect) -> str:
+def _dialect(target: NameTarget, dialect: Dialect) -> str:
     if target.sort is NameKind.DIALECT_ENUM:
         values = dialect.enums.get(target.name)
         listed = "" if values is None else ": " + ", ".join(f"`{name}` = {value}" for name, value in values.items())
@@ -284,7 +286,7 @@ def _fault(name: str) -> str | None:
     return f"fault `{name}`: {getdoc(kind)}\n\ntakes {', '.join(takes) or 'nothing'}"
 
 
-def _import(view: ProgramView, target: Target) -> str | None:
+def _import(view: ProgramView, target: NameTarget) -> str | None:
     unit = view.units.get(target.owner)
     each = next((one for one in unit.imports if one.path == target.name), None) if unit is not None else None
     file = None if each is None else view.imports.target(target.owner, each)

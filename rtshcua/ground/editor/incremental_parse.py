@@ -139,6 +139,14 @@ class ParsedText(NamedTuple):
     since: Edit | None = None
 
 
+class _KnownPiece(NamedTuple):
+    """The piece `at` of a cut, which stands `by` characters further on now."""
+
+    text: ParsedText
+    at: int
+    by: int
+
+
 def parse_text(source: Source) -> ParsedText:
     """A text that is parsed for the first time."""
     if refused(source) is not None:
@@ -169,6 +177,25 @@ def parse_edited(old: ParsedText, text: str, earlier: Sequence[ParsedText] = ())
     later: dict[int, _KnownPiece] = {}
     for each in (*earlier, old):
         later |= _later(each, difference(each.source.text, text))
+    try:
+        made, known = _parse_until_known(source, old, first, later)
+    except Enough:
+        return parse_text(source)
+    replaced, rest = old.pieces[first:], tuple[ParsedPiece, ...]()
+    if known is not None:
+        replaced, rest = old.pieces[first : known.at], known.text.pieces[known.at :]
+        rest = tuple(_moved_piece(piece, known.by) for piece in rest) if known.by else rest
+    pieces = (*old.pieces[:first], *made, *rest)
+    if sum(len(piece.found) for piece in pieces) >= MAX_FINDINGS:
+        return parse_text(source)
+    comparable = known is None or known.text is old
+    return _joined(source, pieces)._replace(since=edit if comparable and _say_the_same(replaced, made) else None)
+
+
+def _parse_until_known(
+    source: Source, old: ParsedText, first: int, later: Mapping[int, _KnownPiece]
+) -> tuple[list[ParsedPiece], _KnownPiece | None]:
+    """The pieces from number `first` on, up to one that is known already; None where there is none. Raises Enough."""
     start = old.pieces[first].start if first else beginning(source)
     reader = _PieceBuilder(source, later, old.pieces[first - 1].end if first else start)
     automaton = Automaton(reader)
@@ -176,21 +203,10 @@ def parse_edited(old: ParsedText, text: str, earlier: Sequence[ParsedText] = ())
         _begin_behind(automaton)
     try:
         run(automaton, start)
-    except Enough:
-        return parse_text(source)
     except _MetKnownPiece as met:
-        known, at, by = met.known
-        replaced = old.pieces[first:at] if known is old else None
-        rest = known.pieces[at:] if not by else tuple(_moved_piece(piece, by) for piece in known.pieces[at:])
-    else:
-        reader.close(len(text), len(text), firm=False)
-        replaced, rest = old.pieces[first:], ()
-    pieces = (*old.pieces[:first], *reader.pieces, *rest)
-    if sum(len(piece.found) for piece in pieces) >= MAX_FINDINGS:
-        return parse_text(source)
-    return _joined(source, pieces)._replace(
-        since=edit if replaced is not None and _say_the_same(replaced, reader.pieces) else None
-    )
+        return reader.pieces, met.known
+    reader.close(len(source.text), len(source.text), firm=False)
+    return reader.pieces, None
 
 
 def _say_the_same(old: Sequence[ParsedPiece], new: Sequence[ParsedPiece]) -> bool:
@@ -198,14 +214,6 @@ def _say_the_same(old: Sequence[ParsedPiece], new: Sequence[ParsedPiece]) -> boo
         tuple(node for piece in old for node in piece.declarations),
         tuple(node for piece in new for node in piece.declarations),
     )
-
-
-class _KnownPiece(NamedTuple):
-    """The piece `at` of a cut, which stands `by` characters further on now."""
-
-    parse_text: ParsedText
-    at: int
-    by: int
 
 
 def _later(known: ParsedText, edit: Edit) -> dict[int, _KnownPiece]:

@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.editor.occurrences import NameKind, Target, at, spans
+from rtshcua.ground.editor.occurrences import NameKind, NameTarget, at, spans
 from rtshcua.ground.editor.syntax import token_at
 from rtshcua.ground.editor.workspace import ProgramView
 
 
-def targets(view: ProgramView, file: str, offset: int) -> tuple[Target, ...]:
+def targets(view: ProgramView, file: str, offset: int) -> tuple[NameTarget, ...]:
     """What a place means. Within what could not be parsed, a word that is declared somewhere."""
     found = tuple(dict.fromkeys(each.target for each in at(view.occurrences(file), offset)))
     if found:
@@ -18,7 +18,7 @@ def targets(view: ProgramView, file: str, offset: int) -> tuple[Target, ...]:
         return ()
     for name in (token.text, token.text.partition(".")[0]):
         if name in view.symbols.declared:
-            return (Target(NameKind.DECLARED, name),)
+            return (NameTarget(NameKind.DECLARED, name),)
     return ()
 
 
@@ -49,7 +49,7 @@ def importers(views: Iterable[ProgramView], file: str) -> tuple[Span, ...]:
     return tuple(sorted(set(found)))
 
 
-def declared_at(view: ProgramView, target: Target) -> list[Span]:
+def declared_at(view: ProgramView, target: NameTarget) -> list[Span]:
     """The places that give a name."""
     if target.sort is NameKind.DECLARED:
         declared = view.symbols.declared.get(target.name)
@@ -61,7 +61,7 @@ def declared_at(view: ProgramView, target: Target) -> list[Span]:
     ]  # fmt: skip
 
 
-def references(views: Iterable[ProgramView], view: ProgramView, target: Target) -> dict[Span, bool]:
+def references(views: Iterable[ProgramView], view: ProgramView, target: NameTarget) -> dict[Span, bool]:
     """All places that mean `target`, as `view` understands it, in these programs; whether each gives the name.
 
     One name may be declared in several files that no program has together: only programs in which it is declared at

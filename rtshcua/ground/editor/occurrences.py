@@ -46,7 +46,7 @@ class NameKind(Enum):
     IMPORT = "import"
 
 
-class Target(NamedTuple):
+class NameTarget(NamedTuple):
     """What is meant: `owner` is the skill, template, mission or enumeration that a parameter or a member belongs to; of
     a choice it is the skill and the parameter, of an import the importing file.
     """
@@ -60,14 +60,14 @@ class Occurrence(NamedTuple):
     """A place that means `target`; `declares` where it is the one that gives the name."""
 
     span: Span
-    target: Target
+    target: NameTarget
     declares: bool = False
 
 
 #: what the values of a fault's parameters name
 _OF_FAULTS = {"message": NameKind.MESSAGE, "role": NameKind.ROLE}
 #: what the names of parameters mean at a place; several where a rule is about several skills
-Scope = Mapping[str, tuple[Target, ...]]
+Scope = Mapping[str, tuple[NameTarget, ...]]
 
 
 class _OccurrenceFinder:
@@ -79,11 +79,11 @@ class _OccurrenceFinder:
     def names(self, names: Iterable[Name], sort: NameKind) -> Iterator[Occurrence]:
         """Names of one sort."""
         for name in names:
-            yield Occurrence(name.span, Target(sort, name.text))
+            yield Occurrence(name.span, NameTarget(sort, name.text))
 
     def role(self, name: Name, scope: Scope) -> Iterator[Occurrence]:
         """A role, or a template's parameter for one."""
-        for target in scope.get(name.text, (Target(NameKind.ROLE, name.text),)):
+        for target in scope.get(name.text, (NameTarget(NameKind.ROLE, name.text),)):
             yield Occurrence(name.span, target)
 
     def contract(self, node: SkillDecl | Overrides, scope: Scope) -> Iterator[Occurrence]:
@@ -116,15 +116,15 @@ class _OccurrenceFinder:
         if name in scope:
             yield from (Occurrence(node.span, target) for target in scope[name])
         elif name in self.symbols.declared:
-            yield Occurrence(node.span, Target(NameKind.DECLARED, name))
+            yield Occurrence(node.span, NameTarget(NameKind.DECLARED, name))
         elif name in (LOCAL_TIME, PHASE):
-            yield Occurrence(node.span, Target(NameKind.WORD, name))
+            yield Occurrence(node.span, NameTarget(NameKind.WORD, name))
         elif name.endswith(ENTRY):
             zone = name.removesuffix(ENTRY)
-            yield Occurrence(Span(file, start + len(zone) + 1, node.span.end), Target(NameKind.WORD, "entry"))
+            yield Occurrence(Span(file, start + len(zone) + 1, node.span.end), NameTarget(NameKind.WORD, "entry"))
             yield from self.reference(Reference(span=Span(file, start, start + len(zone)), name=zone), scope)
         else:
-            yield Occurrence(node.span, Target(NameKind.DECLARED, name))
+            yield Occurrence(node.span, NameTarget(NameKind.DECLARED, name))
 
     def arguments(
         self, written: Sequence[ArgumentValue], owner: SkillDecl | TemplateDecl | None, scope: Scope
@@ -137,30 +137,30 @@ class _OccurrenceFinder:
             if each.name is not None:
                 parameter = named.get(each.name.text)
                 if owner is not None:
-                    yield Occurrence(each.name.span, Target(NameKind.PARAMETER, each.name.text, owner.name.text))
+                    yield Occurrence(each.name.span, NameTarget(NameKind.PARAMETER, each.name.text, owner.name.text))
             yield from self.argument(each.value, parameter, "" if owner is None else owner.name.text, scope)
 
     def argument(self, value: Node, parameter: Parameter | None, owner: str, scope: Scope) -> Iterator[Occurrence]:
         """A value for a parameter, which may be a choice or a role."""
         if isinstance(value, Reference) and parameter is not None and value.name not in scope:
             if any(choice.text == value.name for choice in parameter.choices):
-                yield Occurrence(value.span, Target(NameKind.CHOICE, value.name, f"{owner}.{parameter.name.text}"))
+                yield Occurrence(value.span, NameTarget(NameKind.CHOICE, value.name, f"{owner}.{parameter.name.text}"))
                 return
             if parameter.type.text == "role":
-                yield Occurrence(value.span, Target(NameKind.ROLE, value.name))
+                yield Occurrence(value.span, NameTarget(NameKind.ROLE, value.name))
                 return
         yield from self.within(value, scope)
 
     def case(self, node: NominalDecl | TestDecl) -> Iterator[Occurrence]:
         """A nominal or a test."""
-        scope: dict[str, tuple[Target, ...]] = {}
+        scope: dict[str, tuple[NameTarget, ...]] = {}
         if isinstance(node, TestDecl):
             if node.nominal is not None:
-                yield Occurrence(node.nominal.span, Target(NameKind.DECLARED, node.nominal.text))
+                yield Occurrence(node.nominal.span, NameTarget(NameKind.DECLARED, node.nominal.text))
             asked = "" if node.request is None else node.request.skill.text
             skill = self.symbols.skills.get(asked)
             for parameter in () if skill is None else skill.parameters:
-                scope[parameter.name.text] = (Target(NameKind.PARAMETER, parameter.name.text, asked),)
+                scope[parameter.name.text] = (NameTarget(NameKind.PARAMETER, parameter.name.text, asked),)
         else:
             yield from self.names((node.policy, node.vehicle), NameKind.DECLARED)
         yield from self._case(tuple(value for value in astuple(node) if value is not node.name), scope)
@@ -193,7 +193,7 @@ class _OccurrenceFinder:
         for each in fault.arguments:
             sort = None if each.name is None else _OF_FAULTS.get(each.name.text)
             if sort is not None and isinstance(each.value, Reference):
-                yield Occurrence(each.value.span, Target(sort, each.value.name))
+                yield Occurrence(each.value.span, NameTarget(sort, each.value.name))
 
     def _case(self, node: Any, scope: Scope) -> Iterator[Occurrence]:
         match node:
@@ -258,12 +258,12 @@ class _OccurrenceFinder:
     def _member(self, node: Reference, other: Any, scope: Scope) -> Iterator[Occurrence]:
         if isinstance(other, Reference):
             if other.name == PHASE and PHASE not in scope:
-                yield Occurrence(node.span, Target(NameKind.PHASE, node.name))
+                yield Occurrence(node.span, NameTarget(NameKind.PHASE, node.name))
                 return
             signal = None if other.name in scope else self.symbols.signals.get(other.name)
             enum = None if signal is None else self.symbols.enums.get(signal.type.text)
             if enum is not None and any(member.name.text == node.name for member in enum.members):
-                yield Occurrence(node.span, Target(NameKind.MEMBER, node.name, enum.name.text))
+                yield Occurrence(node.span, NameTarget(NameKind.MEMBER, node.name, enum.name.text))
                 return
             chosen = tuple(self._choices(node.name, scope.get(other.name, ())))
             if chosen:
@@ -271,21 +271,21 @@ class _OccurrenceFinder:
                 return
         yield from self.reference(node, scope)
 
-    def _choices(self, name: str, targets: Iterable[Target]) -> Iterator[Target]:
+    def _choices(self, name: str, targets: Iterable[NameTarget]) -> Iterator[NameTarget]:
         for target in targets:
             owner = self.symbols.skills.get(target.owner) or self.symbols.missions.get(target.owner)
             for parameter in () if owner is None else owner.parameters:
                 if parameter.name.text == target.name and any(each.text == name for each in parameter.choices):
-                    yield Target(NameKind.CHOICE, name, f"{target.owner}.{target.name}")
+                    yield NameTarget(NameKind.CHOICE, name, f"{target.owner}.{target.name}")
 
     def declaration(self, node: Node) -> Iterator[Occurrence]:
         """What a declaration says."""
         if isinstance(node, Import):
-            yield Occurrence(node.span, Target(NameKind.IMPORT, node.path, node.span.file))
+            yield Occurrence(node.span, NameTarget(NameKind.IMPORT, node.path, node.span.file))
             return
         name = getattr(node, "name", None)
         if isinstance(name, Name) and not isinstance(node, TestDecl | ScenarioDecl):
-            yield Occurrence(name.span, Target(NameKind.DECLARED, name.text), True)
+            yield Occurrence(name.span, NameTarget(NameKind.DECLARED, name.text), True)
         match node:
             case EnumDecl():
                 yield from self._enum(node)
@@ -302,7 +302,7 @@ class _OccurrenceFinder:
             case PolicyDecl():
                 yield from self._policy(node)
             case RoleDecl():
-                yield from (Occurrence(each.span, Target(NameKind.ROLE, each.text), True) for each in node.names)
+                yield from (Occurrence(each.span, NameTarget(NameKind.ROLE, each.text), True) for each in node.names)
             case MissionDecl():
                 yield from self._mission(node)
             case NominalDecl() | TestDecl():
@@ -314,21 +314,21 @@ class _OccurrenceFinder:
 
     def _enum(self, enum: EnumDecl) -> Iterator[Occurrence]:
         if enum.dialect is not None:
-            yield Occurrence(enum.dialect.span, Target(NameKind.DIALECT_ENUM, enum.dialect.text))
+            yield Occurrence(enum.dialect.span, NameTarget(NameKind.DIALECT_ENUM, enum.dialect.text))
         for member in enum.members:
-            yield Occurrence(member.name.span, Target(NameKind.MEMBER, member.name.text, enum.name.text), True)
+            yield Occurrence(member.name.span, NameTarget(NameKind.MEMBER, member.name.text, enum.name.text), True)
 
     def _signal(self, signal: SignalDecl) -> Iterator[Occurrence]:
         enum = None if signal.type.text in NAMED else self.symbols.enums.get(signal.type.text)
         sort = NameKind.TYPE if enum is None else NameKind.DECLARED  # `signal position : position`: no name of a signal
-        yield Occurrence(signal.type.span, Target(sort, signal.type.text))
+        yield Occurrence(signal.type.span, NameTarget(sort, signal.type.text))
         for source in signal.sources:
-            yield Occurrence(source.message.span, Target(NameKind.MESSAGE, source.message.text))
+            yield Occurrence(source.message.span, NameTarget(NameKind.MESSAGE, source.message.text))
             for field in (*source.fields, *(each.field for each in source.where)):
-                yield Occurrence(field.span, Target(NameKind.FIELD, field.text, source.message.text))
+                yield Occurrence(field.span, NameTarget(NameKind.FIELD, field.text, source.message.text))
         for name in signal.unknown_at:
             if enum is not None and any(member.name.text == name.text for member in enum.members):
-                yield Occurrence(name.span, Target(NameKind.MEMBER, name.text, enum.name.text))
+                yield Occurrence(name.span, NameTarget(NameKind.MEMBER, name.text, enum.name.text))
 
     def _skill(self, skill: SkillDecl) -> Iterator[Occurrence]:
         owner = skill.name.text
@@ -341,17 +341,17 @@ class _OccurrenceFinder:
             motion = skill.motion
             for name in (motion.target, motion.altitude, motion.speed, motion.pattern, motion.time):
                 if name is not None:
-                    yield Occurrence(name.span, Target(NameKind.PARAMETER, name.text, owner))
+                    yield Occurrence(name.span, NameTarget(NameKind.PARAMETER, name.text, owner))
         yield from self.contract(skill, scope)
         if skill.timing_class is not None:
-            yield Occurrence(skill.timing_class.span, Target(NameKind.CLASS, skill.timing_class.text))
+            yield Occurrence(skill.timing_class.span, NameTarget(NameKind.CLASS, skill.timing_class.text))
         for link in skill.fallback:
             yield from self._link(link, scope)
 
     def _sizes(self, sizes: SizesDecl) -> Iterator[Occurrence]:
         yield from self.names((sizes.skill,), NameKind.DECLARED)
         for each in sizes.given:
-            yield Occurrence(each.name.span, Target(NameKind.PARAMETER, each.name.text, sizes.skill.text))
+            yield Occurrence(each.name.span, NameTarget(NameKind.PARAMETER, each.name.text, sizes.skill.text))
 
     def _template(self, template: TemplateDecl) -> Iterator[Occurrence]:
         scope = self._parameters(template.parameters, template.name.text)
@@ -407,11 +407,11 @@ class _OccurrenceFinder:
             (mission.role, NameKind.ROLE),
         ):
             if name is not None:
-                yield Occurrence(name.span, Target(sort, name.text))
+                yield Occurrence(name.span, NameTarget(sort, name.text))
         scope = self._parameters(mission.parameters, mission.name.text)
         yield from self._declared(mission.parameters, mission.name.text)
         for phase in mission.phases:
-            yield Occurrence(phase.name.span, Target(NameKind.PHASE, phase.name.text), True)
+            yield Occurrence(phase.name.span, NameTarget(NameKind.PHASE, phase.name.text), True)
             for item in phase.items:
                 yield from self._item(item, scope)
 
@@ -433,31 +433,31 @@ class _OccurrenceFinder:
         """Parameters; the `sizes` of their skill may be the ends of their ranges, and their defaults."""
         for parameter in parameters:
             name = parameter.name.text
-            yield Occurrence(parameter.name.span, Target(NameKind.PARAMETER, name, owner), True)
+            yield Occurrence(parameter.name.span, NameTarget(NameKind.PARAMETER, name, owner), True)
             if parameter.choices:
                 for choice in parameter.choices:
-                    yield Occurrence(choice.span, Target(NameKind.CHOICE, choice.text, f"{owner}.{name}"), True)
+                    yield Occurrence(choice.span, NameTarget(NameKind.CHOICE, choice.text, f"{owner}.{name}"), True)
             elif parameter.type.span.start < parameter.type.span.end:
-                yield Occurrence(parameter.type.span, Target(NameKind.TYPE, parameter.type.text))
+                yield Occurrence(parameter.type.span, NameTarget(NameKind.TYPE, parameter.type.text))
             if parameter.range is not None:
                 yield from self.within(parameter.range, sizes or {})
             if parameter.default is not None:
                 yield from self.argument(parameter.default, parameter, owner, sizes or {})
 
-    def _of_skills(self, names: Iterable[Name]) -> dict[str, tuple[Target, ...]]:
+    def _of_skills(self, names: Iterable[Name]) -> dict[str, tuple[NameTarget, ...]]:
         """The parameters of the skills that a rule names; of all skills where it names none."""
         written = [name.text for name in names] or list(self.symbols.skills)
-        found: dict[str, tuple[Target, ...]] = {}
+        found: dict[str, tuple[NameTarget, ...]] = {}
         for name in written:
             skill = self.symbols.skills.get(name)
             for parameter in () if skill is None else skill.parameters:
                 targets = found.get(parameter.name.text, ())
-                found[parameter.name.text] = (*targets, Target(NameKind.PARAMETER, parameter.name.text, name))
+                found[parameter.name.text] = (*targets, NameTarget(NameKind.PARAMETER, parameter.name.text, name))
         return found
 
     @staticmethod
-    def _parameters(parameters: Sequence[Parameter], owner: str) -> dict[str, tuple[Target, ...]]:
-        return {each.name.text: (Target(NameKind.PARAMETER, each.name.text, owner),) for each in parameters}
+    def _parameters(parameters: Sequence[Parameter], owner: str) -> dict[str, tuple[NameTarget, ...]]:
+        return {each.name.text: (NameTarget(NameKind.PARAMETER, each.name.text, owner),) for each in parameters}
 
 
 def occurrences(symbols: Symbols, unit: Unit) -> tuple[Occurrence, ...]:
@@ -489,7 +489,7 @@ def at(found: Sequence[Occurrence], offset: int) -> tuple[Occurrence, ...]:
     return tuple(each for each in inside if each.span.end - each.span.start == least)
 
 
-def spans(found: Iterable[Occurrence], targets: Iterable[Target]) -> Mapping[Span, bool]:
+def spans(found: Iterable[Occurrence], targets: Iterable[NameTarget]) -> Mapping[Span, bool]:
     """The places that mean one of `targets`, and whether they give the name."""
     wanted = set(targets)
     places: dict[Span, bool] = {}

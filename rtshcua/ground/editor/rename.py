@@ -19,7 +19,7 @@ from rtshcua.ground.checker.symbols import WORDS
 from rtshcua.ground.checker.well_known import MEASURED, PER_CELL, VELOCITY, WELL_KNOWN
 from rtshcua.ground.editor.incremental_parse import same
 from rtshcua.ground.editor.navigation import declared_at, references, targets
-from rtshcua.ground.editor.occurrences import NameKind, Occurrence, Target, at
+from rtshcua.ground.editor.occurrences import NameKind, NameTarget, Occurrence, at
 from rtshcua.ground.editor.workspace import ProgramView, Workspace
 from rtshcua.ground.language.table import table
 from rtshcua.ground.pipeline.program import Compilation
@@ -46,7 +46,7 @@ class ProgramVerdict(NamedTuple):
 class NameChange(NamedTuple):
     """Which name becomes which, and where, by file."""
 
-    target: Target
+    target: NameTarget
     name: str
     places: Mapping[str, tuple[Span, ...]]
 
@@ -85,7 +85,7 @@ def consequence(
     return None
 
 
-def _expected(each: Occurrence, made: NameChange) -> tuple[Target, bool]:
+def _expected(each: Occurrence, made: NameChange) -> tuple[NameTarget, bool]:
     """What a place of the old text must mean in the new one."""
     meant, target = each.target, made.target
     if meant == target:
@@ -328,14 +328,14 @@ def _by_file(places: Iterable[Span]) -> dict[str, tuple[Span, ...]]:
     return by_file
 
 
-def _tested(workspace: Workspace, concerned: Iterable[ProgramView], target: Target) -> Iterator[ProgramView]:
+def _tested(workspace: Workspace, concerned: Iterable[ProgramView], target: NameTarget) -> Iterator[ProgramView]:
     """The programs of files whose tests may quote the name: tests are run where their file itself is asked for."""
     files = {file for each in concerned for file, unit in each.units.items()
              if (unit.tests or unit.scenarios) and target.name in each.text(file)}  # fmt: skip
     return (workspace.view(file) for file in sorted(files))
 
 
-def _target(workspace: Workspace, view: ProgramView, file: str, offset: int) -> Target | Refusal:
+def _target(workspace: Workspace, view: ProgramView, file: str, offset: int) -> NameTarget | Refusal:
     if not at(view.occurrences(file), offset):
         return Refusal("rename", "there is no name here, or what it stands in has a syntax error")
     found = targets(view, file, offset)
@@ -360,7 +360,7 @@ def _target(workspace: Workspace, view: ProgramView, file: str, offset: int) -> 
     return target
 
 
-def _sentinels(view: ProgramView, target: Target) -> set[str]:
+def _sentinels(view: ProgramView, target: NameTarget) -> set[str]:
     """The values that signals are unknown at, of an enumeration: these may be those of the dialect."""
     of_type = [each for each in view.symbols.signals.values() if each.type.text == target.owner]
     enum = view.symbols.enums[target.owner]
@@ -368,7 +368,7 @@ def _sentinels(view: ProgramView, target: Target) -> set[str]:
     return {name.text for each in of_type for name in each.unknown_at} - own
 
 
-def _unfit(view: ProgramView, target: Target, name: str) -> str | None:
+def _unfit(view: ProgramView, target: NameTarget, name: str) -> str | None:
     declared = view.symbols.declared.get(target.name) if target.sort is NameKind.DECLARED else None
     dotted = isinstance(declared, SignalDecl)
     if not all(map(_PLAIN.fullmatch, name.split(".") if dotted else [name])):
@@ -387,7 +387,7 @@ def _faulty(views: Iterable[ProgramView]) -> str | None:
     return None
 
 
-def _clash(views: Iterable[ProgramView], target: Target, name: str) -> str | None:
+def _clash(views: Iterable[ProgramView], target: NameTarget, name: str) -> str | None:
     views = list(views)
     why = _faulty(views)
     if why is not None:
@@ -403,7 +403,7 @@ def _clash(views: Iterable[ProgramView], target: Target, name: str) -> str | Non
     return None
 
 
-def _is_taken(each: Occurrence, target: Target, name: str) -> bool:
+def _is_taken(each: Occurrence, target: NameTarget, name: str) -> bool:
     """Whether a name that something else gives stands in the way of `target`."""
     if not each.declares or each.target.name != name:
         return False

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from rtshcua.diagnostics.codes import NOT_FORMATTED, UNSAFE_FORMAT
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.format.layout import align, layout
+from rtshcua.ground.format.line_layout import align, layout
 from rtshcua.ground.format.style import WIDTH
 from rtshcua.ground.format.token_reader import TokenizedText, read
 from rtshcua.ground.format.token_sheet import COMMENT, content, sheet

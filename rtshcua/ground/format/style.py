@@ -28,133 +28,53 @@ def _style(*breaks: str, aligned: bool = True, cuts: tuple[str, ...] = ()) -> St
 
 #: in a block of these, how wide the column of first words is; longer ones stand out. A fixed width, so that a line that
 #: comes or goes changes no other.
-COLUMNS = {
-    "vehicle": 8,
-    "skill": 8,
-    "mission": 8,
-    "step": 8,
-    "nominal": 8,
-    "policy": 7,
-    "template": 7,
-    "test": 6,
-    "scenario": 6,
-}
+COLUMNS = (
+    dict.fromkeys(("vehicle", "skill", "mission", "step", "nominal"), 8)
+    | dict.fromkeys(("policy", "template"), 7)
+    | dict.fromkeys(("test", "scenario"), 6)
+)
 
 _RULE = _style("by", "through", "when", "to")
-_PART = _style()
 _WITHOUT_COLUMN = _style(aligned=False)
 
-#: all declarations and items, by the actions of their rules
-ITEMS = {
+#: the items without a style of their own, by the actions of their rules
+_PLAIN_ITEMS = (
     # declarations
-    "import_file": _PART,
-    "enum": _PART,
+    "import_file", "enum", "vehicle", "skill", "sizes", "role", "template", "policy", "mission", "nominal", "test",
+    "scenario",
+    # of signals and zones
+    "unknown", "stale", "floor", "ceiling", "entry", "daily", "on_days", "dates",
+    # of vehicles
+    "identity", "home", "speed", "climb", "position_error", "endurance", "reserve", "cells", "clock", "time_zone",
+    "elevation", "return_at", "brakes", "speeds", "accelerates", "wind", "not_fitted",
+    # of skills and steps
+    "climb_to", "fly_to", "cover_area", "hold_for", "stay", "timing_class", "deadline", "duration", "grace",
+    "require", "assume", "maintain", "fallback", "energy", "record",
+    # of missions
+    "intent", "proposed", "most_steps",
+    # of nominals and tests
+    "under", "aboard", "asker", "given", "instant", "in_phase", "answer", "released", "issued", "issued_ahead",
+    "in_force", "identified",
+    # of scenarios
+    "flown_mission", "flavours", "seeds", "start", "ends", "flies", "never", "reaction", "distance", "lands",
+)  # fmt: skip
+#: all declarations and items
+ITEMS = dict.fromkeys(_PLAIN_ITEMS, Style()) | {
+    **dict.fromkeys(("permit", "forbid", "confirm", "degrade", "delegate"), _RULE),
+    **dict.fromkeys(
+        ("use", "contingency", "without_evidence", "without_link", "repeat", "step", "deed", "rows"), _WITHOUT_COLUMN
+    ),
     "signal": _style("or", "where", cuts=(":", "=", "unknown", "stale")),
     "zone": _style("feature", "hole", cuts=("=", "from")),
-    "vehicle": _PART,
-    "skill": _PART,
-    "sizes": _PART,
-    "role": _PART,
-    "template": _PART,
-    "policy": _PART,
-    "mission": _PART,
-    "nominal": _PART,
-    "test": _PART,
-    "scenario": _PART,
-    # of signals and zones
-    "unknown": _PART,
-    "stale": _PART,
-    "floor": _PART,
-    "ceiling": _PART,
-    "entry": _PART,
-    "daily": _PART,
-    "on_days": _PART,
-    "dates": _PART,
-    # of vehicles
-    "identity": _PART,
-    "home": _PART,
-    "speed": _PART,
-    "climb": _PART,
-    "position_error": _PART,
-    "endurance": _PART,
-    "reserve": _PART,
-    "cells": _PART,
-    "clock": _PART,
-    "time_zone": _PART,
-    "elevation": _PART,
-    "return_at": _PART,
-    "brakes": _PART,
-    "speeds": _PART,
-    "accelerates": _PART,
-    "wind": _PART,
-    "not_fitted": _PART,
-    # of skills and steps
-    "climb_to": _PART,
-    "fly_to": _PART,
-    "cover_area": _PART,
-    "hold_for": _PART,
-    "stay": _PART,
-    "timing_class": _PART,
-    "deadline": _PART,
     "validity": _style("during"),
-    "duration": _PART,
-    "grace": _PART,
-    "require": _PART,
-    "assume": _PART,
-    "maintain": _PART,
-    "fallback": _PART,
-    "energy": _PART,
-    "record": _PART,
     "sized": _style("during"),
-    # of policies and templates
-    "permit": _RULE,
-    "forbid": _RULE,
-    "confirm": _RULE,
-    "degrade": _RULE,
-    "delegate": _RULE,
-    "use": _WITHOUT_COLUMN,
     "airspace": _style("inside", "outside", aligned=False),
-    "contingency": _WITHOUT_COLUMN,
-    "without_evidence": _WITHOUT_COLUMN,
-    "without_link": _WITHOUT_COLUMN,
-    # of missions
-    "intent": _PART,
-    "proposed": _PART,
-    "most_steps": _PART,
     "phase": _style(aligned=False, cuts=("{",)),
-    "repeat": _WITHOUT_COLUMN,
-    "step": _WITHOUT_COLUMN,
-    # of nominals and tests
-    "under": _PART,
-    "aboard": _PART,
-    "asker": _PART,
-    "given": _PART,
-    "instant": _PART,
-    "in_phase": _PART,
-    "answer": _PART,
-    "released": _PART,
-    "issued": _PART,
-    "issued_ahead": _PART,
-    "in_force": _PART,
-    "identified": _PART,
-    "deed": _WITHOUT_COLUMN,
     "asked": _style("by", "through"),
     "expectation": _style("because", "<_AT_CLAUSE>"),
-    "rows": _WITHOUT_COLUMN,
     "row": _style(cuts=("expect",)),
-    # of scenarios
-    "flown_mission": _PART,
-    "flavours": _PART,
-    "seeds": _PART,
-    "start": _PART,
     "incident": _style("<FAULT>", aligned=False, cuts=("<FAULT>",)),
     "demand": _style("because", "<_AT_CLAUSE>"),
-    "ends": _PART,
-    "flies": _PART,
-    "never": _PART,
-    "reaction": _PART,
-    "distance": _PART,
-    "lands": _PART,
 }
 
 #: what an opening bracket after it belongs to, and stands close to: the rest of a call, a shape or a list

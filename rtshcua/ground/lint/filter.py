@@ -7,8 +7,8 @@ from typing import NamedTuple
 from rtshcua.diagnostics.codes import NOT_FORMATTED, can_be_ignored
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.lint.ignores import Ignore, ignores, unused_ignore
-from rtshcua.ground.project.settings import IgnoredCode
+from rtshcua.ground.lint.ignores import Ignore, Ignores, ignores, unused_ignore
+from rtshcua.ground.project.project_settings import IgnoredCode
 
 
 class Suppressed(NamedTuple):
@@ -47,13 +47,7 @@ def filter_findings(
     by_comment: set[Ignore] = set()
     by_project: set[IgnoredCode] = set()
     for each in found:
-        span = each.span
-        comments, settings = [], []
-        if span is not None and can_be_ignored(each.code):
-            line = sources[span.file].position(span.start).line if span.file in sources else 0
-            given = written[span.file].given if span.file in written else ()
-            comments = [one for one in given if one.code is each.code and one.line in (None, line)]
-            settings = [one for one in configured.get(span.file, ()) if one.code is each.code]
+        comments, settings = _ignores_of(each, sources, written, configured)
         by_comment.update(comments)
         by_project.update(settings)
         if comments:
@@ -67,6 +61,22 @@ def filter_findings(
         kept += here.faults
         kept += [unused_ignore(one) for one in unused if one.code is not NOT_FORMATTED or file in formatted]
     return FilteredFindings(tuple(kept), tuple(taken), frozenset(by_project))
+
+
+def _ignores_of(
+    found: Diagnostic,
+    sources: Mapping[str, Source],
+    written: Mapping[str, Ignores],
+    configured: Mapping[str, Sequence[IgnoredCode]],
+) -> tuple[list[Ignore], list[IgnoredCode]]:
+    """The comments, and the settings, that ignore a finding."""
+    span = found.span
+    if span is None or not can_be_ignored(found.code):
+        return [], []
+    line = sources[span.file].position(span.start).line if span.file in sources else 0
+    given = written[span.file].given if span.file in written else ()
+    comments = [one for one in given if one.code is found.code and one.line in (None, line)]
+    return comments, [one for one in configured.get(span.file, ()) if one.code is found.code]
 
 
 class Linted(NamedTuple):

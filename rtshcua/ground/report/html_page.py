@@ -74,19 +74,6 @@ GLOSSARY: Final = (
 )
 
 
-_TEMPLATES = (
-    "policy_report.html",
-    "glance.html",
-    "chapter.html",
-    "rights.html",
-    "skills.html",
-    "patterns.html",
-    "sign.html",
-    "map.svg",
-    "profile.svg",
-    "checked.html",
-    "policy_report.css",
-)
 #: what a reader does not see, or what turns around the text beside it: a comment or an intent may hold any of it
 _HIDDEN = re.compile(
     "[\x00-\x09\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
@@ -99,12 +86,10 @@ _UNIT = re.compile(r"(?<=\d) (?=(?:m/s|km/h|cm|mm|km|m|mV|V|%|s|ms|us|min|h|deg|
 
 def page(report: PolicyReport) -> str:
     """The page; the same bytes for the same report."""
-    environment, style = templates()
-    style += _footer(report)
-    text = environment.get_template("policy_report.html").render(
+    return rendered(
+        "policy_report.html",
+        _footer(report),
         book=report,
-        style=Markup(style),
-        style_digest=b64encode(sha256(style.encode()).digest()).decode("ascii"),
         glossary=GLOSSARY,
         reasons=REASONS,
         anchor_of=_reason,
@@ -116,6 +101,14 @@ def page(report: PolicyReport) -> str:
         anchors=_anchors,
         chunks=_chunks,
     )
+
+
+def rendered(template: str, more_style: str = "", **values: object) -> str:
+    """The page that a template makes of values, with the style of all pages and perhaps more of it."""
+    environment, style = templates()
+    style += more_style
+    digest = b64encode(sha256(style.encode()).digest()).decode("ascii")
+    text = environment.get_template(template).render(style=Markup(style), style_digest=digest, **values)
     return visibly(text)
 
 
@@ -141,7 +134,7 @@ def _footer(report: PolicyReport) -> str:
 def templates() -> tuple[Environment, str]:
     """The templates, which take a while to compile, and the style of the page."""
     folder = files("rtshcua.ground.report") / "templates"
-    texts = {name: (folder / name).read_text(encoding="utf-8") for name in _TEMPLATES}
+    texts = {each.name: each.read_text(encoding="utf-8") for each in folder.iterdir() if each.is_file()}
     environment = Environment(
         loader=DictLoader(texts),
         autoescape=True,

@@ -3,13 +3,9 @@
 The page includes missions that are refused, as far as their path is planned.
 """
 
-from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from hashlib import sha256
 from itertools import pairwise
-
-from markupsafe import Markup
 
 from rtshcua.decision.values import AND, FALSE, TRUE, Truth
 from rtshcua.decision.zones import PreparedZone
@@ -20,7 +16,7 @@ from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.program import Planned
 from rtshcua.ground.report.chapter import chapter, mission_view
 from rtshcua.ground.report.drawing.zone_map import ZoneMap, mission_map
-from rtshcua.ground.report.html_page import templates, visibly
+from rtshcua.ground.report.html_page import rendered
 from rtshcua.ground.report.report_model import Chapter
 from rtshcua.ground.report.reported_policy import ReportedPolicy
 from rtshcua.model.flat import mission as flat
@@ -108,18 +104,15 @@ class CheckedProgram:
 
 def mission_map_page(checkings: Sequence[CheckedProgram]) -> str:
     """The page; the same bytes for the same sources."""
-    environment, style = templates()
     drawings = [each for checking in checkings for each in checking.drawings()]
     others = list(dict.fromkeys(text for checking in checkings for text in checking.others()))
     refused = sum(each.refused for each in drawings)
-    text = environment.get_template("checked.html").render(
+    return rendered(
+        "checked.html",
         drawings=drawings,
         others=others,
         summary=f"Missions that are drawn: {len(drawings)}; of these refused: {refused}",
-        style=Markup(style),
-        style_digest=b64encode(sha256(style.encode()).digest()).decode("ascii"),
     )
-    return visibly(text)
 
 
 def _is_within(found: Diagnostic, node: Node) -> bool:

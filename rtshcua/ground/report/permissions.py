@@ -63,17 +63,21 @@ def _answer(skill: str, about: list[Rule]) -> str:
     """In short, for those sources that some permit names and that are not always forbidden; what is forbidden to others
     is no condition. `yes`: through one of them at least nothing is asked besides.
     """
-    never = _sources(rule for rule in about if rule.kind == "forbid" and rule.when is None)
-    if not _sources(rule for rule in about if rule.kind == "permit") - never:
+    permits, forbids, confirms = (
+        [rule for rule in about if rule.kind == kind] for kind in ("permit", "forbid", "confirm")
+    )
+    if not _sources(permits) - _sources(_unconditional(forbids)):
         return NO
-    if any(rule.target is not None and rule.target.skill.text != skill and rule.when is None for rule in about):
+    if any(rule.target is not None and rule.target.skill.text != skill for rule in _unconditional(about)):
         return REPLACED
-    sometimes = _sources(rule for rule in about if rule.kind == "forbid")
-    plainly = _sources(rule for rule in about if rule.kind == "permit" and rule.when is None) - sometimes
-    confirms = [rule for rule in about if rule.kind == "confirm"]
-    if any(rule.when is None for rule in confirms):
+    plainly = _sources(_unconditional(permits)) - _sources(forbids)
+    if _unconditional(confirms):
         return APPROVAL if plainly else f"{APPROVAL}, {CONDITIONS}"
     return YES if plainly and not confirms else CONDITIONS
+
+
+def _unconditional(rules: Iterable[Rule]) -> list[Rule]:
+    return [rule for rule in rules if rule.when is None]
 
 
 def _sources(rules: Iterable[Rule]) -> frozenset[str]:

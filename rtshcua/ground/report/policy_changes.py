@@ -55,21 +55,22 @@ def _described(one: Difference, policy: Policy) -> tuple[str, ...]:
         case "order":
             kind = RuleKind[one.name.upper()]
             return tuple(name(rule.text) for rule in policy.rules if rule.kind == kind)
+    figures = _figures(one, policy)
+    return () if figures is None else tuple(f"{field}: {figures[field]() or 'nothing'}" for field in one.fields)
+
+
+def _figures(one: Difference, policy: Policy) -> Mapping[str, Callable[[], str]] | None:
+    """The figures of the vehicle, or of a zone, skill or signal; None where the policy has none of the name."""
+    match one.what:
         case "vehicle":
-            return _lines(one.fields, _vehicle(policy))
+            return _vehicle(policy)
         case "zone":
-            zones = {zone.name: zone for zone in policy.zones[: policy.declared]}
-            return _lines(one.fields, _zone(zones[one.name], policy)) if one.name in zones else ()
+            zones = policy.zones[: policy.declared]
+            return next((_zone(zone, policy) for zone in zones if zone.name == one.name), None)
         case "skill":
-            skills = {contract.name: contract for contract in policy.contracts}
-            return _lines(one.fields, _skill(skills[one.name], policy)) if one.name in skills else ()
+            return next((_skill(each, policy) for each in policy.contracts if each.name == one.name), None)
         case _:
-            signals = {signal.name: signal for signal in policy.signals}
-            return _lines(one.fields, _signal(signals[one.name])) if one.name in signals else ()
-
-
-def _lines(fields: Iterable[str], told: Mapping[str, Callable[[], str]]) -> tuple[str, ...]:
-    return tuple(f"{field}: {told[field]() or 'nothing'}" for field in fields)
+            return next((_signal(signal) for signal in policy.signals if signal.name == one.name), None)
 
 
 def _airspace(policy: Policy) -> str:

@@ -9,7 +9,7 @@ from zlib import crc32
 from fuzz import corpus, world
 from fuzz.mutation.sentences import mutated as mutated
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.editor.actions import actions
+from rtshcua.ground.editor.code_actions import actions
 from rtshcua.ground.editor.code_completion import complete, signature
 from rtshcua.ground.editor.document_structure import folds, outline, semantic_tokens
 from rtshcua.ground.editor.hover import hover

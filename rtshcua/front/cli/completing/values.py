@@ -7,7 +7,7 @@ from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.front.cli.table import COMMANDS
 from rtshcua.ground.agent.tool_forms import FORMS
-from rtshcua.ground.project.settings import LEVELS
+from rtshcua.ground.project.project_settings import LEVELS
 
 _SOURCES, _BUNDLE, _LOGS, _ROOTS = ("*.rts",), ("*.bundle",), ("*.jsonl",), ("*.trust",)
 

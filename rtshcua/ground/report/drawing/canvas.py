@@ -149,6 +149,10 @@ class LabelBox:
             and other.y < self.y + self.height + GAP
         )
 
+    def is_on_page(self, width: float, height: float) -> bool:
+        """Whether a part of it lies on a page of this size."""
+        return self.x < width and self.x + self.width > 0 and self.y < height and self.y + self.height > 0
+
     def points(self) -> tuple[tuple[float, float], ...]:
         """Points all along its sides, and its middle."""
         right, low = self.x + self.width, self.y + self.height

@@ -44,8 +44,7 @@ def label_zones(on: Canvas, labels: Labels, zones: Sequence[ZoneView], beneath: 
     lost = []
     for zone in reversed(by_size(zones)):
         box = boxes[zone.name]
-        seen = box.x < on.width and box.x + box.width > 0 and box.y < on.height and box.y + box.height > 0
-        if not seen or fills(on, zone.ground):
+        if not box.is_on_page(on.width, on.height) or fills(on, zone.ground):
             continue
         others = [*beneath, *(other for name, other in small.items() if name != zone.name)]
         ground = _thinned(zone.ground)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.editor.actions import actions, all_safe
+from rtshcua.ground.editor.code_actions import actions, all_safe
 from rtshcua.ground.editor.code_completion import complete, signature
 from rtshcua.ground.editor.document_structure import folds, outline
 from rtshcua.ground.editor.incremental_parse import parse_text

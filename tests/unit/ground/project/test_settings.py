@@ -5,7 +5,7 @@ import pytest
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.file_patterns import matches
-from rtshcua.ground.project.settings import IgnoredCode, ProjectSettings, parse_settings
+from rtshcua.ground.project.project_settings import IgnoredCode, ProjectSettings, parse_settings
 from virtual.rows import rows
 
 WHOLE = """

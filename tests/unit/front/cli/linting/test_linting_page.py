@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics import codes
-from rtshcua.ground.project.settings import ProjectSettings, parse_settings
+from rtshcua.ground.project.project_settings import ProjectSettings, parse_settings
 
 
 def page(checkout: Path) -> str:

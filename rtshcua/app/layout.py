@@ -11,7 +11,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.format_text import format_text
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.language.size import MAX_SIZE
+from rtshcua.ground.language.size_limits import MAX_SIZE
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,9 @@ def of_file(path: Path, width: int, *, write: bool) -> Laid:
     try:
         data = Readable(str(library.root()), [path]).read(str(path))
     except OSError as error:
-        from rtshcua.ground.language.faults import unreadable  # with the model, for which the usual case has no need
+        from rtshcua.ground.language.file_findings import (
+            unreadable,  # with the model, for which the usual case has no need
+        )
 
         return Laid(shown(str(path)), b"", None, (unreadable(shown(str(path)), None, error, None),), unreadable=True)
     laid = of_text(path, data, width)
@@ -59,13 +61,13 @@ def of_text(path: Path, data: bytes, width: int) -> Laid:
     """Lays out what a file holds."""
     name = shown(str(path))
     if len(data) > MAX_SIZE:
-        from rtshcua.ground.language.faults import too_large
+        from rtshcua.ground.language.file_findings import too_large
 
         return Laid(name, data, None, (too_large(name, len(data)),), unreadable=True)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        from rtshcua.ground.language.faults import not_text
+        from rtshcua.ground.language.file_findings import not_text
 
         source = Source(name, data.decode("utf-8", errors="replace"))
         return Laid(name, data, None, (not_text(source, data, error.start),))

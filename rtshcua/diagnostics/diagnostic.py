@@ -1,10 +1,10 @@
 """One finding for the person who reads it: a stable code, the exact span, what was found, what would be accepted."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
-from rtshcua.diagnostics.codes import Code, Severity
+from rtshcua.diagnostics.codes import UNKNOWN_NAME, UNKNOWN_ROLE, Code, Severity
 from rtshcua.diagnostics.span import Span
 
 
@@ -59,3 +59,32 @@ class Diagnostic:
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     """Whether any of the findings forbids going on."""
     return any(d.severity is Severity.ERROR for d in diagnostics)
+
+
+#: how many of the other places are shown
+MOST_PLACES = 3
+_FOLDED = (UNKNOWN_NAME, UNKNOWN_ROLE)
+
+
+def folded(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """The findings, with those that tell of one missing name in one, where the first of them stands, with a count.
+
+    Findings on a specification stay apart, for each has its own pointer.
+    """
+    kept: list[Diagnostic] = []
+    at: dict[tuple[str, str], int] = {}
+    others: dict[int, list[Diagnostic]] = {}
+    for each in found:
+        key = (each.code.id, each.message)
+        if each.code not in _FOLDED or each.span is None or each.pointer is not None:
+            kept.append(each)
+        elif key in at:
+            others.setdefault(at[key], []).append(each)
+        else:
+            at[key] = len(kept)
+            kept.append(each)
+    for place, more in others.items():
+        labels = tuple(Label(each.span, "here too") for each in more[:MOST_PLACES] if each.span is not None)
+        message = f"{kept[place].message}; it is named in {len(more) + 1} places"
+        kept[place] = replace(kept[place], message=message, labels=(*kept[place].labels, *labels))
+    return tuple(kept)

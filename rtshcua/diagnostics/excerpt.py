@@ -144,3 +144,13 @@ def escaped(json: str) -> str:
 def _escape(character: str) -> str:
     units = character.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2))
+
+
+SHOWN = 40  # characters
+
+
+def short(text: str) -> str:
+    """`text` on one line, printable, and cut where it is long."""
+    text = text[: SHOWN + 1]
+    plain = text if text.isprintable() else text.encode("unicode_escape").decode()
+    return plain if len(plain) <= SHOWN else plain[: SHOWN - 3] + "..."

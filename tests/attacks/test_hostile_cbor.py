@@ -21,7 +21,7 @@ from rtshcua.evidence.proofs.file import MAX_PROOF, read_extra
 from rtshcua.front.cli import app
 from rtshcua.ground.checker import geojson
 from rtshcua.ground.checker.geojson import NoArea, read_area
-from rtshcua.ground.language.size import MAX_SIZE
+from rtshcua.ground.language.size_limits import MAX_SIZE
 from rtshcua.wire import cbor, cose, names
 from rtshcua.wire.bundle import MAX_BUNDLE, claimed_vehicle, envelopes
 from rtshcua.wire.document import MAX_DOCUMENT, kind_of

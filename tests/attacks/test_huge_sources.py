@@ -29,7 +29,7 @@ from rtshcua.ground.language import parse as parsing
 from rtshcua.ground.language.load import load
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.paths import shown
-from rtshcua.ground.language.size import MAX_TOKENS
+from rtshcua.ground.language.size_limits import MAX_TOKENS
 from rtshcua.ground.language.table import PATH as TABLE
 from rtshcua.ground.lint import ignores as ignoring
 from rtshcua.ground.lint.ignores import ignores

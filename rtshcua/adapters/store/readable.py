@@ -11,7 +11,7 @@ from typing import Final
 
 from rtshcua.adapters.store.checkout import Outside, checkout_of, lies_in
 from rtshcua.adapters.store.reading import NotRegular, read_regular
-from rtshcua.ground.language.size import MAX_SIZE
+from rtshcua.ground.language.size_limits import MAX_SIZE
 
 #: folders that imports may lead to besides, parted as in PATH: the user's to say, and no checkout's
 ALLOWED: Final = "RTSHCUA_IMPORTS"

@@ -4,12 +4,17 @@ There is no standard of it. The schema of Jenkins refuses attributes that it doe
 case among them, so the file is that of the suite and the case's `classname`, and the line stands in the text.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Final
 from xml.etree import ElementTree
 
+from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import visible
+from rtshcua.diagnostics.render import render_one
+from rtshcua.diagnostics.span import Source
 
 _HEAD: Final = '<?xml version="1.0" encoding="utf-8"?>\n'
 
@@ -117,3 +122,43 @@ def _line(text: str) -> str:
 def _text(text: str) -> str:
     """Lines stay lines."""
     return "\n".join(visible(line) for line in text.split("\n"))
+
+
+#: the name of the suite of what is about no file
+NO_FILE = "rtshcua"
+
+
+def suites(
+    found: Iterable[Diagnostic],
+    sources: Mapping[str, Source],
+    files: Iterable[str] = (),
+    failing: Collection[Severity] = (Severity.ERROR, Severity.WARNING),
+) -> tuple[Suite, ...]:
+    """Suites for `junit`, by name. Each of `files` has one, in which a test passes where nothing was found.
+
+    A finding of a severity that is not among `failing` is a test that passes, and says in its output what was found.
+    """
+    of_file = sorted(found, key=_file)
+    grouped = {
+        file: tuple(_outcome(each, sources, failing) for each in group) for file, group in groupby(of_file, _file)
+    }
+    passed = {file: (Outcome("nothing found", file),) for file in files}
+    return tuple(Suite(file, cases) for file, cases in sorted((passed | grouped).items()))
+
+
+def _file(diagnostic: Diagnostic) -> str:
+    return NO_FILE if diagnostic.span is None else diagnostic.span.file
+
+
+def _outcome(diagnostic: Diagnostic, sources: Mapping[str, Source], failing: Collection[Severity]) -> Outcome:
+    code, span = diagnostic.code, diagnostic.span
+    name, file, line = f"{code.id} {code.slug}", "", None
+    if span is not None:
+        file = span.file
+        if file in sources:
+            at = sources[file].position(span.start)
+            name, line = f"{name} at {at.line}:{at.column}", at.line
+    text = render_one(diagnostic, sources).rstrip("\n")
+    if diagnostic.severity in failing:
+        return Outcome(name, file, line, failure=text, kind=code.id)
+    return Outcome(name, file, line, output=text)

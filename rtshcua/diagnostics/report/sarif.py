@@ -4,16 +4,74 @@ Numbers in comments and docstrings are sections of the standard. Columns and off
 `unicodeCodePoints`), lines end at a line feed, and ends are exclusive, as everywhere here.
 """
 
+import hashlib
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple, Protocol
+from urllib.parse import quote
 
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.report.fingerprints import FINGERPRINT, fingerprints
-from rtshcua.diagnostics.report.places import ROOT, artifact, physical, region, uri
 from rtshcua.diagnostics.span import Source, Span
+
+#: what relative names of files are relative to
+ROOT: Final = "SRCROOT"
+
+
+def physical(span: Span, sources: Mapping[str, Source]) -> dict[str, Any]:
+    """A physicalLocation (3.29)."""
+    return {"artifactLocation": artifact(span.file), "region": region(span, sources.get(span.file))}
+
+
+def region(span: Span, source: Source | None) -> dict[str, int]:
+    """A region (3.30) in both ways that the standard has."""
+    offsets = {"charOffset": span.start, "charLength": span.end - span.start}
+    if source is None:
+        return offsets
+    start, end = source.position(span.start), source.position(span.end)
+    return {
+        "startLine": start.line,
+        "startColumn": start.column,
+        "endLine": end.line,
+        "endColumn": end.column,
+    } | offsets
+
+
+def artifact(file: str) -> dict[str, str]:
+    """An artifactLocation (3.4): a name that is relative stays so, for it is the same on every machine."""
+    return {"uri": uri(file)} if file.startswith("/") else {"uri": uri(file), "uriBaseId": ROOT}
+
+
+def uri(file: str) -> str:
+    """RFC 3986; octets of a name that are no UTF-8 keep their value, and a colon is no scheme's."""
+    path = quote(file, safe="/", errors="surrogateescape")
+    return f"file://{path}" if file.startswith("/") else path
+
+
+#: name and version of the mark (SARIF, 3.27.17); another way to compute it needs another version
+FINGERPRINT: Final = "findingInLine/v1"
+
+
+def fingerprints(found: Iterable[Diagnostic], sources: Mapping[str, Source]) -> list[str]:
+    """The mark of each finding, in order: of its code, the words of its line, and its number among those of the same
+    file that are alike.
+    """
+    seen: dict[tuple[str, str], int] = {}
+    marks = []
+    for diagnostic in found:
+        file, words = "", diagnostic.pointer or ""
+        if diagnostic.span is not None:
+            file = diagnostic.span.file
+            source = sources.get(file)
+            if source is not None:
+                line = source.line(source.position(diagnostic.span.start).line)
+                words = f"{' '.join(line.split())}\n{' '.join(source.slice(diagnostic.span).split())}"
+        digest = hashlib.sha256(f"{diagnostic.code.id}\n{words}".encode(errors="surrogatepass")).hexdigest()[:32]
+        seen[file, digest] = seen.get((file, digest), 0) + 1
+        marks.append(f"{digest}:{seen[file, digest]}")
+    return marks
+
 
 VERSION: Final = "2.1.0"
 SCHEMA: Final = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"

@@ -8,9 +8,8 @@ from typing import Any
 
 from rtshcua.app.exit_codes import code_of, is_unreadable
 from rtshcua.diagnostics.codes import Severity
-from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.diagnostic import Diagnostic, folded
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.folding import folded
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import MOST_SHOWN, most_severe, render
 from rtshcua.diagnostics.serialise import as_json

@@ -20,7 +20,7 @@ from rtshcua.front.cli.faults import say, tell
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out, out_rendered
 from rtshcua.ground.format.format_text import not_formatted
-from rtshcua.ground.language.size import MAX_SIZE
+from rtshcua.ground.language.size_limits import MAX_SIZE
 
 app = typer.Typer(add_completion=False)
 

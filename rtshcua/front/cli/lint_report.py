@@ -11,8 +11,8 @@ from rtshcua.app.lint.findings import LintFindings
 from rtshcua.app.lint.scope import LintOptions
 from rtshcua.app.lint.service import LintRun, lint
 from rtshcua.diagnostics.codes import Severity
+from rtshcua.diagnostics.diagnostic import folded
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.folding import folded
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.render import render
 from rtshcua.diagnostics.serialise import as_json
@@ -78,8 +78,7 @@ def _written(done: LintRun, code: ExitCode) -> str:
 
         return github(told.found, told.sources, here)
     if form == "junit":
-        from rtshcua.diagnostics.report.junit import junit
-        from rtshcua.diagnostics.report.suites import suites
+        from rtshcua.diagnostics.report.junit import junit, suites
 
         failing = frozenset[Severity]().union(*(done.failing(each) for each in told.found))
         return junit(suites(told.found, told.sources, asked, failing))

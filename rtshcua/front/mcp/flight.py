@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from rtshcua.front.mcp.flight_lines import understood
-from rtshcua.ground.language.size import values_of, without_texts
+from rtshcua.ground.language.size_limits import values_of, without_texts
 
 #: how long until it is tried again to follow, in seconds
 AGAIN_S: Final = 0.3

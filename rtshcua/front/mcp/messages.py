@@ -10,7 +10,7 @@ import re
 from math import isfinite
 from typing import Any, Final, NamedTuple
 
-from rtshcua.ground.language.size import bare_of, values_of
+from rtshcua.ground.language.size_limits import bare_of, values_of
 
 #: octets and values (`without_texts`) of one message: the largest mission that a flight takes has 250 KB. Python needs
 #: many times the octets, where one character of a text is beyond U+FFFF

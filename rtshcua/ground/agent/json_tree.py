@@ -15,7 +15,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.language.size import without_texts
+from rtshcua.ground.language.size_limits import without_texts
 
 MAX_BYTES: Final = 1 << 20
 MAX_DEPTH: Final = 16

@@ -27,7 +27,7 @@ from rtshcua.ground.agent.specification_schema import (
     shape_errors,
 )
 from rtshcua.ground.checker.agent_values import Moved, parse_clauses, parse_quantity, parse_value
-from rtshcua.ground.language.faults import not_a_source
+from rtshcua.ground.language.file_findings import not_a_source
 from rtshcua.ground.language.load import Listing, Program, Read, load, no_packs
 from rtshcua.ground.language.paths import Packs, imported, on_a_shelf, shown, stable
 from rtshcua.ground.pipeline.pins import PROPOSED, Pins, claims

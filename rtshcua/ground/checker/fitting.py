@@ -7,7 +7,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.types import COUNT, EXAMPLES, LENGTH, POSITION, Kind, Type, Typed
-from rtshcua.ground.language.exact import CANONICAL
+from rtshcua.ground.language.exact_values import CANONICAL
 from rtshcua.model.ir.expression import Quantity, Reference, Value
 from rtshcua.model.ir.places import ENTRY, ZoneDecl
 from rtshcua.model.ir.signals import SignalDecl

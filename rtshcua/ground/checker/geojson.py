@@ -26,7 +26,7 @@ from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.kinds import GEOJSON, recognised
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.geometry.polygons import Point, contains, crossing, touching_edges
-from rtshcua.ground.language.size import bare_of, values_of
+from rtshcua.ground.language.size_limits import bare_of, values_of
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 from rtshcua.model.ir.places import GeoJson
 

@@ -17,7 +17,7 @@ from rtshcua.ground.editor.workspace import ProgramView
 from rtshcua.ground.geometry.polygons import doubled_area
 from rtshcua.ground.geometry.projection import projection_at
 from rtshcua.ground.geometry.shapes import Disc, Shape, bounds
-from rtshcua.ground.language.exact import CANONICAL
+from rtshcua.ground.language.exact_values import CANONICAL
 from rtshcua.ground.lower.ground_plan import GroundPlans
 from rtshcua.mavlink.dialect import DATUM, Dialect
 from rtshcua.model.faults import parameters

@@ -7,7 +7,7 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.format.format_text import FormatDifference, format_text, has_too_many_comments
 from rtshcua.ground.format.style import WIDTH
 from rtshcua.ground.format.token_reader import read
-from rtshcua.ground.language.faults import too_many_comments
+from rtshcua.ground.language.file_findings import too_many_comments
 from rtshcua.ground.language.parse import parse
 
 

@@ -16,7 +16,7 @@ from rtshcua.ground.format.line_layout import align, layout
 from rtshcua.ground.format.style import WIDTH
 from rtshcua.ground.format.token_reader import TokenizedText, read
 from rtshcua.ground.format.token_sheet import COMMENT, content, sheet
-from rtshcua.ground.language.size import MAX_SIZE, MAX_TOKENS
+from rtshcua.ground.language.size_limits import MAX_SIZE, MAX_TOKENS
 from rtshcua.ground.lint.ignores import ignores_line
 
 

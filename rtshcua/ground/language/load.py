@@ -6,15 +6,16 @@ Declarations have no order, so files may import each other in a circle, which is
 """
 
 import posixpath
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
-from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.codes import IMPORT_CYCLE
+from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.language.circles import Edge, circles
-from rtshcua.ground.language.faults import (
+from rtshcua.ground.language.file_findings import (
     MAX_FILES,
     MAX_SIZE,
     Wanted,
@@ -31,6 +32,65 @@ from rtshcua.ground.language.parse import Parsed, parse
 from rtshcua.ground.language.paths import LIBRARY, Packs, imported, shown, stable
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import, Unit
+
+NAMED = 12  # files of one circle; more are counted, so that many long circles cannot swamp a person
+
+
+class ImportEdge(NamedTuple):
+    """A file has `by`, which imports the file `to`."""
+
+    by: Import
+    to: str
+
+
+def circles(files: Iterable[str], imports: Mapping[str, Sequence[ImportEdge]]) -> list[Diagnostic]:
+    """A finding for each import that leads back to where a walk came from; the walk follows `imports` depth first, in
+    the order in which they are written, and begins with each of `files` that it has not met.
+    """
+    found: list[Diagnostic] = []
+    done: set[str] = set()
+    for file in files:
+        if file not in done:
+            _walk(file, imports, done, found)
+    return found
+
+
+def _walk(first: str, imports: Mapping[str, Sequence[ImportEdge]], done: set[str], found: list[Diagnostic]) -> None:
+    path = [first]
+    places = {first: 0}  # in `path`
+    taken: list[ImportEdge] = []  # from each file of `path` to the next
+    waiting = [iter(imports.get(first, ()))]
+    while waiting:
+        edge = next(waiting[-1], None)
+        if edge is None:
+            waiting.pop()
+            done.add(path[-1])
+            del places[path.pop()], taken[-1:]
+        elif edge.to in places:
+            start = places[edge.to]
+            found.append(_circle(path[start:], taken[start:], edge))
+        elif edge.to not in done:
+            places[edge.to] = len(path)
+            path.append(edge.to)
+            taken.append(edge)
+            waiting.append(iter(imports.get(edge.to, ())))
+
+
+def _circle(files: list[str], taken: list[ImportEdge], last: ImportEdge) -> Diagnostic:
+    names = [*files, last.to]
+    if len(names) > NAMED:
+        half = NAMED // 2
+        names[half:-half] = [f"({len(names) - NAMED} more)"]
+    return Diagnostic(
+        IMPORT_CYCLE,
+        f"this import closes a circle: `{' -> '.join(names)}`",
+        last.by.span,
+        "move what the files need of each other into one that imports none of them"
+        if len(files) > 1
+        else "a file sees its own declarations, so leave the import out",
+        labels=tuple(Label(edge.by.span, "and this one leads there") for edge in taken[:NAMED]),
+    )
+
 
 #: how the names of sources end, and of files that zones are read from: nothing else is read for an import
 _SOURCES, _DATA = (".rts",), (".geojson", ".json")
@@ -123,7 +183,7 @@ class _Loader:
     queue: list[tuple[str, Import | None]] = field(default_factory=list)
     seen: set[str] = field(default_factory=set)
     units: list[Unit] = field(default_factory=list)
-    imports: dict[str, list[Edge]] = field(default_factory=dict)
+    imports: dict[str, list[ImportEdge]] = field(default_factory=dict)
     sources: dict[str, Source] = field(default_factory=dict)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
@@ -159,7 +219,7 @@ class _Loader:
                 break
             path = self._path(each, name)
             if path is not None:
-                self.imports[name].append(Edge(each, self.want(path, each)))
+                self.imports[name].append(ImportEdge(each, self.want(path, each)))
         for zone in parsed.unit.zones:
             if isinstance(zone.shape, GeoJson):
                 self._take_data(zone.shape, name)

@@ -13,9 +13,9 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.reader import MAX_FINDINGS, Enough, Reader
 from rtshcua.ground.language.explain import explain
-from rtshcua.ground.language.faults import MAX_SIZE, not_a_source, too_large, too_long
+from rtshcua.ground.language.file_findings import MAX_SIZE, not_a_source, too_large, too_long
 from rtshcua.ground.language.recovery import file_level, misread, pending, resume
-from rtshcua.ground.language.size import MAX_TOKENS
+from rtshcua.ground.language.size_limits import MAX_TOKENS
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl

@@ -10,7 +10,7 @@ from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.analysis.space import means_unknown, reported_range
 from rtshcua.ground.checker.ranges import accepted
 from rtshcua.ground.checker.symbols import Extent
-from rtshcua.ground.language.exact import exact
+from rtshcua.ground.language.exact_values import exact
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.policy import Policy

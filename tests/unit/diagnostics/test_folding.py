@@ -3,8 +3,7 @@
 from dataclasses import replace
 
 from rtshcua.diagnostics.codes import SYNTAX, UNKNOWN_NAME, UNKNOWN_ROLE
-from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.diagnostics.folding import folded
+from rtshcua.diagnostics.diagnostic import Diagnostic, folded
 from rtshcua.diagnostics.span import Span
 
 

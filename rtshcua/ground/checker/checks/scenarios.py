@@ -4,6 +4,7 @@ Only those of the file that was asked for are looked at: the scenarios of an imp
 """
 
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.excerpt import short
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.expectations import check_expectation
 from rtshcua.ground.checker.condition_nodes import walk
@@ -13,7 +14,6 @@ from rtshcua.ground.checker.faults import NAMED, fault_of
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_flown, find_skill, find_zone
 from rtshcua.ground.checker.symbols import correction, suggestion
-from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Condition, Edge, ForLast, Near, Quantity, WithinLast
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.scenarios import (

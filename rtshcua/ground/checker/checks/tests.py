@@ -4,6 +4,7 @@ Only those of the file that was asked for are looked at: the tests of an importe
 """
 
 from rtshcua.diagnostics import codes
+from rtshcua.diagnostics.excerpt import short
 from rtshcua.ground.checker.arguments import bind_value, pair
 from rtshcua.ground.checker.checks.expectations import check_expectation
 from rtshcua.ground.checker.checks.premises import (
@@ -22,7 +23,6 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.lookup import find_skill
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.symbols import correction, suggestion
-from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import ArgumentValue, SkillDecl

@@ -1,13 +1,12 @@
 """Numbers, places, times, texts and names, as they are written out."""
 
 from rtshcua.diagnostics.codes import BAD_COORDINATES, BAD_PERIOD, DATUM_NOT_ALLOWED, OUT_OF_BOUNDS, SYNTAX, Code
+from rtshcua.diagnostics.excerpt import short
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.build.number_findings import degrees, report_trouble
 from rtshcua.ground.language.build.reader import Action, Reader, several
-from rtshcua.ground.language.exact import Trouble, exact
-from rtshcua.ground.language.moment import moment as utc_us
-from rtshcua.ground.language.wording import short
+from rtshcua.ground.language.exact_values import Trouble, exact, utc_us
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name
 from rtshcua.model.quantity import UNITS, Datum, Dimension

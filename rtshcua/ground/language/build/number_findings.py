@@ -5,11 +5,11 @@ from fractions import Fraction
 
 from rtshcua.diagnostics.codes import NOT_EXACT, OUT_OF_BOUNDS, UNKNOWN_UNIT
 from rtshcua.diagnostics.diagnostic import Fix
+from rtshcua.diagnostics.excerpt import SHOWN, short
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.build.reader import Reader
-from rtshcua.ground.language.exact import CANONICAL, Exact, Trouble, exact
-from rtshcua.ground.language.wording import SHOWN, short
+from rtshcua.ground.language.exact_values import CANONICAL, Exact, Trouble, exact
 from rtshcua.model.flat.limits import MAX_DURATION, MAX_SPEED, MAX_VALUE
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.quantity import UNITS, Dimension, display

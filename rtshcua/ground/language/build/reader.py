@@ -10,8 +10,8 @@ from msgspec import NODEFAULT
 
 from rtshcua.diagnostics.codes import NOT_WRITTEN, SYNTAX, TOO_DEEP, WRITTEN_TWICE, Code
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label
+from rtshcua.diagnostics.excerpt import short
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.tests import Quoted
 

@@ -3,10 +3,10 @@
 from typing import Any
 
 from rtshcua.diagnostics.codes import BAD_PERIOD, NOT_WRITTEN, SYNTAX
+from rtshcua.diagnostics.excerpt import short
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.literals import DAYS, LAST_US
 from rtshcua.ground.language.build.reader import Action, Part, Reader, node, part, several
-from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import (

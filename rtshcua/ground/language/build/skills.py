@@ -4,9 +4,9 @@ from itertools import chain
 from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.codes import SYNTAX
+from rtshcua.diagnostics.excerpt import short
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.reader import Action, Part, Reader, node, part, several
-from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Condition, Junction, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import (

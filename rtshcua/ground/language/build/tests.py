@@ -6,10 +6,10 @@ from typing import Any
 
 from rtshcua.diagnostics.codes import SYNTAX, WRITTEN_TWICE
 from rtshcua.diagnostics.diagnostic import Fix, Label
+from rtshcua.diagnostics.excerpt import short
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.language.build.literals import text
 from rtshcua.ground.language.build.reader import Action, Part, Reader, node, part, several
-from rtshcua.ground.language.wording import short
 from rtshcua.model.ir.expression import Quantity, Value
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.scenarios import (

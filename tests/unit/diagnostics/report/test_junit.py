@@ -12,8 +12,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.diagnostics.report.junit import Outcome, Suite, junit
-from rtshcua.diagnostics.report.suites import suites
+from rtshcua.diagnostics.report.junit import Outcome, Suite, junit, suites
 from rtshcua.diagnostics.span import Source, Span
 
 

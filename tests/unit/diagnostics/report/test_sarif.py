@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix, Label
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.report.fingerprints import FINGERPRINT
-from rtshcua.diagnostics.report.sarif import Ignored, sarif
+from rtshcua.diagnostics.report.sarif import FINGERPRINT, Ignored, sarif
 from rtshcua.diagnostics.span import Source, Span
 
 TEXT = "policy a version 1 {\n  permit goto by any\n  permit goto by any\n}\n"

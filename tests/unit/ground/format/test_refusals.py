@@ -10,7 +10,7 @@ from rtshcua.ground.format import format_text
 from rtshcua.ground.format.format import formatted
 from rtshcua.ground.format.format_text import difference, not_formatted
 from rtshcua.ground.format.token_reader import read
-from rtshcua.ground.language.faults import MAX_SIZE
+from rtshcua.ground.language.file_findings import MAX_SIZE
 from rtshcua.ground.language.parse import parse
 from virtual.rows import rows
 

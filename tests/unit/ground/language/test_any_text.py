@@ -13,7 +13,7 @@ from rtshcua.ground.format.token_reader import read
 from rtshcua.ground.language import generate
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.reader import Reader
-from rtshcua.ground.language.faults import MAX_SIZE
+from rtshcua.ground.language.file_findings import MAX_SIZE
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.language.table import MAX_SKIPPED, table
 from virtual.rows import rows

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.language.exact import LIMIT, Trouble, exact
+from rtshcua.ground.language.exact_values import LIMIT, Trouble, exact
 from rtshcua.ground.language.parse import parse
 from rtshcua.model.ir.expression import Comparison, Quantity
 from rtshcua.model.quantity import UNITS, Datum, Dimension, display

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from rtshcua.diagnostics.codes import IMPORT_CYCLE, IMPORT_PATH, NO_SUCH_FILE, NOT_TEXT, TOO_LARGE, Severity
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.language.faults import MAX_SIZE
+from rtshcua.ground.language.file_findings import MAX_SIZE
 from rtshcua.ground.language.load import Program, load
 from virtual.rows import rows
 

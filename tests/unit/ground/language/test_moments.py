@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtshcua.ground.language.moment import moment
+from rtshcua.ground.language.exact_values import utc_us
 from virtual.rows import rows
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -17,8 +17,8 @@ OFFSETS = st.integers(-24 * 60 + 1, 24 * 60 - 1).map(lambda minutes: timezone(ti
 @given(st.integers(0, 2**53 - 1), OFFSETS)
 def test_as_the_standard_library_reads_them(expected: int, zone: timezone) -> None:
     time = (EPOCH + timedelta(microseconds=expected)).astimezone(zone)
-    assert moment(time.isoformat()) == expected
-    assert moment(time.isoformat().replace("T", "t")) == expected
+    assert utc_us(time.isoformat()) == expected
+    assert utc_us(time.isoformat().replace("T", "t")) == expected
 
 
 @rows(
@@ -36,7 +36,7 @@ def test_as_the_standard_library_reads_them(expected: int, zone: timezone) -> No
     ],
 )
 def test_by_hand(text: str, expected: int) -> None:
-    assert moment(text) == expected
+    assert utc_us(text) == expected
 
 
 @rows(
@@ -68,13 +68,13 @@ def test_by_hand(text: str, expected: int) -> None:
 )
 def test_refused(text: str, why: str) -> None:
     with pytest.raises(ValueError, match=re.escape(why)):
-        moment(text)
+        utc_us(text)
 
 
 @given(st.text() | st.from_regex(r"\A[0-9TZ:.+-]{0,30}\Z"))
 def test_any_text_is_a_moment_or_refused(text: str) -> None:
     try:
-        assert moment(text) >= 0
+        assert utc_us(text) >= 0
     except ValueError:
         with pytest.raises(ValueError, match=r"\w"):
-            moment(text)
+            utc_us(text)

@@ -8,9 +8,9 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
 from rtshcua.diagnostics.kinds import Kind, foreign
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.paths import LIBRARY, is_direct, pack_of
-from rtshcua.ground.language.size import MAX_FILES as MAX_FILES
-from rtshcua.ground.language.size import MAX_SIZE as MAX_SIZE
-from rtshcua.ground.language.size import MAX_TOKENS
+from rtshcua.ground.language.size_limits import MAX_FILES as MAX_FILES
+from rtshcua.ground.language.size_limits import MAX_SIZE as MAX_SIZE
+from rtshcua.ground.language.size_limits import MAX_TOKENS
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import
 

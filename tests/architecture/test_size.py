@@ -11,13 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 754,
-    "code lines": 84_066,
-    "shared class names": 36,
-    "of them across packages": 22,
-    "shared file names": 80,
+    "modules": 746,
+    "code lines": 84_040,
+    "shared class names": 35,
+    "of them across packages": 21,
+    "shared file names": 78,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 29,
+    "modules below 80 lines with one importer": 26,
     "functions of more than 60 lines": 21,
     "functions of a complexity over 15": 133,
     "functions of a complexity over 25": 9,

@@ -37,9 +37,8 @@ from rtshcua.adapters.store.telemetry import TelemetryFile
 from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.transport import UdpTransport
-from rtshcua.app.fly.narrator import Teller
+from rtshcua.app.fly.narrator import Teller, Watching
 from rtshcua.app.fly.story import Note
-from rtshcua.app.fly.watching import Watching
 from rtshcua.codec.frames import Codec
 from rtshcua.front.cli.live.feed import Feed
 from rtshcua.model.flat.situation import Now

@@ -11,7 +11,7 @@ from rtshcua.adapters.store.keystore import KeyStore, read_root
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.roots import opened
 from rtshcua.app.documents import read_bundle
-from rtshcua.app.fly.trust import LAPSED, REVOKED
+from rtshcua.app.fly.vehicle_trust import LAPSED, REVOKED
 from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission

@@ -21,6 +21,7 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from reference.flying import refusal_of, request
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import (
     AGAIN_S,
@@ -35,8 +36,8 @@ from rtshcua.adapters.boundary_process import (
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.store.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.adapters.store.writing import lock
-from rtshcua.app.fly.boundary import started
-from rtshcua.app.fly.refused import Refused
+from rtshcua.adapters.vehicle.address import Address, LinkCarrier
+from rtshcua.app.fly.start_boundary import start_process
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -412,19 +413,23 @@ def test_when_it_dies_nothing_leaves_that_was_not_signed_ahead(held: Held) -> No
 # ---------------------------------------------------------------------------------------- what keeps it from beginning
 
 
-def begun(state: Path) -> BoundaryProcess:
+def tried(state: Path) -> BoundaryProcess | Refusal:
     """As `run` begins one."""
     _, signed = case.root(issued_us())
-    return started(
-        VEHICLE, signed, state, link_key=None, own_key=None, log_key=case.KEYS[Duty.LOG], user=None, paced=False,
-        settings={}, owed={},
-    )  # fmt: skip
+    of = request(state=state, link=Address(LinkCarrier.UDP_IN, "127.0.0.1", 1), mode=EnforcementMode.PROCESS)
+    return start_process(of, VEHICLE, signed, None, case.KEYS[Duty.LOG], {})
+
+
+def begun(state: Path) -> BoundaryProcess:
+    found = tried(state)
+    assert isinstance(found, BoundaryProcess)
+    return found
 
 
 def why_not(state: Path) -> tuple[ExitCode, str]:
-    with pytest.raises(Refused) as refused:
-        begun(state)
-    return refused.value.code, refused.value.slug
+    found = refusal_of(tried(state))
+    assert found.code is not None
+    return found.code, found.slug
 
 
 def test_each_reason_not_to_begin_has_a_slug_and_an_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

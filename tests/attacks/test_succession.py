@@ -15,6 +15,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.documents import approval, low, presented, recall, replacement
+from reference.flying import context, refusal_of, request
 from reference.world import APPROVAL_KEY, LOG_KEY, MISSION_KEY, POLICY_KEY, ROOT, START, VEHICLE, renewed, sealed_again
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.folders import data_folder, state_folder
@@ -22,13 +23,18 @@ from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.replay import FileReplayStore, looked_up
 from rtshcua.adapters.store.roots import RootStore, opened
 from rtshcua.adapters.store.signing import fingerprint, read_link_key
-from rtshcua.app.fly.link_signing import Signing
-from rtshcua.app.fly.refused import Refused
-from rtshcua.app.fly.trust import trust
+from rtshcua.app.fly import waiting
+from rtshcua.app.fly.clearance import revoked_link_key, run_folder
+from rtshcua.app.fly.flight_request import FlightContext, FlightRequest
+from rtshcua.app.fly.link_signing import LinkSigning
+from rtshcua.app.fly.vehicle_trust import trust
+from rtshcua.app.fly.verify_bundle import Verified, verify
+from rtshcua.app.fly.verify_bundle import lapsed as bundle_lapsed
+from rtshcua.app.fly.waiting import admit_bundle, broken_off
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli import launch
 from rtshcua.front.cli.app import main
+from rtshcua.front.cli.console import TerminalConsole
 from rtshcua.library import root as library
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.frames import FrameSession
@@ -63,8 +69,7 @@ def test_what_a_revoked_key_signs_is_refused_in_flight(document: Callable[..., b
 def test_a_bundle_of_a_revoked_key_is_not_loaded(key: SigningKey) -> None:
     found = load(
         sealed_again(low()), root=revoking(key), vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE,
-        flight=bytes(16),
-        session_key=bytes(SESSION_KEY_BYTES), peer_is_own_simulator=True,
+        flight=bytes(16), session_key=bytes(SESSION_KEY_BYTES), peer_is_own_simulator=True,
     )  # fmt: skip
     assert isinstance(found, Refusal)
     assert found.slug == "revoked-key"
@@ -100,13 +105,27 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     return slug
 
 
-def order(**changed: object) -> launch.Launch:
-    usual = launch.Launch(
-        bundle=Path("old.bundle"), link=None, simulator=(), mode=EnforcementMode.SOFTWARE, speed=1, vehicle=None,
-        roots=(),
-        log_key=None, passphrase_file=None, data=data_folder(), state=state_folder(), runs=Path("runs"), style="json",
-    )  # fmt: skip
-    return altered(usual, **changed)  # type: ignore[arg-type]
+def order(**changed: object) -> FlightRequest:
+    return request(**({"bundle": Path("old.bundle"), "data": data_folder(), "state": state_folder()} | changed))
+
+
+def flying(of: FlightRequest, clock: SystemClock | None = None) -> FlightContext:
+    return context(of, clock, console=TerminalConsole("json", data_folder(), None))
+
+
+def verified(of: FlightRequest, bundle: str, clock: SystemClock | None = None) -> Verified:
+    found = verify(flying(of, clock), Path(bundle).read_bytes())
+    assert isinstance(found, Verified), found
+    return found
+
+
+def unverified(of: FlightRequest, bundle: str, clock: SystemClock | None = None) -> Refusal:
+    return refusal_of(verify(flying(of, clock), Path(bundle).read_bytes()))
+
+
+def accepts(settled: str | Refusal, text: str) -> bool:
+    assert isinstance(settled, str)
+    return text in settled
 
 
 def test_a_vehicle_that_missed_two_roots_takes_those_between_too(
@@ -137,9 +156,9 @@ def test_a_bundle_of_before_is_refused_once_its_key_is_revoked(
     assert refused(capsys, "run", "old.bundle") == "revoked-key"
     assert not Path("runs").exists()
     assert main(["compile", str(PATROL), "-o", "new.bundle"]) == ExitCode.OK, "the new key has the old one's place"
-    trusted, _, loaded = launch._trusting(order(), Path("new.bundle").read_bytes(), SystemClock())
+    _, loaded, trusted, _ = verified(order(), "new.bundle")
     assert (trusted.distrust, trusted.root.version, loaded.vehicle) == (None, 2, QUAD)
-    assert "version 2 is accepted in the place of version 1" in trusted.settle(resumed=False)
+    assert accepts(trusted.settle(resumed=False), "version 2 is accepted in the place of version 1")
     assert version() == 2
     fleet.root_path.write_bytes(Path("first.trust").read_bytes())  # the key store is set back
     assert refused(capsys, "run", "old.bundle") == "revoked-key"
@@ -153,21 +172,17 @@ def test_what_the_vehicle_accepts_meanwhile_counts(fleet: KeyStore, capsys: pyte
     assert main(["keys", "rotate-root", "--days", "30"]) == ExitCode.OK
     clock = SystemClock()
     waits = trust((), data_folder(), state_folder(), QUAD, clock.now().utc_us)
-    waits.expect_latest()
+    assert waits.superseded() is None
     assert main(["keys", "revoke", "mission-agent"]) == ExitCode.OK
     roots = [str(path) for path in sorted((data_folder() / "keys").glob("root-*.trust"))]
     assert main(["keys", "accept", *roots, str(fleet.root_path), "--vehicle", QUAD]) == ExitCode.OK
     newest = version()
     assert newest > waits.root.version
-    for begins in (waits.expect_latest, lambda: waits.settle(resumed=False)):
-        with pytest.raises(Refused) as refused_as:
-            begins()
-        assert (refused_as.value.code, refused_as.value.slug) == (ExitCode.UNTRUSTED, "root-superseded")
+    for found in (waits.superseded(), waits.settle(resumed=False)):
+        assert refusal_of(found)[::3] == ("root-superseded", ExitCode.UNTRUSTED)
     assert version() == newest
     RootStore(state_folder(), QUAD).path.write_bytes(b"damaged")
-    with pytest.raises(Refused) as damaged:
-        waits.expect_latest()
-    assert damaged.value.slug == "root-damaged"
+    assert refusal_of(waits.superseded()).slug == "root-damaged"
 
 
 def test_two_roots_of_one_version_are_a_fork(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
@@ -203,7 +218,7 @@ def test_the_log_key_that_was_revoked_signs_no_log_more(fleet: KeyStore, capsys:
     Path("stolen.key").touch(0o600)
     Path("stolen.key").write_bytes(stolen)
     assert refused(capsys, "run", "old.bundle", "--log-key", "stolen.key") == "revoked-key"
-    launch._trusting(order(), Path("old.bundle").read_bytes(), SystemClock())
+    verified(order(), "old.bundle")
 
 
 @pytest.mark.parametrize("resumed", [False, True])
@@ -216,15 +231,15 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
     assert main(["keys", "revoke", "--link", "link.key"]) == ExitCode.OK
     assert f"{name} the key of a link" in " ".join(capsys.readouterr().out.split())
     root = opened(fleet.root())
-    signing = Signing(Path("link.key"), POLICY, FrameSession(), Path("state"), SystemClock(), unsigned_radio=True)
+    signing = LinkSigning(Path("link.key"), POLICY, FrameSession(), Path("state"), SystemClock(), unsigned_radio=True)
     if resumed:
-        launch._expect_link_key(signing, root, resumed=True)
+        assert revoked_link_key(signing, root, resumed=True) is None
         assert "brought down all the same" in signing.notes[-1]
     else:
-        with pytest.raises(Refused, match=name) as found:
-            launch._expect_link_key(signing, root, resumed=False)
-        assert (found.value.code, found.value.slug) == (ExitCode.UNTRUSTED, "link-key-revoked")
-    launch._expect_link_key(signing, opened(Path("first.trust").read_bytes()), resumed=False)
+        found = refusal_of(revoked_link_key(signing, root, resumed=False))
+        assert name in found.text
+        assert (found.code, found.slug) == (ExitCode.UNTRUSTED, "link-key-revoked")
+    assert revoked_link_key(signing, opened(Path("first.trust").read_bytes()), resumed=False) is None
     signing.close()
 
 
@@ -233,7 +248,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
 def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, what: str) -> None:
     """A run is killed in the air, a key of its bundle is revoked, and it is started again with the old command line."""
     of = launched(order())
-    store = FileReplayStore(launch._left_in(order()), QUAD)
+    store = FileReplayStore(order().kept_in, QUAD)
     store.open_once(of.bundle.mission_digest, of.expires_us, 0, of.bundle.policy.name, of.bundle.policy.version)
     old_key, again = fleet.key_path(Duty.LOG).read_bytes(), order()
     if what == "damaged":
@@ -248,17 +263,14 @@ def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, w
         Path("old.key").touch(0o600)
         Path("old.key").write_bytes(old_key)
         again = order(log_key=Path("old.key"))
-    trusted, _, loaded = launch._trusting(again, Path("old.bundle").read_bytes(), SystemClock())
+    _, loaded, trusted, _ = verified(again, "old.bundle")
     assert loaded.bundle.mission_digest == of.bundle.mission_digest
-    assert "brought down all the same" in trusted.settle(resumed=True)
-    with pytest.raises(Refused) as grounded:
-        trusted.settle(resumed=False)
-    assert grounded.value.slug in ("revoked-key", "root-damaged", "root-rollback")
-    with pytest.raises(Refused):
-        launch._trusting(altered(again, dry_run=True), Path("old.bundle").read_bytes(), SystemClock())
+    assert accepts(trusted.settle(resumed=True), "brought down all the same")
+    grounded = refusal_of(trusted.settle(resumed=False))
+    assert grounded.slug in ("revoked-key", "root-damaged", "root-rollback")
+    unverified(altered(again, dry_run=True), "old.bundle")
     store.give_back(of.bundle.mission_digest)
-    with pytest.raises(Refused):  # nothing of it is in the air
-        launch._trusting(again, Path("old.bundle").read_bytes(), SystemClock())
+    unverified(again, "old.bundle")  # nothing of it is in the air
 
 
 def test_what_flies_comes_down_where_something_else_is_in_the_state_folders_place(fleet: KeyStore) -> None:
@@ -268,12 +280,10 @@ def test_what_flies_comes_down_where_something_else_is_in_the_state_folders_plac
     state_folder().touch()
     with pytest.raises(NotADirectoryError):
         looked_up(state_folder(), QUAD, of.bundle.mission_digest, of.expires_us, "bridge_inspection", 7)
-    trusted, _, loaded = launch._trusting(order(), Path("old.bundle").read_bytes(), SystemClock())
+    _, loaded, trusted, _ = verified(order(), "old.bundle")
     assert loaded.bundle.mission_digest == of.bundle.mission_digest
-    assert trusted.settle(resumed=True).endswith("it is brought down all the same")
-    with pytest.raises(Refused) as grounded:
-        trusted.settle(resumed=False)
-    assert grounded.value.code == ExitCode.INPUT
+    assert accepts(trusted.settle(resumed=True), "it is brought down all the same")
+    assert refusal_of(trusted.settle(resumed=False)).code == ExitCode.INPUT
 
 
 def test_what_comes_down_keeps_its_evidence_elsewhere_where_no_run_can_lie(
@@ -282,13 +292,13 @@ def test_what_comes_down_keeps_its_evidence_elsewhere_where_no_run_can_lie(
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     Path("runs").touch()
     with pytest.raises(OSError, match="directory"):
-        launch._run_folder(order(), launched(order()), b"bundle", SystemClock(), resumed=False)
-    run, told = launch._run_folder(order(), launched(order()), b"bundle", SystemClock(), resumed=True)
+        run_folder(flying(order()), launched(order()), b"bundle", resumed=False)
+    run, told = run_folder(flying(order()), launched(order()), b"bundle", resumed=True)
     assert (run.path / "mission.bundle").read_bytes() == b"bundle"
     assert run.path.is_relative_to(tmp_path)
     assert str(run.path) in told
     Path("runs").unlink()
-    run, told = launch._run_folder(order(), launched(order()), b"bundle", SystemClock(), resumed=True)
+    run, told = run_folder(flying(order()), launched(order()), b"bundle", resumed=True)
     assert (run.path.parent, told) == (Path("runs"), "")
 
 
@@ -320,40 +330,39 @@ def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, d
         RootStore(state_folder(), QUAD).path.unlink()
     of = launched(order())
     log_key = fleet.signing_key(Duty.LOG).kid
-    assert launch._lapsed(bundle, fleet.root(), log_key, of, SystemClock()) is None
-    lapsed = launch._lapsed(bundle, fleet.root(), log_key, of, Late())  # by the vehicle's clock, or after a long wait
+    assert bundle_lapsed(bundle, fleet.root(), log_key, of, SystemClock()) is None
+    lapsed = bundle_lapsed(bundle, fleet.root(), log_key, of, Late())  # by the vehicle's clock, or after a long wait
     assert lapsed is not None
-    with pytest.raises(Refused) as fresh:  # nothing of it flew
-        launch._trusting(order(), bundle, Late())
-    assert fresh.value.slug == lapsed.slug == ("expired" if duty is Duty.ROOT else "key-expired")
-    store = FileReplayStore(launch._left_in(order()), QUAD)
+    fresh = unverified(order(), "old.bundle", Late())  # nothing of it flew
+    assert fresh.slug == lapsed.slug == ("expired" if duty is Duty.ROOT else "key-expired")
+    store = FileReplayStore(order().kept_in, QUAD)
     store.open_once(of.bundle.mission_digest, of.expires_us, 0, of.bundle.policy.name, of.bundle.policy.version)
-    trusted, _, loaded = launch._trusting(order(), bundle, Late())
+    _, loaded, trusted, _ = verified(order(), "old.bundle", Late())
     assert loaded.bundle.mission_digest == of.bundle.mission_digest
     assert trusted.distrust is not None
-    assert trusted.distrust.slug == fresh.value.slug
-    assert "brought down all the same" in trusted.settle(resumed=True)
-    with pytest.raises(Refused):
-        trusted.settle(resumed=False)
-    with pytest.raises(Refused):
-        launch._trusting(order(dry_run=True), bundle, Late())
+    assert trusted.distrust.slug == fresh.slug
+    assert accepts(trusted.settle(resumed=True), "brought down all the same")
+    refusal_of(trusted.settle(resumed=False))
+    unverified(order(dry_run=True), "old.bundle", Late())
 
 
 def test_a_wait_brings_down_its_own_flight_and_none_of_somebody_else_long_after(
     fleet: KeyStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A run died, the vehicle came home otherwise, and later somebody flies it in a mode that is ours too."""
-    monkeypatch.setattr(launch, "BUNDLE", "old.bundle")
+    monkeypatch.setattr(waiting, "BUNDLE", "old.bundle")
     base = launched(order())
     past: Any = SimpleNamespace(broken_off=Path.cwd())
     seen = SimpleNamespace(landed_state=2, airborne=True, armed=True)
     vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen))
 
     def found(clock: SystemClock) -> bool:
-        return launch._broken_off(order(), past, base, vehicle, clock, []) is not None
+        aloft = broken_off(flying(order(), clock), past, base, vehicle, [])
+        assert not isinstance(aloft, Refusal)
+        return aloft is not None
 
     assert not found(SystemClock()), "nothing of that bundle flew"
-    store = FileReplayStore(launch._left_in(order()), QUAD)
+    store = FileReplayStore(order().kept_in, QUAD)
     store.open_once(base.bundle.mission_digest, base.expires_us, 0, base.bundle.policy.name, base.bundle.policy.version)
     assert found(SystemClock())
     assert not found(Late())
@@ -371,10 +380,9 @@ def replace_mission(base: Loaded) -> Loaded:
 def test_no_bundle_is_admitted_once_the_log_key_has_expired_that_the_wait_began_with(fleet: KeyStore) -> None:
     expiring(fleet, Duty.LOG)
     bundle = Path("old.bundle").read_bytes()
-    trusted, key, base = launch._trusting(order(), bundle, SystemClock())
-    other = replace_mission(base)
-    refusal = launch._admit(order(), bundle, other, trusted, key.kid, cast("Signing", None), Late())
-    assert isinstance(refusal, Refusal)
+    _, base, trusted, signer = verified(order(), "old.bundle")
+    other, unsigned = replace_mission(base), cast("LinkSigning", None)
+    refusal = refusal_of(admit_bundle(flying(order(), Late()), bundle, other, trusted, signer.kid, unsigned))
     assert (refusal.slug, "the log key" in refusal.text) == ("key-expired", True)
 
 
@@ -390,8 +398,8 @@ def test_an_expired_root_is_accepted_by_no_vehicle(
     assert RootStore(state_folder(), QUAD).path.exists() is not named
 
 
-def launched(of: launch.Launch) -> Loaded:
-    return launch._trusting(of, of.bundle.read_bytes(), SystemClock())[2]
+def launched(of: FlightRequest) -> Loaded:
+    return verified(of, str(of.bundle)).loaded
 
 
 def test_a_root_in_earnest_is_accepted_by_flying_under_it_and_one_for_development_is_not(tmp_path: Path) -> None:

@@ -11,16 +11,18 @@ from typing import Any
 
 import pytest
 
+from reference.flying import context, request
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.app.fly.trust import trust
+from rtshcua.app.fly.vehicle_trust import trust
+from rtshcua.app.fly.verify_bundle import load_bundle
+from rtshcua.app.fly.waiting import admit_bundle
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli import launch
 from rtshcua.front.cli.app import main
 from rtshcua.library import root as library
-from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded
+from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.wire.keys import Duty
 
 PROPOSAL, POLICY = library() / "missions" / "proposal.json", library() / "policies" / "bridge_inspection.rts"
@@ -46,17 +48,14 @@ def hand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
     assert main(["compile", "person.rts", "-o", "base.bundle"]) == ExitCode.OK
     clock, base = SystemClock(), Path("base.bundle")
     trusted = trust((), data_folder(), state_folder(), "quad-07", clock.now().utc_us)
-    order = launch.Launch(
-        bundle=base, link=None, simulator=(), mode=EnforcementMode.SOFTWARE, speed=1, vehicle=None, roots=(),
-        log_key=None,
-        passphrase_file=None, data=data_folder(), state=state_folder(), runs=Path("runs"), style="json", wait_s=60,
-    )  # fmt: skip
-    waits = launch._load(order, base.read_bytes(), trusted.root, clock.now(), secrets.token_bytes(16))
+    order = request(bundle=base, data=data_folder(), state=state_folder(), wait_s=60)
+    waits = load_bundle(order, base.read_bytes(), trusted.root, clock.now(), secrets.token_bytes(16))
+    assert isinstance(waits, Loaded)
     signing: Any = SimpleNamespace(unheard=frozenset())
     log_key = KeyStore(data_folder()).signing_key(Duty.LOG).kid
 
     def handed(name: str) -> str:
-        outcome = launch._admit(order, Path(name).read_bytes(), waits, trusted, log_key, signing, clock)
+        outcome = admit_bundle(context(order, clock), Path(name).read_bytes(), waits, trusted, log_key, signing)
         assert isinstance(outcome, Loaded | Refusal)
         return outcome.slug if isinstance(outcome, Refusal) else "accepted"
 

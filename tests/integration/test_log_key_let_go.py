@@ -5,11 +5,14 @@ from typing import Any
 
 import pytest
 
-from rtshcua.app.fly.refused import Refused
-from rtshcua.app.fly.session import Flight
+from rtshcua.app.fly.flight_session import FlightSession
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.wire.keys import Duty, SigningKey
+
+
+class Enough(Exception):
+    """This is all that is asked."""
 
 
 def held(public: bytes) -> list[SigningKey]:
@@ -27,12 +30,12 @@ def test_the_log_key_is_let_go_before_the_flight(ground: Any, monkeypatch: pytes
     del here
     found: list[int] = []
 
-    def fly(flight: Flight) -> Any:
+    def fly(session: FlightSession) -> Any:
         found.append(len(held(public)))
-        flight.refuse()
-        raise Refused(ExitCode.REFUSED, "enough", "this is all that is asked")
+        session.refuse()
+        raise Enough
 
-    monkeypatch.setattr(Flight, "fly", fly)
+    monkeypatch.setattr(FlightSession, "fly", fly)
     monkeypatch.chdir(ground.folder)
-    assert app.main(["run", bundle, "--json", "--speed", "20"]) == ExitCode.REFUSED
+    assert app.main(["run", bundle, "--json", "--speed", "20"]) == ExitCode.FAULT
     assert found == [0]

@@ -41,7 +41,7 @@ def test_a_bundle_that_expired_begins_nothing_where_the_time_is_known(
 ) -> None:
     """Before a vehicle is looked for; one that is waited with says the policy alone, and may be of any age."""
     monkeypatch.setattr(utc, "kernel_error_us", lambda: 1_000)
-    monkeypatch.setattr("rtshcua.front.cli.launch._simulate", None)
+    monkeypatch.setattr("rtshcua.app.fly.connect.start_simulator", None)
     if words == ("--wait",):
         words = ("--connect", "PORT", *IDENTITY, "--mode", "software", "--wait", "--agent-socket", "agents")
     link = [f"udpin:127.0.0.1:{port}" if word == "PORT" else word for word in words]

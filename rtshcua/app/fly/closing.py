@@ -1,17 +1,22 @@
-"""The end of a flight: the log signed and closed, the frames finished, and what the disk did not take named."""
+"""The stage that closes: the log signed and read back, the frames finished, and what the disk did not take named."""
 
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
 from rtshcua.adapters.loop import append_all
+from rtshcua.adapters.store.logs import lines
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, SUMMARY, TELEMETRY, RunFolder
 from rtshcua.adapters.store.telemetry import TelemetryFile
 from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.app.fly.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder
+from rtshcua.evidence.verify import verify
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending
@@ -84,3 +89,26 @@ def keep_summary(run: RunFolder, summary: Summary) -> Summary:
 
 def _reason(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
+
+
+class ReadBack(NamedTuple):
+    """Why the log is refused, in words, None where it verifies; and for how long it has nothing, in us."""
+
+    refused: str | None
+    gaps_us: int = 0
+
+
+def read_back(log: Path) -> ReadBack:
+    """What a verifier makes of a closed log: chain, order, seals and signatures. That the trust root names the key that
+    signed it was found before the flight; what the boundary stated, and each decision, `verify-log --audit` holds
+    against it.
+    """
+    try:
+        with open_regular(log) as file:
+            report = verify(lines(file))
+    except OSError as error:
+        return ReadBack(f"it cannot be read back: {(error.strerror or str(error)).lower()} ({LOG})")
+    found = report.failure or report.shortfall
+    if found is not None:
+        return ReadBack(f"`verify-log` refuses it: {found.slug} at record {found.record} ({LOG})")
+    return ReadBack(None, sum(gap.us for gap in report.gaps))

@@ -1,23 +1,47 @@
-"""The vehicle is met: its first heartbeat, that it is the only one, and what is said when it is not heard."""
+"""The stage that connects: the link is opened and signed, the first heartbeat heard, and the time of day taken."""
 
 import time
 from collections.abc import Sequence
 from errno import ENOENT
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
+from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP
 from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.doctor.identity import IdentityQuestions
+from rtshcua.adapters.doctor.standing import standing
+from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
+from rtshcua.adapters.simulator import Simulator, SimulatorError
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.owed import OwedParameters
+from rtshcua.adapters.store.qualifications import read_record
+from rtshcua.adapters.store.signing import LinkKeyError
 from rtshcua.adapters.utc import UtcWatch, certain_from_us
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.messages import Message
-from rtshcua.app.fly.interrupts import Interrupts
-from rtshcua.app.fly.link_signing import Signing
-from rtshcua.app.fly.refused import Refused
+from rtshcua.adapters.vehicle.telemetry import UnknownSource
+from rtshcua.adapters.vehicle.transport import Transport, UdpTransport, open_transport
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.flight_request import FlightContext, FlightRequest
+from rtshcua.app.fly.link_signing import LinkSigning
+from rtshcua.app.fly.previous_log import LogBefore
+from rtshcua.app.fly.start_boundary import Begun, BoundaryClient, of_link_key
+from rtshcua.app.fly.verify_bundle import may_have_flown
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.policy import Policy
+from rtshcua.onboard.calls import call
+from rtshcua.onboard.enforcement.isolated import IsolatedGate
+from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event
+from rtshcua.onboard.rehearsal import stranded
 from rtshcua.simulation.simulated_mark import hundredths, marked_speed
+from rtshcua.wire.qualification import Qualification, open_qualification
+from rtshcua.wire.trust import TrustRoot
+from rtshcua.wire.untrusted import Untrusted
 
 #: How long a heartbeat is waited for, in seconds,
 HEARTBEAT_S = 10.0
@@ -69,6 +93,13 @@ LISTENING_UTC_NOTE: Final = (
     "states it)"
 )
 
+#: that somebody asked for the end before anything flew
+INTERRUPTED: Final = Refusal("interrupted", "interrupted before anything flew", "", ExitCode.INTERRUPTED)
+
+#: s that the version and parameters of a vehicle that may be qualified are waited for
+_TOLD_S: Final = 4.0
+_QUALIFY_HELP: Final = "`rtshcua qualify` flies a short test of it"
+_LOOPBACK: Final = "127.0.0.1"
 _POLL_S = 0.05
 _HELP: Final = "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try"
 _KEY_HELP: Final = "has the vehicle the key of `--signing-key`, and are both clocks right?"
@@ -127,58 +158,67 @@ def unlike(question: SpeedQuestion, speed: float) -> Refusal | None:
             f"`--speed {speed:g}` is for a vehicle that this program simulates, and this one {said}: at a real "
             "vehicle a second is a second"
         )
-        return Refusal("not-simulated", text, "without `--speed`; `rtshcua sim --speed N` starts a simulated vehicle")
+        return Refusal(
+            "not-simulated",
+            text,
+            "without `--speed`; `rtshcua sim --speed N` starts a simulated vehicle",
+            ExitCode.REFUSED,
+        )
     if question.speed != hundredths(speed):
         text = f"the simulated vehicle flies {question.speed / 100:g} seconds in a second, and not {speed:g}"
-        return Refusal("other-speed", text, f"`--speed {question.speed / 100:g}`")
+        return Refusal("other-speed", text, f"`--speed {question.speed / 100:g}`", ExitCode.REFUSED)
     return None
 
 
-def _expect_simulated(
-    vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, speed: float, events: list[Event]
-) -> None:
+def await_heartbeat(
+    context: FlightContext, vehicle: ConnectedVehicle, signing: LinkSigning, *, hurried: bool
+) -> list[Event] | Refusal:
+    """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
+    nothing begins; what happened meanwhile. The vehicle is ready only afterwards. `hurried`: a flight may have broken
+    off in the air; then a second vehicle is not waited for, so that the first is told to come down.
+    """
+    link, events = context.request.link, list[Event]()
+    vehicle.driver.issued_from_us = _UNDATED_US
+    until_s = time.monotonic() + HEARTBEAT_S
+    while vehicle.driver.flavour is None:
+        if context.interrupts.wish() is not None:
+            return INTERRUPTED
+        if time.monotonic() > until_s:
+            where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
+            unheard = unmet(where, HEARTBEAT_S, context.request.system, signing.rejected, vehicle.silence)
+            return unheard._replace(code=ExitCode.LINK)
+        events += _poll(context, vehicle)
+    if link is not None and context.request.speed != 1:
+        refusal = _not_simulated(context, vehicle, events)
+        if refusal is not None:
+            return refusal
+    until_s = time.monotonic() + (0 if link is None or hurried else ANOTHER_S)
+    while time.monotonic() < until_s and vehicle.driver.link.crowd is None:
+        events += _poll(context, vehicle)
+    if vehicle.driver.link.crowd is not None:
+        text = vehicle.driver.link.crowd
+        return Refusal("two-vehicles", text, "one vehicle to a port is safest", ExitCode.REFUSED)
+    vehicle.driver.issued_from_us = 0
+    return events
+
+
+def _not_simulated(context: FlightContext, vehicle: ConnectedVehicle, events: list[Event]) -> Refusal | None:
+    """Why a vehicle is not flown faster than life: it has to say itself that it is simulated, else its times would not
+    be checked, nor true in the log. `events` get what came meanwhile.
+    """
     question = SpeedQuestion()
     vehicle.driver.asks_first = question
     until_s = time.monotonic() + SPEED_S
     while not question.told and time.monotonic() < until_s:
-        if interrupts.wish() is not None:
-            raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
-        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+        if context.interrupts.wish() is not None:
+            return INTERRUPTED
+        events += _poll(context, vehicle)
     vehicle.driver.asks_first = None
-    refusal = unlike(question, speed)
-    if refusal is not None:
-        raise Refused(ExitCode.REFUSED, *refusal)
+    return unlike(question, context.request.speed)
 
 
-def meet(
-    link: Address | None, system: int | None, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts,
-    signing: Signing, *, hurried: bool, speed: float = 1,
-) -> list[Event]:  # fmt: skip
-    """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
-    nothing begins; what happened meanwhile. The vehicle is ready only afterwards. `link` None: our own simulated
-    vehicle. `hurried`: a flight may have broken off in the air; then a second vehicle is not waited for, so that the
-    first is told to come down. `speed` other than 1: it is held to be simulated, which it has to say itself; else its
-    times would not be checked, nor true in the log. Raises `Refused`.
-    """
-    events: list[Event] = []
-    vehicle.driver.issued_from_us = _UNDATED_US
-    until_s = time.monotonic() + HEARTBEAT_S
-    while vehicle.driver.flavour is None:
-        if interrupts.wish() is not None:
-            raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted before anything flew")
-        if time.monotonic() > until_s:
-            where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
-            raise Refused(ExitCode.LINK, *unmet(where, HEARTBEAT_S, system, signing.rejected, vehicle.silence))
-        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
-    if link is not None and speed != 1:
-        _expect_simulated(vehicle, clock, interrupts, speed, events)
-    until_s = time.monotonic() + (0 if link is None or hurried else ANOTHER_S)
-    while time.monotonic() < until_s and vehicle.driver.link.crowd is None:
-        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
-    if vehicle.driver.link.crowd is not None:
-        raise Refused(ExitCode.REFUSED, "two-vehicles", vehicle.driver.link.crowd, "one vehicle to a port is safest")
-    vehicle.driver.issued_from_us = 0
-    return events
+def _poll(context: FlightContext, vehicle: ConnectedVehicle) -> Sequence[Event]:
+    return vehicle.poll(context.clock.now().monotonic_us, context.clock.us_in(_POLL_S))
 
 
 def await_utc(
@@ -205,3 +245,241 @@ def await_utc(
     vehicle.driver.utc_patience_us = 0 if patient or (listens and not utc.waits) else clock.us_in(READY_UTC_S)
     vehicle.driver.issued_from_us = certain_from_us(issued_us, clock.now())
     return events
+
+
+# ---------------------------------------------------------------- the qualification of what is connected
+
+
+def record_of(vehicle: str, root: TrustRoot, now_us: int, data: Path | None = None) -> Qualification | str | None:
+    """The record of the vehicle of this identity; None where it has none, a text where it is not to be trusted."""
+    try:
+        signed = read_record(data_folder() if data is None else data, vehicle)
+        return None if signed is None else open_qualification(signed, root=root, vehicle=vehicle, now_us=now_us)
+    except Untrusted as error:
+        return str(error)
+    except OSError as error:
+        return (error.strerror or str(error)).lower()
+
+
+def unqualified(
+    record: Qualification | str | None, vehicle: ConnectedVehicle, clock: LinkClock
+) -> tuple[str | None, list[Event]]:
+    """A note for a vehicle that is not qualified as it is now, None where it is; and what happened meanwhile. It is
+    asked only where there is a record that could hold, and only on the ground.
+    """
+    driver, events = vehicle.driver, list[Event]()
+    flavour = driver.flavour
+    if flavour is None or not isinstance(record, Qualification) or not record.qualifies:
+        return f"{standing(record, None, {}).text} ({_QUALIFY_HELP})", events
+    questions = IdentityQuestions(flavour, names=[name for name, _ in record.parameters])
+    driver.asks = questions
+    until_s = time.monotonic() + _TOLD_S
+    while not questions.told and time.monotonic() < until_s and not (driver.seen.airborne or driver.seen.armed):
+        events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
+    driver.asks = None
+    if driver.seen.airborne or driver.seen.armed:
+        return None, events
+    stands = standing(record, questions.firmware, questions.parameters)
+    return (None if stands.qualified else f"{stands.text} ({_QUALIFY_HELP})"), events
+
+
+# ---------------------------------------------------------------- the stage
+
+
+class Connected(NamedTuple):
+    """A vehicle that is connected, what signs its link, what happened since it was first heard, and who may follow the
+    flight.
+    """
+
+    vehicle: ConnectedVehicle
+    signing: LinkSigning
+    events: list[Event]
+    agents: Agents | None
+
+
+def connect(
+    context: FlightContext, begun: Begun, previous: LogBefore | None, debts: OwedParameters
+) -> Connected | Refusal:
+    """Open the link, until the flight is over, and wait for the vehicle and the time of day. Raises OSError."""
+    request, loaded, driven = context.request, begun.loaded, context.request.dry_run
+    signing = sign_link(context, loaded, begun.apart)
+    if isinstance(signing, Refusal):
+        return signing
+    context.resources.callback(signing.close)
+    deaf = stranded_signal(request, loaded, signing)
+    if deaf is not None:
+        return deaf
+    driver = make_driver(context, loaded, signing, fence=request.fence)
+    if isinstance(driver, Refusal):
+        return driver
+    driver.prepares = not driven and bool(request.settings or debts.left)
+    driver.left = None if previous is None else previous.left(begun.bundle, loaded)
+    transport = begun.transport or open_link(context)
+    if isinstance(transport, Refusal):
+        return transport
+    vehicle = ConnectedVehicle(transport, driver, context.clock, context.frames.keep)
+    context.resources.callback(vehicle.close)
+    refusal = too_slow(driver) or _simulate(context, loaded, transport)
+    if refusal is not None:
+        return refusal
+    agents = begun.agents or open_agents(context, loaded)
+    driver.asks_utc, driver.asks_back = context.utc.vehicle_may_tell, context.utc.question
+    hangs = not driven and previous is not None and previous.broken_off is not None
+    driver.hurries = hurried = hangs and may_have_flown(request, loaded)
+    events = await_heartbeat(context, vehicle, signing, hurried=hurried)
+    if isinstance(events, Refusal):
+        return events
+    patient, listens = driven or request.utc_error_us is not None, request.boundary_socket is not None
+    events += await_utc(
+        context.utc, vehicle, context.clock, loaded.issued_us, patient=patient, listens=listens, hurried=hurried
+    )
+    return Connected(vehicle, signing, events, agents)
+
+
+def sign_link(context: FlightContext, loaded: Loaded, apart: BoundaryClient | None = None) -> LinkSigning | Refusal:
+    """What signs the link; where the boundary that decides runs apart, that one, and its key is not read here. Raises
+    OSError.
+    """
+    request, gate = context.request, loaded.executor.frames
+    process = apart.process if apart is not None and isinstance(gate, IsolatedGate) else None
+    try:
+        signing = LinkSigning(
+            request.signing_key if process is None else None, loaded.bundle.policy, gate, request.state, context.clock,
+            unsigned_radio=request.unsigned_radio, even_damaged=not request.dry_run,
+        )  # fmt: skip
+        if process is not None and isinstance(gate, IsolatedGate):
+            if request.boundary_socket is not None:
+                where = request.boundary_socket
+                signing.notes.append(f"the boundary at `{where}` decides, by keys and a root of its own")
+            if process.missing:
+                signing.notes.append(f"the boundary runs without {'; without '.join(process.missing)}")
+            if process.link_name is not None:
+                policy, radio = loaded.bundle.policy, request.unsigned_radio
+                signing.elsewhere(process.link_name, gate, policy, unsigned_radio=radio)
+    except LinkKeyError as error:
+        return of_link_key(error)
+    if request.unbuilt:
+        signing.notes.append(f"{UNBUILT}: {UNBUILT_HELP}")
+    if signing.name is None and request.link is not None and not request.link.is_loopback:
+        signing.notes.append(
+            f"`{request.link}` has no key: whoever reaches it can speak as the vehicle (`--signing-key`)"
+        )
+    return signing
+
+
+def stranded_signal(request: FlightRequest, loaded: Loaded, signing: LinkSigning) -> Refusal | None:
+    """Why a mission does not begin that would break off in the air for a signal that cannot come; a rehearsal tells."""
+    steps = stranded(loaded.bundle.policy, loaded.bundle.mission, signing.unheard)
+    if not steps or request.dry_run:
+        return None
+    first = call(loaded.bundle.policy, steps[0])
+    return Refusal(
+        "signal-unsigned",
+        f"`{first}` needs a signal of RADIO_STATUS, which radios do not sign: it would wait for it in vain",
+        "`--unsigned-radio` takes it unsigned, and the worst of the last seconds counts", ExitCode.REFUSED,
+    )  # fmt: skip
+
+
+def make_driver(context: FlightContext, loaded: Loaded, signing: LinkSigning, *, fence: bool) -> Driver | Refusal:
+    """What drives a vehicle under the policy of a bundle. `fence`: the vehicle's own becomes the airspace."""
+    request, policy = context.request, loaded.bundle.policy
+    try:
+        own = manoeuvres(packs_of(policy.sources))
+    except BrokenPack as error:
+        return Refusal("broken-pack", error.text, "", ExitCode.REFUSED)
+    try:
+        make = Driver if request.sortie is None else request.sortie.driver
+        return make(
+            policy,
+            loaded.executor.frames,
+            context.slack,
+            fence=fence and not request.dry_run,
+            manoeuvres=own,
+            verifier=signing.verifier,
+            system=request.system,
+            steps=loaded.bundle.mission.invocations,
+            meant=request.settings if request.dry_run else None,
+        )
+    except UnknownSource as error:
+        return Refusal("unknown-source", str(error), "", ExitCode.REFUSED)
+
+
+def too_slow(driver: Driver) -> Refusal | None:
+    """Why a link carries too little for a policy; None where it carries enough."""
+    if driver.shortfall is None:
+        return None
+    help = "a faster link, or longer deadlines and times to stale in the policy; docs/flying/link.md counts octets"
+    return Refusal("link-too-slow", driver.shortfall, help, ExitCode.REFUSED)
+
+
+def open_link(context: FlightContext) -> Transport | Refusal:
+    """The way to the vehicle; to our own simulated one, a port that the system chooses."""
+    if context.transport is not None:
+        return context.transport
+    link = context.request.link or Address(LinkCarrier.UDP_IN, _LOOPBACK, 0)
+    try:
+        return open_transport(link)
+    except OSError as error:
+        return unopened(link, error)._replace(code=ExitCode.LINK)
+
+
+def start_simulator(context: FlightContext, loaded: Loaded, port: int) -> Simulator | Refusal:
+    """The simulated vehicle of a policy, until the flight is over."""
+    request = context.request
+    words = [*options_of_policy(loaded.bundle.policy), *request.simulator]
+    if request.signing_key is not None:
+        words += ["--signing-key", str(request.signing_key)]
+    try:
+        simulator = Simulator(["--port", str(port), "--speed", f"{request.speed:g}", *words])
+    except SimulatorError as error:
+        return Refusal("simulator", str(error), "", ExitCode.LINK)
+    return context.resources.enter_context(simulator)
+
+
+def options_of_policy(policy: Policy) -> list[str]:
+    """Options that make it the vehicle of a policy: its home, its endurance, its return, no faster, what it reads."""
+    from rtshcua.virtual.fitting import fitting  # the simulation's parameters, which a flight of another vehicle lacks
+
+    fits = fitting(policy)
+    home = fits.home
+    return [
+        f"--return-at={fits.return_mm / 1_000:g}",
+        f"--home={home.latitude / 1e7:.7f},{home.longitude / 1e7:.7f},{home.amsl_mm // 1_000}",
+        f"--hover={fits.hover_us / 60_000_000:.3f}",
+        f"--cruise={fits.cruise_mm_s / 1_000:.3f}",
+        *(sorted(f"--extra={extra}" for extra in fits.extras) or ["--stock"]),
+    ]
+
+
+def open_agents(context: FlightContext, loaded: Loaded, *, waits: bool = False) -> Agents | None:
+    """Who may follow the flight and hand in, until it is over. Raises OSError."""
+    request = context.request
+    if request.agent_socket is None and request.operator_socket is None:
+        return None
+    return context.resources.enter_context(
+        Agents(request.agent_socket, loaded, operators=request.operator_socket, group=request.agent_group, waits=waits)
+    )
+
+
+def utc_notes(context: FlightContext, apart: BoundaryClient | None, *, listens: bool) -> list[str]:
+    """That the time of day is not known, and what helps."""
+    if not context.utc.waits:
+        return []
+    if listens:
+        return [LISTENING_UTC_NOTE]
+    unkeyed = apart is not None and apart.process.link_name is None
+    return [APART_UTC_NOTE if unkeyed or not context.utc.vehicle_counts else UTC_NOTE]
+
+
+def _simulate(context: FlightContext, loaded: Loaded, transport: Transport) -> Refusal | None:
+    """Start the simulated vehicle of a flight without a link, and its incidents. One that waits has it already."""
+    request = context.request
+    if not isinstance(transport, UdpTransport) or request.link is not None or request.wait_s is not None:
+        return None
+    simulator = start_simulator(context, loaded, transport.port)
+    if isinstance(simulator, Refusal):
+        return simulator
+    context.clock.tell(simulator.heard)
+    if request.incidents is None:
+        return None
+    return request.incidents.begin(loaded.policy, loaded.bundle.mission, simulator)

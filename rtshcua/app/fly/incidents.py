@@ -11,9 +11,9 @@ from heapq import heappop, heappush
 from msgspec import structs
 
 from rtshcua.adapters.simulator import Simulator, SimulatorError
-from rtshcua.app.fly.refused import Refused
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
 from rtshcua.model.faults import AgentFault, HostFault
 from rtshcua.model.flat.mission import Mission
@@ -27,24 +27,29 @@ from rtshcua.virtual.scenario import Due, Triggers
 Watch = Callable[[Now, Sequence[Event], Sequence[Action]], None]
 
 
-class Incidents:
-    """What goes wrong in one run, by one scenario and seed. Raises `Refused` for what no run can have."""
+def plan_incidents(flight: ScenarioFlight, flavour: str | None, seed: int | None) -> "Incidents | Refusal":
+    """What goes wrong in one run, by a scenario and a seed; no run can have all of it."""
+    scenario, code = flight.scenario, ExitCode.USAGE
+    for incident in scenario.incidents:
+        if isinstance(incident.fault, HostFault | AgentFault):
+            text = f"`{incident.text}` goes wrong in virtual time alone"
+            return Refusal("usage", text, "`rtshcua test` flies the scenario", code)
+    if scenario.start.utc_us is not None:
+        text = "the scenario says at what time it begins, and a run begins now"
+        return Refusal("usage", text, "`rtshcua test` flies the scenario", code)
+    if flavour is not None and flavour not in scenario.flavours:
+        text = f"the scenario is flown aboard {', '.join(scenario.flavours)}"
+        return Refusal("usage", text, "leave `--flavour` out, or name one of these", code)
+    return Incidents(flight, flavour or scenario.flavours[0], scenario.first_seed if seed is None else seed)
 
-    def __init__(self, flight: ScenarioFlight, flavour: str | None, seed: int | None) -> None:
+
+class Incidents:
+    """What goes wrong in one run, by one scenario and seed."""
+
+    def __init__(self, flight: ScenarioFlight, flavour: str, seed: int) -> None:
         self.scenario = flight.scenario
-        for incident in self.scenario.incidents:
-            if isinstance(incident.fault, HostFault | AgentFault):
-                text = f"`{incident.text}` goes wrong in virtual time alone"
-                raise Refused(ExitCode.USAGE, "usage", text, "`rtshcua test` flies the scenario")
-        if self.scenario.start.utc_us is not None:
-            text = "the scenario says at what time it begins, and a run begins now"
-            raise Refused(ExitCode.USAGE, "usage", text, "`rtshcua test` flies the scenario")
-        if flavour is not None and flavour not in self.scenario.flavours:
-            text = f"the scenario is flown aboard {', '.join(self.scenario.flavours)}"
-            raise Refused(ExitCode.USAGE, "usage", text, "leave `--flavour` out, or name one of these")
         self._flight = flight
-        self._flavour = flavour or self.scenario.flavours[0]
-        self._seed = self.scenario.first_seed if seed is None else seed
+        self._flavour, self._seed = flavour, seed
         self._triggers = Triggers(self.scenario, self._seed)
         self._agenda: list[tuple[int, int]] = []  # when, and the number of what happens
         self.happened: list[str] = []
@@ -60,15 +65,16 @@ class Incidents:
             words += ["--wind", f"{start.wind_mm_s / 1000:g},{start.wind_from_deg},{start.gust_mm_s / 1000:g}"]
         return words
 
-    def begin(self, policy: PreparedPolicy, mission: Mission, simulator: Simulator) -> None:
-        """The run begins, of this mission. Raises `Refused` where it is not the scenario's."""
+    def begin(self, policy: PreparedPolicy, mission: Mission, simulator: Simulator) -> Refusal | None:
+        """The run begins, of this mission; why it does not, where that is not the scenario's."""
         if _flown(mission, policy.policy) != _flown(self._flight.mission, self._of_scenario()):
             text = f"the scenario flies another mission than the bundle's `{mission.name}`, or under another policy"
             help = "the mission that it `flies` makes the bundle: compile it again from the same sources"
-            raise Refused(ExitCode.USAGE, "usage", text, help)
+            return Refusal("usage", text, help, ExitCode.USAGE)
         self._simulator = simulator
         self._triggers.begin(policy)
         self._schedule(self._triggers.start())
+        return None
 
     def around(self, watch: Watch, start_us: int) -> Watch:
         """What watches the loop of the run, with this beside it; it began at `start_us` of its monotonic clock."""

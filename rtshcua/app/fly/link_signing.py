@@ -25,7 +25,7 @@ _STRANGE = (
 _UNSIGNED = frozenset({"RADIO_STATUS"})
 
 
-class Signing:
+class LinkSigning:
     """Signs what `frames` lets out to a vehicle, and verifies what comes in. Without a key it does neither.
 
     `state` is the folder where timestamps are kept, by the vehicle's identity. Raises LinkKeyError, and OSError where

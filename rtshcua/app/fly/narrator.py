@@ -1,14 +1,19 @@
-"""From evidence lines and the loaded bundle to what the view is told, and to the counts of the summary."""
+"""From evidence lines and the loaded bundle to what the view is told, after each step, and to the counts of the
+summary. It never waits.
+"""
 
+import time
 from base64 import b64decode
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from math import cos, isqrt, pi, sin
 from typing import Final, NamedTuple
 
 import msgspec
 
 from rtshcua.adapters.preparation import PERMITTED
-from rtshcua.app.fly.story import Area, Asks, Happening, Plan, Signal, Step
+from rtshcua.app.fly.agents import Agents
+from rtshcua.app.fly.story import Area, Asks, Happened, Happening, Note, Plan, Signal, Snapshot, Step
+from rtshcua.app.fly.view_ports import LiveView
 from rtshcua.decision.outline import rings
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.model.flat.code import Op
@@ -16,12 +21,15 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import POSITION
+from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.zone import CIRCLE, Zone
 from rtshcua.model.outcome import Reason
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.calls import call
+from rtshcua.onboard.ports import Action, Append, Event
 from rtshcua.onboard.runtime.dispatcher import UNCONFIRMED
+from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 from rtshcua.wire import cose, names
 from rtshcua.wire.approval import ApprovalDocument
 from rtshcua.wire.bundle import parse_unverified
@@ -35,6 +43,8 @@ REPLACED = "replacement"
 NOTHING_FLIES = "no command is sent, because the vehicle is on the ground"
 #: what the boundary makes of what was told anyway
 _UNTOLD = frozenset({BOUNDARY, PERMITTED})
+_SNAPSHOT_S = 0.1
+_WAITING_NOTE_S = 5.0
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
 
 
@@ -259,3 +269,54 @@ def _agreed(detail: str) -> str:
     except (ValueError, Untrusted):
         return ""
     return body.role if body.granted else ""
+
+
+class Watching:
+    """The loop's `watch`. `view` makes a snapshot, `unready` says what it waits for; `live`: one that is drawn.
+
+    `replan` is asked for the plan after the mission was replaced; `agents` are told of everything too.
+    """
+
+    def __init__(
+        self, feed: LiveView, teller: Teller, view: Callable[[Now], RuntimeView], unready: Callable[[], str | None], *,
+        live: bool, replan: Callable[[], Plan] | None = None, agents: Agents | None = None,
+    ) -> None:  # fmt: skip
+        self._feed = feed
+        self._teller = teller
+        self._view = view
+        self._unready = unready
+        self._live = live
+        self._replan = replan
+        self._agents = agents
+        self._waited_for = ""
+        self._shown_s = self._waited_s = time.monotonic()
+
+    def __call__(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
+        """One step was made."""
+        for action in actions:
+            if isinstance(action, Append):
+                what = self._teller.tell(action.line)
+                if what is not None:
+                    if what.event == REPLACED and self._replan is not None:
+                        self._feed.post(self._replan())
+                    self._feed.post(Happened(what))
+        if self._agents is not None:
+            self._agents.watch(actions)
+        moment_s = time.monotonic()
+        if moment_s - self._shown_s >= _SNAPSHOT_S:
+            self._shown_s = moment_s
+            self._show(now, moment_s)
+
+    def _show(self, now: Now, moment_s: float) -> None:
+        self._feed.flush()
+        if not self._live and moment_s - self._waited_s < _WAITING_NOTE_S:
+            return
+        view = self._view(now)
+        if self._live:
+            self._feed.post(Snapshot(view), keep=False)
+        if moment_s - self._waited_s >= _WAITING_NOTE_S:
+            self._waited_s = moment_s
+            unready = self._unready()
+            if view.stage is RunStage.WAITING and unready is not None and unready != self._waited_for:
+                self._waited_for = unready
+                self._feed.post(Note(f"waiting for the vehicle: {unready}"))

@@ -3,6 +3,7 @@
 import secrets
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import Self
 
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.last_log import LastLog, PreviousLog
@@ -20,16 +21,21 @@ LOG_BEFORE = "log-before"
 _UNKEPT = "the next log will not know of this one, for that cannot be kept"
 
 
-class Past:
-    """Ends the last log of a vehicle, where it must, when it is made. `hash` and `note` are for the next log."""
+class LogBefore:
+    """The last log of a vehicle; `hash` and `note` are for the next one."""
 
-    def __init__(self, state: Path, vehicle: str, log_key: SigningKey | None) -> None:
-        """Without the log's key the log before stays without an end."""
-        self._last = LastLog(state, vehicle)
-        signer = None if log_key is None else signer_of(log_key)
-        self._earlier: PreviousLog = self._last.settle(look if signer is None else lambda path: recover(path, signer))
+    def __init__(self, last: LastLog, earlier: PreviousLog) -> None:
+        self._last = last
+        self._earlier = earlier
         self._log: Path | None = None
         self._held = ExitStack()
+
+    @classmethod
+    def settle(cls, state: Path, vehicle: str, log_key: SigningKey | None) -> Self:
+        """Ends it, where it must be ended; without the log's key it stays without an end."""
+        last = LastLog(state, vehicle)
+        signer = None if log_key is None else signer_of(log_key)
+        return cls(last, last.settle(look if signer is None else lambda path: recover(path, signer)))
 
     @property
     def hash(self) -> str | None:

@@ -5,13 +5,11 @@ back after a run that sent nothing.
 import time
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.store.replay import FileReplayStore, looked_up
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
-from rtshcua.app.fly.refused import Refused
-from rtshcua.app.fly.session import Flight
 from rtshcua.app.wording import utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -29,6 +27,19 @@ AIR_S: Final = 5.0
 ANSWER_S: Final = 3.0
 _POLL_S: Final = 0.05
 _MEND: Final = "put `replay/` of the state folder right; without it, each bundle that has not expired opens again"
+
+
+class Grounded(Protocol):
+    """A flight whose log has begun."""
+
+    @property
+    def used_up(self) -> bool:
+        """Whether the bundle may not fly any more, after it."""
+        ...
+
+    def refuse(self) -> None:
+        """Close the log: it is not to be."""
+        ...
 
 
 def flown_before(state: Path, loaded: Loaded) -> str | None:
@@ -52,13 +63,13 @@ def _not_opened(loaded: Loaded, opening: MissionOpening) -> Refusal:
     policy, vehicle = loaded.bundle.policy, loaded.vehicle
     if opening is MissionOpening.DAMAGED:
         text = f"what is kept about the bundles that `{vehicle}` opened is damaged: this one may have flown"
-        return Refusal(opening, text, _MEND)
+        return Refusal(opening, text, _MEND, ExitCode.REFUSED)
     if opening is MissionOpening.OLD_POLICY:
         text = f"a later version of `{policy.name}` than {policy.version} was in force on `{vehicle}`"
         help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
-        return Refusal(opening, text, help)
+        return Refusal(opening, text, help, ExitCode.REFUSED)
     text = f"this bundle was opened before on `{vehicle}`: a bundle flies once"
-    return Refusal(opening, text, "compile the mission again, which issues it anew")
+    return Refusal(opening, text, "compile the mission again, which issues it anew", ExitCode.REFUSED)
 
 
 def expired(loaded: Loaded, now: Now) -> Refusal | None:
@@ -75,13 +86,15 @@ def too_old(policy: Policy, steps: Iterable[Invocation], now: Now) -> Refusal | 
         if now.utc_us - now.utc_error_us > end_us:
             which = f"step {number_of(step.step)}, `{call(policy, step)}`"
             text = f"the bundle expired at {utc(end_us)}: later {which}, may not begin"
-            return Refusal("bundle-expired", text, "compile the mission again, which issues it anew")
+            return Refusal("bundle-expired", text, "compile the mission again, which issues it anew", ExitCode.REFUSED)
     return None
 
 
-def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
+def broke_off(
+    state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]
+) -> bool | Refusal:
     """True for a bundle that was opened before while the vehicle is in the air, or armed; one that can be opened is not
-    yet.
+    yet. A refusal for one that was opened, and nothing of it flies. Raises OSError.
 
     Then a run of it broke off up there, or had just told it to take off: nothing of the mission is flown again, but it
     is brought down. So it is where nobody can tell, for the state folder is damaged, or cannot be read or written: what
@@ -97,12 +110,12 @@ def broke_off(state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: Lin
     if opening is MissionOpening.OPENED:
         return False
     if opening is MissionOpening.OLD_POLICY:
-        raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
+        return _not_opened(loaded, opening)
     if still_flies(vehicle, clock, events):
         return True
     if unread is not None:
         raise unread
-    raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
+    return _not_opened(loaded, opening)
 
 
 def still_flies(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
@@ -124,7 +137,7 @@ def obeys(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> b
     return not vehicle.driver.keyless
 
 
-def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -> None:
+def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Grounded) -> Refusal | None:
     """Open the bundle, which works once: after the first record is on the disk, so that a disk that is full uses up no
     bundle, and before anything is sent. Another run may have been faster; then this one does not fly.
     """
@@ -137,12 +150,13 @@ def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Flight) -
     except OSError:
         flight.refuse()
         raise
-    if opening is not MissionOpening.OPENED:
-        flight.refuse()
-        raise Refused(ExitCode.REFUSED, *_not_opened(loaded, opening))
+    if opening is MissionOpening.OPENED:
+        return None
+    flight.refuse()
+    return _not_opened(loaded, opening)
 
 
-def give_back(state: Path, loaded: Loaded, flight: Flight, now: Now) -> str | None:
+def give_back(state: Path, loaded: Loaded, flight: Grounded, now: Now) -> str | None:
     """After a run that ended with nothing sent: its bundle may be handed in again, unless it expired meanwhile; that,
     in words. None if it was used.
 

@@ -15,7 +15,7 @@ from rtshcua.evidence.report import LogReport
 SIMULATED: Final = "simulated"
 
 
-def told(speed: float, *, own: bool) -> str | None:
+def pace_of(speed: float, *, own: bool) -> str | None:
     """What a log says of a flight at `speed` seconds of flight in a second; None where it is a flight as any other.
 
     `own`: of the simulated vehicle that we start ourselves; another one may be simulated too, which we cannot know.

@@ -7,23 +7,47 @@ Nothing that moves the vehicle is sent meanwhile, and its geofence stays as it i
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import msgspec
 
 from rtshcua.adapters.clock import LinkClock
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.runs import BUNDLE
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.app.fly.agents import Agents
-from rtshcua.app.fly.console import Console
-from rtshcua.app.fly.interrupts import Interrupts
-from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.connect import (
+    await_heartbeat,
+    make_driver,
+    open_agents,
+    open_link,
+    record_of,
+    sign_link,
+    start_simulator,
+    stranded_signal,
+    too_slow,
+    unqualified,
+)
+from rtshcua.app.fly.flight_request import FlightContext
+from rtshcua.app.fly.link_signing import LinkSigning
+from rtshcua.app.fly.previous_log import LogBefore
+from rtshcua.app.fly.replay_check import expired, not_opened, still_flies
+from rtshcua.app.fly.start_boundary import KEYLESS, Begun, BoundaryClient, own_key_of
+from rtshcua.app.fly.stop_wishes import Interrupts
+from rtshcua.app.fly.vehicle_trust import Trusted
+from rtshcua.app.fly.verify_bundle import Verified, lapsed, load_bundle, local_log_key, verify
+from rtshcua.app.fly.view_ports import Console
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.onboard.enforcement.isolated import IsolatedExecutor
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event, Presented, Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.onboard.runtime.seen import value_in_words
 from rtshcua.wire import names
+from rtshcua.wire.bundle import MAX_BUNDLE
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.receipt import Receipt, decode
 from rtshcua.wire.untrusted import Untrusted
@@ -50,19 +74,20 @@ class Admitted(NamedTuple):
     loaded: Loaded
 
 
-class Waiting:
-    """One wait. `admit` says whether a bundle may fly, and `expect` raises `Refused` once none may any more. `most_s`:
-    how long it waits at most, in seconds. `notes`: what there is to tell first.
+class MissionWait:
+    """One wait. `admit` says whether a bundle may fly, `superseded` and `lost` why none may any more.
+    `most_s`: how long it waits at most, in seconds. `notes`: what there is to tell first.
     """
 
     def __init__(
-        self, base: Loaded, admit: Callable[[bytes], Loaded | Refusal], expect: Callable[[], None],
-        vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, agents: Agents, *,
+        self, base: Loaded, admit: Callable[[bytes], Loaded | Refusal], superseded: Callable[[], Refusal | None],
+        lost: Callable[[], Refusal | None], vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts,
+        agents: Agents, *,
         console: Console, most_s: float, notes: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self._base = base
         self._admit = admit
-        self._expect = expect
+        self._superseded, self._lost = superseded, lost
         self._vehicle = vehicle
         self._clock = clock
         self._interrupts = interrupts
@@ -74,8 +99,8 @@ class Waiting:
         self._refused = 0
         self._said_s = -SAID_S
 
-    def follow(self, events: Sequence[Event]) -> Admitted:
-        """Wait until a bundle is admitted. `events` came while the vehicle was met. Raises `Refused`."""
+    def follow(self, events: Sequence[Event]) -> Admitted | Refusal:
+        """Wait until a bundle is admitted. `events` came while the vehicle was connected."""
         policy = self._base.bundle.policy
         begun_s = time.monotonic()
         told_s, unready = begun_s - TOLD_S, ""
@@ -86,16 +111,18 @@ class Waiting:
         self._vehicle.announce(_INFO, ANNOUNCED)
         while True:
             if self._interrupts.wish() is not None:
-                raise Refused(ExitCode.INTERRUPTED, "interrupted", "interrupted while it waited: nothing was flown")
+                return _ended("interrupted", "interrupted while it waited: nothing was flown", ExitCode.INTERRUPTED)
             now_s = time.monotonic()
             if now_s - begun_s >= self._most_s:
                 text = f"no bundle was admitted within {self._most_s:g} s: nothing was flown"
-                raise Refused(ExitCode.REFUSED, "nothing-handed-in", text)
+                return _ended("nothing-handed-in", text, ExitCode.REFUSED)
             for event in events:
                 if isinstance(event, Readings):
                     self._monitor.update(event)
             if now_s - told_s >= TOLD_S:
-                self._expect()
+                over = self._superseded() or self._lost()
+                if over is not None:
+                    return over
                 told_s, before, unready = now_s, unready, self._vehicle.driver.unready or ""
                 if unready != before:
                     self._tell("vehicle", f"not ready yet: {unready}" if unready else "the vehicle is ready")
@@ -105,28 +132,32 @@ class Waiting:
                 return admitted
             events = self._vehicle.poll(self._clock.now().monotonic_us, self._clock.us_in(_POLL_S))
 
-    def _handed_in(self) -> Admitted | None:
+    def _handed_in(self) -> Admitted | Refusal | None:
         found = self._agents.events(self._clock.now())
         for text in self._agents.notes():
             self._console.say(f"note: {text}")
         for number, event in enumerate(found):
             if isinstance(event, Presented):
                 admitted = self._take(event)
-                if admitted is not None:
+                if isinstance(admitted, Admitted):
                     self._agents.fly(admitted.loaded, found[number + 1 :])
+                if admitted is not None:
                     return admitted
         return None
 
-    def _take(self, event: Presented) -> Admitted | None:
+    def _take(self, event: Presented) -> Admitted | Refusal | None:
         kind = _kind_of(event.document)
         if kind is names.RECALL:
             receipt = decode(self._base.boundary.present(event.document, self._clock.now(), 0))
             assert isinstance(receipt, Receipt)
             self._agents.answer(event.sender, receipt.slug, receipt.text)
             if receipt.accepted:
-                raise Refused(ExitCode.ABORTED, "recalled", "recalled while it waited: nothing was flown")
+                return _ended("recalled", "recalled while it waited: nothing was flown", ExitCode.ABORTED)
             self._refusal(receipt.slug, receipt.text)
             return None
+        over = None if kind is not None else self._superseded()
+        if over is not None:
+            return over
         outcome = Refusal("not-flying", _NOTHING_FLIES) if kind is not None else self._admit(event.document)
         if isinstance(outcome, Refusal):
             self._agents.answer(event.sender, outcome.slug, outcome.text)
@@ -176,9 +207,157 @@ class Waiting:
             self._console.say(text)
 
 
+def _ended(slug: str, text: str, code: ExitCode) -> Refusal:
+    return Refusal(slug, text, "", code)
+
+
 def _kind_of(data: bytes) -> names.Artefact | None:
     """Which kind of document these bytes are, if they are one."""
     try:
         return kind_of(data)
     except Untrusted:
         return None
+
+
+# ---------------------------------------------------------------- the stage
+
+
+def await_mission(context: FlightContext, begun: Begun, previous: LogBefore | None) -> Begun | Refusal:
+    """Wait, connected, for the bundle that flies; the one of a flight that broke off in the air is not waited for.
+    Raises OSError.
+    """
+    transport = open_link(context)
+    if isinstance(transport, Refusal):
+        return transport
+    context.resources.callback(transport.close)
+    if isinstance(transport, UdpTransport) and context.request.link is None:
+        simulator = start_simulator(context, begun.loaded, transport.port)
+        if isinstance(simulator, Refusal):
+            return simulator
+    agents = open_agents(context, begun.loaded, waits=True)
+    assert agents is not None  # the command line asks for one
+    signing = sign_link(context, begun.loaded, begun.apart)
+    if isinstance(signing, Refusal):
+        return signing
+    try:
+        waited = _wait(context, begun._replace(transport=transport, agents=agents), agents, signing, previous)
+    finally:
+        signing.close()
+    if isinstance(waited, Refusal):
+        return waited
+    if waited.trusted is not begun.trusted and not isinstance(waited.loaded.executor, IsolatedExecutor):
+        own_key = own_key_of(context, waited.trusted.root, waited.loaded) if context.listening is None else KEYLESS
+        return waited._replace(own_key=own_key)
+    return waited
+
+
+def _wait(
+    context: FlightContext, begun: Begun, agents: Agents, signing: LinkSigning, previous: LogBefore | None
+) -> Begun | Refusal:
+    request, base, trusted, apart = context.request, begun.loaded, begun.trusted, begun.apart
+    driver = make_driver(context, base, signing, fence=False)
+    if isinstance(driver, Refusal):
+        return driver
+    assert begun.transport is not None
+    assert request.wait_s is not None
+    vehicle = ConnectedVehicle(begun.transport, driver, context.clock, lambda at_us, frame: None)
+    slow = too_slow(driver)
+    if slow is not None:
+        return slow
+    hurried = previous is not None and previous.broken_off is not None
+    events = await_heartbeat(context, vehicle, signing, hurried=hurried)
+    if isinstance(events, Refusal):
+        return events
+    aloft = None if previous is None else broken_off(context, previous, base, vehicle, events)
+    if isinstance(aloft, Refusal):
+        return aloft
+    if aloft is not None:
+        return _bring_down(context, begun, aloft, agents)
+    if trusted.distrust is not None:  # what it is not enough for is to fly anything new
+        return trusted.distrust
+    if isinstance(begun.absent, OSError):
+        raise begun.absent
+    if begun.absent is not None:
+        return begun.absent
+    notes = list(signing.notes)
+    if request.link is not None:
+        record = record_of(base.vehicle, trusted.root, context.clock.now().utc_us, request.data)
+        note, meanwhile = unqualified(record, vehicle, context.clock)
+        events += meanwhile
+        notes += [note] if note is not None else []
+
+    def admit(data: bytes) -> Loaded | Refusal:
+        return admit_bundle(context, data, base, trusted, begun.log_key.kid, signing, apart)
+
+    def lost() -> Refusal | None:
+        return None if apart is None else apart.lost()
+
+    wait = MissionWait(
+        base, admit, trusted.superseded, lost, vehicle, context.clock, context.interrupts, agents,
+        console=context.console, most_s=request.wait_s, notes=notes,
+    )  # fmt: skip
+    admitted = wait.follow(events)
+    if isinstance(admitted, Refusal):
+        return admitted
+    return begun._replace(bundle=admitted.data, loaded=admitted.loaded)
+
+
+def _bring_down(context: FlightContext, begun: Begun, aloft: Verified, agents: Agents) -> Begun:
+    """The bundle of a flight that broke off in the air, in force where decisions are made, or in this process."""
+    same_root = aloft.trusted.root == begun.trusted.root and aloft.trusted.distrust is None
+    apart = begun.apart if same_root or context.listening is not None else None  # it has the one root, or its own
+    loaded = aloft.loaded if apart is None else apart.load(aloft.bundle, context.clock.now())
+    if isinstance(loaded, Refusal):
+        context.console.say(f"note: {loaded.text}; it is brought down all the same")
+        loaded = aloft.loaded
+    if not isinstance(loaded.executor, IsolatedExecutor):
+        begun.log_key.use(local_log_key(context))
+    agents.fly(loaded)
+    return begun._replace(bundle=aloft.bundle, loaded=loaded, trusted=aloft.trusted)
+
+
+def broken_off(
+    context: FlightContext, previous: LogBefore, base: Loaded, vehicle: ConnectedVehicle, events: list[Event]
+) -> Verified | Refusal | None:
+    """The bundle of the flight before this run, and under what it is trusted, if that did not end, and the vehicle is
+    in the air still: a restart brings it down, as `run` does that is given the same bundle again. No charge lasts
+    longer than `endurance_us` after the last moment at which it could take off: what flies then is somebody else's.
+
+    Raises OSError for a bundle that cannot be read.
+    """
+    if previous.broken_off is None or not still_flies(vehicle, context.clock, events):
+        return None
+    data = read_regular(previous.broken_off / BUNDLE, MAX_BUNDLE)
+    request = replace(context.request, wait_s=None)
+    verified = verify(context._replace(request=request), data, base.in_force.flight)
+    if isinstance(verified, Refusal):
+        return verified
+    loaded = verified.loaded
+    landed = context.clock.now().utc_us > loaded.expires_us + loaded.bundle.policy.vehicle.endurance_us
+    return None if landed or not_opened(request.kept_in, loaded) is None else verified
+
+
+def admit_bundle(
+    context: FlightContext, data: bytes, base: Loaded, trusted: Trusted, log_key: bytes, signing: LinkSigning,
+    apart: BoundaryClient | None = None,
+) -> Loaded | Refusal:  # fmt: skip
+    """What `run` asks of a bundle before it connects, of one that was handed in; and that its policy is the one that is
+    waited under; and that the boundary takes it. It flies as the flight that the sockets tell of.
+    """
+    loaded = load_bundle(context.request, data, trusted.root, context.clock.now(), base.in_force.flight)
+    if isinstance(loaded, Refusal):
+        return loaded
+    if loaded.bundle.policy_digest != base.bundle.policy_digest:
+        theirs, ours = loaded.bundle.policy, base.bundle.policy
+        text = f"it is under {theirs.name}@{theirs.version}, and this vehicle waits under {ours.name}@{ours.version}"
+        return Refusal("other-policy", text, "the policy's envelope is that of the bundle that is waited with")
+    if loaded.bundle.mission_digest == base.bundle.mission_digest:  # an agent has it; a person may have signed
+        text = "it is the bundle that is waited with: that says the policy, and its own mission does not fly"
+        return Refusal("waited-with", text, "sign a mission of your own under its policy")
+    refusal = (
+        lapsed(data, trusted.signed, log_key, loaded, context.clock)
+        or stranded_signal(context.request, loaded, signing)
+        or expired(loaded, context.clock.now())
+        or not_opened(context.request.kept_in, loaded)
+    )
+    return refusal or (loaded if apart is None else apart.admit(data, context.clock.now()))

@@ -7,8 +7,8 @@ from pathlib import Path
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.witness_link import Anchor, WitnessClient
-from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.ports import Anchored, Event, Noted
 
 
@@ -17,22 +17,33 @@ def addresses(texts: Sequence[str]) -> tuple[Address, ...]:
     return tuple(address.parse(text, (LinkCarrier.UDP_OUT,)) for text in texts)
 
 
-class Witnessing:
+def find_witnesses(witnesses: Sequence[Address], keys: frozenset[bytes]) -> "FlightWitnesses | Refusal":
+    """The witnesses of a flight. `keys` are the public keys that the trust root names for witnesses of its vehicle."""
+    if witnesses and not keys:
+        text = "the trust root names no witness of this vehicle: nothing that one says could be recorded"
+        return Refusal("no-witness", text, "`rtshcua keys init --witnesses 1` names one", ExitCode.UNTRUSTED)
+    peers = []
+    for each in witnesses:
+        try:
+            peers.append((socket.gethostbyname(each.host), each.port))
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            return Refusal("witness-address", f"`{each}`: {reason}", "", ExitCode.LINK)
+    return FlightWitnesses(peers, keys)
+
+
+class FlightWitnesses:
     """The witnesses of one flight; none at all is the usual number. The flight never waits for them."""
 
-    def __init__(self, witnesses: Sequence[Address], keys: frozenset[bytes]) -> None:
-        """`keys` are the public keys that the trust root names for witnesses of this vehicle. Raises `Refused`."""
-        if witnesses and not keys:
-            text = "the trust root names no witness of this vehicle: nothing that one says could be recorded"
-            raise Refused(ExitCode.UNTRUSTED, "no-witness", text, "`rtshcua keys init --witnesses 1` names one")
+    def __init__(self, peers: Sequence[tuple[str, int]], keys: frozenset[bytes]) -> None:
         self._keys = keys
         self._client: WitnessClient | None = None
-        self._peers = [(_resolved(each), each.port) for each in witnesses]
+        self._peers = peers
 
     def begin(self, log: Path, synced: Callable[[], int]) -> None:
         """Show them a log that has begun; `synced` is how many of its lines are on the disk. Raises OSError."""
         if self._peers:
-            self._client = WitnessClient(self._peers, log, synced, self._keys)
+            self._client = WitnessClient([*self._peers], log, synced, self._keys)
 
     def events(self, now_us: int) -> list[Event]:
         """What came from them."""
@@ -47,11 +58,3 @@ class Witnessing:
         if client is not None:
             for each in client.finish() if closed else client.finish(0):
                 note(each.text)
-
-
-def _resolved(witness: Address) -> str:
-    try:
-        return socket.gethostbyname(witness.host)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise Refused(ExitCode.LINK, "witness-address", f"`{witness}`: {reason}") from None

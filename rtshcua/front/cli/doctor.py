@@ -39,28 +39,28 @@ from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.app.exit_codes import code_of
-from rtshcua.app.fly.connect import unmet, unopened
-from rtshcua.app.fly.link_signing import Signing
-from rtshcua.app.fly.qualified import record_of
-from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.connect import record_of, unmet, unopened
+from rtshcua.app.fly.link_signing import LinkSigning
 from rtshcua.app.fly.replay_check import too_old
+from rtshcua.app.fly.verify_bundle import other_kind
 from rtshcua.app.programs import compile_sources
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.configured import MeantSettings, settings_of
-from rtshcua.front.cli.connection import (
+from rtshcua.front.cli.conflicts import conflict_of
+from rtshcua.front.cli.faults import distrust, fail, misaddressed, refuse
+from rtshcua.front.cli.flight_options import (
     Connect,
     DecidesIn,
     LinkKey,
+    MeantSettings,
     System,
     UnsignedRadio,
     UtcError,
     duration_us,
     mode_of,
+    settings_of,
 )
-from rtshcua.front.cli.faults import distrust, fail, misaddressed, refuse
-from rtshcua.front.cli.launch import expect_no_source
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.mavlink.parameters import shown
 from rtshcua.model.flat.mission import Mission
@@ -85,6 +85,7 @@ _EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
 
 @app.command()
 def doctor(
+    context: typer.Context,
     connect: Connect,
     bundle: Annotated[Path | None, typer.Argument(help="a mission that it is to fly; else the signals that ship")]
     = None,
@@ -111,13 +112,9 @@ def doctor(
         link = address.parse(connect)
     except AddressError as error:
         return misaddressed("--connect", error)
-    if unsigned_radio and signing_key is None:
-        return fail(ExitCode.USAGE, "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed")
-    if utc_error is not None and boundary_socket is not None:
-        text = "`--utc-error` does not go with `--boundary-socket`: the boundary there is told in its own command line"
-        return fail(ExitCode.USAGE, text)
-    if boundary_socket is not None and mode not in (None, EnforcementMode.PROCESS):
-        return fail(ExitCode.USAGE, f"`--boundary-socket` goes with `--mode process`, not with `{mode}`")
+    problem = conflict_of(context)
+    if problem is not None:
+        return problem
     decides, _ = mode_of(mode, own=False, named=boundary_socket is not None)
     try:
         agents = [] if agent_user is None else [told_apart(agent_user, pwd.getpwnam(agent_user).pw_uid, os.geteuid())]
@@ -125,15 +122,16 @@ def doctor(
         return fail(ExitCode.USAGE, f"there is no user `{agent_user}`")
     clock = SystemClock()
     try:
-        policy, mission, root = _wanted(bundle, clock.now().utc_us)
+        wanted = _wanted(bundle, clock.now().utc_us)
     except Untrusted as error:
         return distrust(error)
-    except Refused as refused:
-        return fail(refused.code, str(refused), refused.help, slug=refused.slug)
+    if isinstance(wanted, Refusal):
+        return refuse(wanted)
+    policy, mission, root = wanted
     frames = FrameSession()
     with ExitStack() as stack:
         try:
-            signing = Signing(signing_key, policy, frames, state_folder(), clock, unsigned_radio=unsigned_radio)
+            signing = LinkSigning(signing_key, policy, frames, state_folder(), clock, unsigned_radio=unsigned_radio)
         except LinkKeyError as error:
             return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
         stack.callback(signing.close)
@@ -253,7 +251,7 @@ def _owed(debts: OwedParameters) -> list[VehicleFinding]:
     return [VehicleFinding(slug, MissionVerdict.WARN, found)] if listed else []
 
 
-def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, TrustRoot | None]:
+def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, TrustRoot | None] | Refusal:
     """The policy whose signals count, the mission to fly, and the root that it is trusted by. Raises Untrusted, and
     OSError.
     """
@@ -262,7 +260,9 @@ def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, T
         assert compiled.policy is not None
         return compiled.policy, None, None
     data = read_regular(bundle, MAX_BUNDLE)
-    expect_no_source(bundle)
+    mistaken = other_kind(bundle)
+    if mistaken is not None:
+        return mistaken
     signed = KeyStore(data_folder()).root()
     root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=utc_us)
     opened = open_bundle(data, root=root, vehicle=None, now_us=utc_us)

@@ -86,7 +86,7 @@ def distrust(error: Untrusted, help: str = "", *, where: str = "") -> ExitCode:
 
 def refuse(refusal: Refusal, code: ExitCode | None = None) -> ExitCode:
     """Fails with a refusal, and with the exit code of its slug unless there is another."""
-    return fail(code or code_of(refusal.slug), refusal.text, refusal.help, slug=refusal.slug)
+    return fail(code or refusal.code or code_of(refusal.slug), refusal.text, refusal.help, slug=refusal.slug)
 
 
 def tell(

@@ -53,7 +53,8 @@ class Findings:
 
     def end(self, refusal: Refusal) -> ExitCode:
         """`refuse` for a value, whose slug says the exit code."""
-        return self.refuse(code_of(refusal.slug), *refusal)
+        slug, text, help, code = refusal
+        return self.refuse(code or code_of(slug), slug, text, help)
 
     def finish(self, code: ExitCode, **result: Any) -> ExitCode:
         """End; with `json`, print everything."""

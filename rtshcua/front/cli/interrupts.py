@@ -1,26 +1,11 @@
-"""Ctrl-C and other requests to stop, taken as wishes instead of obeyed at once: a flight falls back first."""
+"""Ctrl-C and other requests to stop a command that looks for them between two pieces of work."""
 
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from threading import current_thread, main_thread
 from types import FrameType, TracebackType
 from typing import Self
 
-
-@contextmanager
-def breakable() -> Iterator[None]:
-    """Within this, in the main thread, Ctrl-C raises KeyboardInterrupt, as Python has it: what is under way is put in
-    order. Elsewhere it ends a command by the signal itself (`entry_point`).
-    """
-    if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.SIG_DFL:
-        yield
-        return
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+from rtshcua.app.fly.stop_wishes import breakable as breakable
 
 
 class Stopped(Exception):

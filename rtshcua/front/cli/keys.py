@@ -28,18 +28,17 @@ from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.address import parse as parse_address
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.app.exit_codes import code_of, untrusted
-from rtshcua.app.fly import attesting
 from rtshcua.app.fly.connect import unopened
-from rtshcua.app.fly.refused import Refused
-from rtshcua.app.fly.trust import HELPS, trust
+from rtshcua.app.fly.start_boundary import boundary_key as attested_key
+from rtshcua.app.fly.vehicle_trust import HELPS, trust
 from rtshcua.app.wording import utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.connection import System
 from rtshcua.front.cli.console import TerminalConsole
 from rtshcua.front.cli.document_options import AsJson
 from rtshcua.front.cli.faults import fail, misaddressed, refuse
+from rtshcua.front.cli.flight_options import System
 from rtshcua.front.cli.known_roles import warn_of_unknown
 from rtshcua.front.cli.showing.keys import as_object, speaks
 from rtshcua.front.cli.stdout import out, out_json, out_rendered
@@ -233,15 +232,15 @@ def provision(
             text = f"the trust root lets no log key {log.kid.hex()} speak for `{vehicle}` now"
             return fail(ExitCode.UNTRUSTED, text, "`--log-key` gives one that it names", slug=slug)
         console = TerminalConsole("lines", data_folder(), passphrase_file)
-        own = attesting.boundary_key(root, vehicle, now_us, console.unlock, boundary_key)
+        own = attested_key(root, vehicle, now_us, console.unlock, boundary_key)
+        if isinstance(own, Refusal):
+            return refuse(own)
         before = store.provisioned(vehicle)
         if before is not None and (not again or own is None or own.kid == before):
             return _provisioned_before(vehicle, own, again=again)
         link = None if signing_key is None else read_link_key(signing_key)
     except Untrusted as error:
         return _refused(error)
-    except Refused as refused:
-        return fail(refused.code, str(refused), refused.help, slug=refused.slug)
     except LinkKeyError as error:
         return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
     seeds = {"log.seed": log.private.private_bytes_raw(), "root.pin": store.pin()}
@@ -441,7 +440,7 @@ def accept(
         return fail(code_of(error.slug), str(error), HELPS.get(error.slug), slug=f"root-{error.slug}")
     if taken.distrust is not None:
         slug = f"root-{taken.distrust.slug.removeprefix('root-')}"
-        return fail(taken.distrust.code, str(taken.distrust), taken.distrust.help, slug=slug)
+        return refuse(taken.distrust._replace(slug=slug))
     RootStore(state, vehicle).keep(taken.signed)
     root = taken.root
     if as_json:

@@ -16,6 +16,7 @@ from rtshcua.app.documents import read_bundle
 from rtshcua.app.exit_codes import words_of
 from rtshcua.app.signing_keys import check_trusted
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.conflicts import conflict_of
 from rtshcua.front.cli.faults import distrust, fail, say
 from rtshcua.front.cli.interrupts import breakable
 from rtshcua.front.cli.unlock import unlock
@@ -32,6 +33,7 @@ _AGENT = "agent"
 
 @app.command()
 def mcp(
+    context: typer.Context,
     bundle: Annotated[Path, typer.Argument(help="the bundle that `rtshcua run --wait` has: its policy is in force")],
     to: Annotated[Path, typer.Option(metavar="SOCKET", help="the agent socket of the vehicle that waits")],
     with_: Annotated[list[Path], typer.Option("--with", help="the sources of that policy (repeatable)")],
@@ -63,8 +65,9 @@ def mcp(
         if (missing.name or "").partition(".")[0] not in ("mcp", "anyio"):
             raise
         return fail(ExitCode.USAGE, "the MCP server is not installed", 'in the checkout: `pip install ".[mcp]"`')
-    if (http is None) != (token_file is None):
-        return fail(ExitCode.USAGE, "`--http` and `--token-file` go together", "or neither: the standard streams")
+    problem = conflict_of(context)
+    if problem is not None:
+        return problem
     store = KeyStore(data_folder())
     try:
         envelope, _ = envelopes(read_bundle(bundle))

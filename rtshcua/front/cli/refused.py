@@ -2,22 +2,19 @@
 
 import json
 
-from rtshcua.app.fly.refused import Refused
+from rtshcua.app.exit_codes import code_of
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import error_object, fail, tell
 from rtshcua.front.cli.stdout import out_json
 
 
-def say_refused(refused: Refused, *, as_json: bool) -> ExitCode:
+def say_refused(refusal: Refusal, *, as_json: bool) -> ExitCode:
     """Tell why it did not; for a program an error in the one form of errors, and the same beside it."""
+    slug, text, help, code = refusal
+    code = code or code_of(slug)
     if not as_json:
-        return fail(refused.code, str(refused), refused.help, slug=refused.slug)
-    event: dict[str, object] = {
-        "event": "refused",
-        "slug": refused.slug,
-        "text": str(refused),
-        "help": refused.help or None,
-    }
-    event |= error_object(refused.code, str(refused), refused.help, slug=refused.slug)
-    out_json(json.dumps(event, ensure_ascii=False))
-    return tell(refused.code, str(refused), refused.help, slug=refused.slug)
+        return fail(code, text, help, slug=slug)
+    event: dict[str, object] = {"event": "refused", "slug": slug, "text": text, "help": help or None}
+    out_json(json.dumps(event | error_object(code, text, help, slug=slug), ensure_ascii=False))
+    return tell(code, text, help, slug=slug)

@@ -16,7 +16,7 @@ from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError, LinkCarrier
 from rtshcua.app.exit_codes import code_of
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import simulated
+from rtshcua.front.cli import flight_options as simulated
 from rtshcua.front.cli.faults import fail, misaddressed
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.simulation.config import Answers, AutopilotKind, Boot, Estimate
@@ -91,7 +91,7 @@ def sim(
             )
         port = link.port
     port = port or PORT
-    words = simulated.arguments(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
+    words = simulated.simulator_words(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
     if home is not None:
         words.append(f"--home={home}")
     if signing_key is not None:

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from reference.flying import refusal_of
 from rtshcua.adapters.store.boundary import BoundaryStore
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.app.fly.attesting import BoundarySession, Elsewhere, boundary_key
-from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.start_boundary import BoundarySession, HeldByBoundary, boundary_key
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.front.cli.unlock import unlock
@@ -38,9 +38,7 @@ def opened(store: KeyStore) -> Callable[[Duty, Path | None], SigningKey]:
 
 
 def slug(store: KeyStore, of: TrustRoot, path: Path | None = None) -> str:
-    with pytest.raises(Refused) as refused:
-        boundary_key(of, "quad-07", NOW_US, opened(store), path)
-    return refused.value.slug
+    return refusal_of(boundary_key(of, "quad-07", NOW_US, opened(store), path)).slug
 
 
 def test_the_key_store_s_key_or_another_file(store: KeyStore) -> None:
@@ -48,7 +46,7 @@ def test_the_key_store_s_key_or_another_file(store: KeyStore) -> None:
     path = store.key_path(Duty.BOUNDARY)
     for given in (None, path):
         found = boundary_key(root(store), "quad-07", NOW_US, opened(store), given)
-        assert found is not None
+        assert isinstance(found, SigningKey)
         assert found.kid == own.kid
 
 
@@ -70,31 +68,37 @@ def test_no_key_or_another_is_refused(store: KeyStore) -> None:
     assert slug(store, of) == "no-boundary-key"
 
 
+def session_of(store: BoundaryStore, key: SigningKey | HeldByBoundary | None, *, aloft: bool) -> BoundarySession:
+    session = BoundarySession.open(store, key, aloft=aloft)
+    assert isinstance(session, BoundarySession)
+    return session
+
+
 def test_sessions_follow_one_another(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
-    first = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    first = session_of(store, case.BOUNDARY_KEY, aloft=False)
     assert first.key == (case.BOUNDARY_KEY, 1, START)
     first.begun(b"a" * 32, 1)
-    broken_off = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    broken_off = session_of(store, case.BOUNDARY_KEY, aloft=False)
     assert broken_off.key == (case.BOUNDARY_KEY, 2, b"a" * 32)
     first.ended(b"b" * 32)
-    assert BoundarySession(store, case.BOUNDARY_KEY, aloft=False).key == (case.BOUNDARY_KEY, 2, b"b" * 32)
+    assert session_of(store, case.BOUNDARY_KEY, aloft=False).key == (case.BOUNDARY_KEY, 2, b"b" * 32)
 
 
 def test_a_state_folder_that_was_put_back_shows_where_the_boundary_counts_itself(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
     store.keep(2, b"a" * 32)
-    session = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    session = session_of(store, case.BOUNDARY_KEY, aloft=False)
     session.begun(b"b" * 32, 8)
     assert "counts 2 sessions of the boundary, its own process 7" in session.note
     assert store.kept() == (8, b"b" * 32), "and goes on from there"
-    same = BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+    same = session_of(store, case.BOUNDARY_KEY, aloft=False)
     same.begun(b"c" * 32, 9)
     assert not same.note
 
 
 def test_a_key_that_the_boundary_has_is_not_held_here(tmp_path: Path) -> None:
-    session = BoundarySession(BoundaryStore(tmp_path, "quad-07"), Elsewhere(), aloft=False)
+    session = session_of(BoundaryStore(tmp_path, "quad-07"), HeldByBoundary(), aloft=False)
     assert session.key == (None, 1, START)
     session.begun(b"a" * 32, 1)
     assert BoundaryStore(tmp_path, "quad-07").kept() == (1, b"a" * 32)
@@ -103,12 +107,12 @@ def test_a_key_that_the_boundary_has_is_not_held_here(tmp_path: Path) -> None:
 def test_nothing_flies_where_a_session_was_to_begin_and_did_not(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
     with pytest.raises(OSError, match="cannot keep that its session begins"):
-        BoundarySession(store, case.BOUNDARY_KEY, aloft=False).begun(START, None)
-    BoundarySession(store, case.BOUNDARY_KEY, aloft=True).begun(START, None)
+        session_of(store, case.BOUNDARY_KEY, aloft=False).begun(START, None)
+    session_of(store, case.BOUNDARY_KEY, aloft=True).begun(START, None)
 
 
 def test_without_a_key_nothing_is_kept(tmp_path: Path) -> None:
-    session = BoundarySession(BoundaryStore(tmp_path, "quad-07"), None, aloft=False)
+    session = session_of(BoundaryStore(tmp_path, "quad-07"), None, aloft=False)
     session.begun(b"a" * 32, None)
     session.ended(b"b" * 32)
     assert (session.key, list(tmp_path.iterdir())) == (None, [])
@@ -118,18 +122,18 @@ def test_what_cannot_be_known_or_kept_holds_back_nothing_that_is_in_the_air(tmp_
     store = BoundaryStore(tmp_path, "quad-07")
     store.keep(1, b"a" * 32)
     store.path.write_bytes(b"x")
-    with pytest.raises(Refused, match="damaged"):
-        BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
-    session = BoundarySession(store, case.BOUNDARY_KEY, aloft=True)
+    refused = refusal_of(BoundarySession.open(store, case.BOUNDARY_KEY, aloft=False))
+    assert (refused.slug, refused.code) == ("damaged", ExitCode.INPUT)
+    session = session_of(store, case.BOUNDARY_KEY, aloft=True)
     assert session.key == (case.BOUNDARY_KEY, 0, START)
     assert "brought down all the same" in session.note
     session.begun(b"a" * 32, 0)
     session.ended(b"b" * 32)
     assert store.path.read_bytes() == b"x"
     store.path.unlink()
-    sound = BoundarySession(store, case.BOUNDARY_KEY, aloft=True)
+    sound = session_of(store, case.BOUNDARY_KEY, aloft=True)
     store.path.mkdir()
     with pytest.raises(OSError, match="no regular file"):
-        BoundarySession(store, case.BOUNDARY_KEY, aloft=False)
+        session_of(store, case.BOUNDARY_KEY, aloft=False)
     sound.begun(b"a" * 32, None)
     sound.ended(b"b" * 32)

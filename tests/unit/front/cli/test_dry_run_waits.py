@@ -8,11 +8,13 @@ from typing import Any
 import pytest
 
 from reference.flat_case import LINK
+from reference.flying import context, request
 from reference.world import START, FakeVehicle, loaded
 from rtshcua.adapters.vehicle.px4 import PX4
-from rtshcua.app.fly.interrupts import Wish
+from rtshcua.app.fly import dry_run
+from rtshcua.app.fly.stop_wishes import Wish
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import dry_run
+from rtshcua.front.cli.showing.rehearsed import show_rehearsal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Event, Readings, Ready
 
@@ -68,9 +70,14 @@ def rehearsed(
     world: World, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], **words: Any
 ) -> tuple[ExitCode, dict[str, Any]]:
     monkeypatch.setattr(dry_run, "time", world)
-    code = dry_run.dry_run(
-        loaded(), world, world, world, [], as_json=True, say=world.said.append, **words  # type: ignore[arg-type]
-    )  # fmt: skip
+    monkeypatch.setattr(dry_run, "not_begun", lambda *_: words.get("refusal"))
+    console: Any = SimpleNamespace(say=world.said.append)
+    of = request(dry_run=True, settings=dict.fromkeys(words.get("sets", ()), 0))
+    shared = context(of, world, console=console, interrupts=world, utc=SimpleNamespace(waits=False))
+    signing: Any = SimpleNamespace(notes=words.get("notes", []), unheard=words.get("unheard", frozenset()))
+    begun: Any = SimpleNamespace(loaded=loaded(), apart=None)
+    connected: Any = SimpleNamespace(vehicle=world, events=[], signing=signing)
+    code = show_rehearsal(dry_run.rehearse_flight(shared, begun, connected), as_json=True)
     said: dict[str, Any] = json.loads(capsys.readouterr().out)
     assert said["exit_code"] == code
     return code, said

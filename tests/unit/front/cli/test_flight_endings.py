@@ -1,6 +1,6 @@
 """Each way in which a flight may end has its exit code, and only a mission that was completed has 0."""
 
-from rtshcua.app.fly.session import EXIT_CODES
+from rtshcua.app.fly.flight_session import EXIT_CODES
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.ports import Ending
 

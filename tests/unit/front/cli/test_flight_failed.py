@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.app.fly.session import Flight
+from rtshcua.app.fly.flight_session import FlightSession
 
 
 @pytest.mark.parametrize("error", [RuntimeError("bug"), KeyboardInterrupt(), MemoryError(), OSError(5, "gone")])
@@ -17,7 +17,7 @@ def test_a_failure_is_told_with_what_the_vehicle_may_do(error: BaseException, al
     def follow() -> None:
         raise error
 
-    flight: Any = Flight.__new__(Flight)
+    flight: Any = FlightSession.__new__(FlightSession)
     flight._runtime = SimpleNamespace(aloft=aloft)
     flight._feed = SimpleNamespace(post=lambda note: said.append(note.text))
     flight._follow, flight._close = follow, closed.append

@@ -1,15 +1,17 @@
 """What goes wrong in one run by a scenario: which runs may have it, when it happens, and what is told of it."""
 
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 
+from reference.flying import refusal_of
 from rtshcua.adapters.simulator import SimulatorError
-from rtshcua.app.fly.incidents import Incidents
-from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.incidents import Incidents, plan_incidents
 from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.scenario_option import chosen
 from rtshcua.model.flat.situation import Now
 
@@ -61,22 +63,30 @@ def source(tmp_path: Path) -> Path:
 
 
 def incidents(source: Path, name: str, **options: str | int | None) -> Incidents:
-    return Incidents(
-        chosen(f"{source}:{name}" if name else str(source), ISSUED_US), options.get("flavour"), options.get("seed")
-    )  # type: ignore[arg-type]
+    found = planned(source, name, **options)
+    assert isinstance(found, Incidents)
+    return found
+
+
+def planned(source: Path, name: str, **options: Any) -> Incidents | Refusal:
+    flight = chosen(f"{source}:{name}" if name else str(source), ISSUED_US)
+    if isinstance(flight, Refusal):
+        return flight
+    return plan_incidents(flight, options.get("flavour"), options.get("seed"))
 
 
 def prepared(source: Path) -> PreparedPolicy:
-    made = prepare(chosen(f"{source}:killed", ISSUED_US).policy.lowered.policy)
+    flight = chosen(f"{source}:killed", ISSUED_US)
+    assert not isinstance(flight, Refusal)
+    made = prepare(flight.policy.lowered.policy)
     assert isinstance(made, PreparedPolicy)
     return made
 
 
 def refused(source: Path, name: str, **options: str | int | None) -> str:
-    with pytest.raises(Refused) as caught:
-        incidents(source, name, **options)
-    assert caught.value.code == ExitCode.USAGE
-    return str(caught.value)
+    found = refusal_of(planned(source, name, **options))
+    assert found.code == ExitCode.USAGE
+    return found.text
 
 
 def test_what_a_vehicle_starts_with_goes_to_its_process(source: Path) -> None:
@@ -87,9 +97,8 @@ def test_what_a_vehicle_starts_with_goes_to_its_process(source: Path) -> None:
 
 def test_a_file_that_is_not_there_is_bad_input(source: Path) -> None:
     source.rename(source.with_name("flight.rts"))
-    with pytest.raises(Refused) as caught:
-        incidents(source, "")
-    assert (caught.value.code, str(caught.value)) == (
+    found = refusal_of(planned(source, ""))
+    assert (found.code, found.text) == (
         ExitCode.INPUT,
         f"cannot read `{source}`: there is no such file",
     )
@@ -132,6 +141,5 @@ def test_another_mission_than_the_scenarios_is_refused(source: Path) -> None:
         msgspec.structs.replace(mission, invocations=tuple(others)),
         msgspec.structs.replace(mission, invocations=(higher, *others)),
     ):
-        with pytest.raises(Refused) as caught:
-            made.begin(prepared(source), wrong, Vehicle())  # type: ignore[arg-type]
-        assert "flies another mission" in str(caught.value)
+        found = made.begin(prepared(source), wrong, Vehicle())  # type: ignore[arg-type]
+        assert "flies another mission" in refusal_of(found).text

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from rtshcua.app.fly import interrupts
-from rtshcua.app.fly.interrupts import Interrupts, Wish
+from rtshcua.app.fly import stop_wishes
+from rtshcua.app.fly.stop_wishes import Interrupts, Wish
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
 
 
 @pytest.fixture
 def at(monkeypatch: pytest.MonkeyPatch) -> Any:
     moment = [100.0]
-    monkeypatch.setattr(interrupts.time, "monotonic", lambda: moment[0])
+    monkeypatch.setattr(stop_wishes.time, "monotonic", lambda: moment[0])
     return moment
 
 

@@ -11,6 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.flat_case import MISSION, POLICY
+from reference.flying import context, refusal_of, request
 from reference.world import START, VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store import replay
@@ -19,10 +20,13 @@ from rtshcua.adapters.store.replay import FileReplayStore
 from rtshcua.adapters.store.signing import LinkStore, write_link_key
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.app.fly import replay_check
-from rtshcua.app.fly.previous_log import Past
+from rtshcua.app.fly.clearance import hanging, timestamps_lost
+from rtshcua.app.fly.connect import make_driver, sign_link
+from rtshcua.app.fly.link_signing import LinkSigning
+from rtshcua.app.fly.previous_log import LogBefore
+from rtshcua.app.fly.verify_bundle import may_have_flown, not_begun
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import launch
-from rtshcua.front.cli.configured import settings_of
+from rtshcua.front.cli.flight_options import settings_of
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.signal import SignalSource
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
@@ -34,9 +38,9 @@ START_CLOCK: Any = SimpleNamespace(now=lambda: START)
 
 def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
     FileReplayStore(tmp_path, VEHICLE).open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
-    with pytest.raises(launch.Refused, match="a later version of `bridge_inspection` than 7") as refused:
-        replay_check.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), [])
-    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "old-policy")
+    refused = refusal_of(replay_check.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), []))
+    assert "a later version of `bridge_inspection` than 7" in refused.text
+    assert (refused.code, refused.slug) == (ExitCode.REFUSED, "old-policy")
 
 
 @pytest.mark.parametrize(
@@ -53,11 +57,10 @@ def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_abou
     seen = ObservedVehicle(armed=armed, landed_state=landed_state)
     vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
     if resumes:
-        assert replay_check.broke_off(tmp_path, of, vehicle, SystemClock(), [])
+        assert replay_check.broke_off(tmp_path, of, vehicle, SystemClock(), []) is True
         return
-    with pytest.raises(launch.Refused) as refused:
-        replay_check.broke_off(tmp_path, of, vehicle, SystemClock(), [])
-    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "replayed")
+    refused = refusal_of(replay_check.broke_off(tmp_path, of, vehicle, SystemClock(), []))
+    assert (refused.code, refused.slug) == (ExitCode.REFUSED, "replayed")
 
 
 @pytest.mark.parametrize("damage", ["empty", "no-versions", "pipe", "no-folder", "gone", "full"])
@@ -84,17 +87,18 @@ def test_whatever_the_state_folder_says_what_flies_comes_down(
     seen = ObservedVehicle(armed=armed, landed_state=2 if armed else 1)
     vehicle: Any = SimpleNamespace(driver=SimpleNamespace(seen=seen), poll=lambda *_: [])
     if armed:
-        assert replay_check.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+        assert replay_check.broke_off(tmp_path, loaded(), vehicle, SystemClock(), []) is True
         return
-    with pytest.raises((launch.Refused, OSError)) as refused:
-        replay_check.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
-    if damage in ("empty", "no-versions"):
-        assert isinstance(refused.value, launch.Refused)
-        assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "damaged")
-        flight = Grounded()
-        with pytest.raises(launch.Refused, match="damaged"):
-            replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
-        assert flight.refused
+    if damage not in ("empty", "no-versions"):
+        with pytest.raises(OSError):
+            replay_check.broke_off(tmp_path, loaded(), vehicle, SystemClock(), [])
+        return
+    refused = refusal_of(replay_check.broke_off(tmp_path, loaded(), vehicle, SystemClock(), []))
+    assert (refused.code, refused.slug) == (ExitCode.REFUSED, "damaged")
+    flight = Grounded()
+    again = replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", flight))
+    assert "damaged" in refusal_of(again).text
+    assert flight.refused
 
 
 def full(path: Path, *_: object, **__: object) -> None:
@@ -121,21 +125,18 @@ def test_a_link_whose_timestamps_are_not_known_brings_home_what_flies(
     else:
         shutil.rmtree(tmp_path / "link")
         (tmp_path / "link").touch()
-    order: Any = SimpleNamespace(
-        signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False, unbuilt=False
-    )
-    of = loaded()
-    signing = launch._sign(order, of, SystemClock())
+    signing = sign_link(context(request(signing_key=key_file, state=tmp_path)), loaded())
+    assert isinstance(signing, LinkSigning)
     assert isinstance(signing.verifier, SignedLink), "it can be heard whether it flies"
     if resumed:
-        launch._expect_kept(signing, resumed=True)
+        assert timestamps_lost(signing, resumed=True) is None
         assert any("brought down all the same" in note for note in signing.notes)
+    elif damage == "damaged":
+        refused = refusal_of(timestamps_lost(signing, resumed=False))
+        assert (refused.code, refused.slug) == (ExitCode.UNTRUSTED, "link-key-damaged")
     else:
-        with pytest.raises((launch.Refused, OSError)) as refused:
-            launch._expect_kept(signing, resumed=False)
-        if damage == "damaged":
-            assert isinstance(refused.value, launch.Refused)
-            assert (refused.value.code, refused.value.slug) == (ExitCode.UNTRUSTED, "link-key-damaged")
+        with pytest.raises(OSError):
+            timestamps_lost(signing, resumed=False)
     signing.close()
 
 
@@ -153,8 +154,8 @@ def test_a_bundle_is_marked_once_and_of_two_runs_at_a_time_one_flies(tmp_path: P
     assert replay_check.flown_before(tmp_path, loaded()) is None
     replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", first))
     assert not first.refused
-    with pytest.raises(launch.Refused, match="a bundle flies once"):
-        replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", second))
+    again = replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", second))
+    assert "a bundle flies once" in refusal_of(again).text
     assert second.refused, "and its log is closed"
     assert replay_check.flown_before(tmp_path, loaded()) is not None
 
@@ -162,18 +163,16 @@ def test_a_bundle_is_marked_once_and_of_two_runs_at_a_time_one_flies(tmp_path: P
 @pytest.mark.parametrize("own", [True, False])
 def test_a_simulated_flight_and_a_real_one_use_up_no_bundle_of_each_other(tmp_path: Path, own: bool) -> None:
     """Nor does the policy that flew on the one forbid an older one on the other."""
-    orders: list[Any] = [
-        SimpleNamespace(state=tmp_path, link=link, wait_s=None) for link in (None, "udpin:127.0.0.1:1")
-    ]
+    orders = [request(state=tmp_path, link=link) for link in (None, "udpin:127.0.0.1:1")]
     flew, other = orders if own else reversed(orders)
     of = loaded()
-    replay_check.mark_opened(launch._left_in(flew), of, SystemClock(), cast("Any", Grounded()))
-    assert "a bundle flies once" in (launch._not_begun(flew, of, START_CLOCK) or "")
-    assert launch._not_begun(other, of, START_CLOCK) is None
-    assert (launch._may_have_flown(flew, of), launch._may_have_flown(other, of)) == (True, False)
-    older = FileReplayStore(launch._left_in(flew), VEHICLE)
+    replay_check.mark_opened(flew.kept_in, of, SystemClock(), cast("Any", Grounded()))
+    assert "a bundle flies once" in (not_begun(flew, of, START_CLOCK) or "")
+    assert not_begun(other, of, START_CLOCK) is None
+    assert (may_have_flown(flew, of), may_have_flown(other, of)) == (True, False)
+    older = FileReplayStore(flew.kept_in, VEHICLE)
     older.open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
-    assert launch._not_begun(other, of, START_CLOCK) is None
+    assert not_begun(other, of, START_CLOCK) is None
 
 
 def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -> None:
@@ -187,11 +186,11 @@ def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -
 def test_a_policy_that_reads_what_no_vehicle_sends() -> None:
     (first, *others) = POLICY.signals
     signals = (replace(first, sources=(SignalSource("BATTERY_STATUS", ("nope",), 1, 1, ()),)), *others)
-    order: Any = SimpleNamespace(sortie=None, fence=True, dry_run=False, system=None)
     signing: Any = SimpleNamespace(verifier=None)
-    with pytest.raises(launch.Refused, match=r"`BATTERY_STATUS\.nope`") as refused:
-        launch._driver(order, loaded(replace(POLICY, signals=signals), MISSION), 1, signing)
-    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "unknown-source")
+    found = make_driver(context(), loaded(replace(POLICY, signals=signals), MISSION), signing, fence=True)
+    refused = refusal_of(found)
+    assert "`BATTERY_STATUS.nope`" in refused.text
+    assert (refused.code, refused.slug) == (ExitCode.REFUSED, "unknown-source")
 
 
 class Over:
@@ -215,23 +214,23 @@ def test_a_flight_whose_log_is_gone_is_not_said_to_have_broken_off(tmp_path: Pat
     log = tmp_path / "runs" / "1" / "log.jsonl"
     log.parent.mkdir(parents=True)
     log.touch()
-    first = Past(tmp_path, VEHICLE, None)
+    first = LogBefore.settle(tmp_path, VEHICLE, None)
     first.begin(log)
     first._held.close()
-    before = Past(tmp_path, VEHICLE, None)
-    assert "before broke off" in launch._hanging(before, loaded())
+    before = LogBefore.settle(tmp_path, VEHICLE, None)
+    assert "before broke off" in hanging(before, loaded())
     shutil.rmtree(log.parent)
-    told = launch._hanging(Past(tmp_path, VEHICLE, None), loaded())
+    told = hanging(LogBefore.settle(tmp_path, VEHICLE, None), loaded())
     assert "is no longer there: whether its flight ended is not known" in told
     assert "broke off" not in told
 
 
 def test_what_a_simulated_flight_leaves_is_not_the_connected_vehicles(tmp_path: Path) -> None:
     """Its log, and the parameters that it set: neither is brought down or put back on the real one."""
-    simulated, real = (launch._left_in(cast("Any", SimpleNamespace(state=tmp_path, link=link))) for link in (None, 1))
+    simulated, real = (request(state=tmp_path, link=link).kept_in for link in (None, 1))
     log = tmp_path / "log.jsonl"
     log.touch()
-    Past(simulated, VEHICLE, None).begin(log)
+    LogBefore.settle(simulated, VEHICLE, None).begin(log)
     owed = OwedParameters(simulated, VEHICLE, sets=True)
     owed.keep(
         {"FENCE_RADIUS": Owed(*settings_of(["FENCE_RADIUS=50"]).values(), *settings_of(["FENCE_RADIUS=300"]).values())}
@@ -239,8 +238,11 @@ def test_what_a_simulated_flight_leaves_is_not_the_connected_vehicles(tmp_path: 
     owed.close()
     assert OwedParameters(simulated, VEHICLE).left
     assert not OwedParameters(real, VEHICLE).left
-    assert Past(simulated, VEHICLE, None).broken_off == tmp_path
-    assert (Past(real, VEHICLE, None).note, Past(real, VEHICLE, None).broken_off) == ("", None)
+    assert LogBefore.settle(simulated, VEHICLE, None).broken_off == tmp_path
+    assert (LogBefore.settle(real, VEHICLE, None).note, LogBefore.settle(real, VEHICLE, None).broken_off) == (
+        "",
+        None,
+    )
 
 
 def late(us: int) -> Now:

@@ -4,8 +4,7 @@ import gc
 
 import pytest
 
-from rtshcua.app.fly.log_signer import LogSigner
-from rtshcua.app.fly.refused import Refused
+from rtshcua.app.fly.verify_bundle import LogNotSigned, LogSigner
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire.keys import Duty, SigningKey
 
@@ -34,6 +33,6 @@ def test_this_process_signs_until_the_key_is_handed_over() -> None:
 def test_what_the_boundary_does_not_sign_does_not_fly() -> None:
     signer = LogSigner(key())
     signer.hand_over(lambda _: Refusal("not-its-log", "the boundary refuses it"))
-    with pytest.raises(Refused, match="does not sign the log") as refused:
+    with pytest.raises(LogNotSigned, match="does not sign the log") as refused:
         signer.sign(TEXT)
-    assert refused.value.slug == "boundary-not-its-log"
+    assert refused.value.refusal.slug == "boundary-not-its-log"

@@ -5,13 +5,14 @@ from typing import Any
 
 import pytest
 
+from reference.flying import context, request
 from rtshcua.adapters.clock import PacedClock, SystemClock
 from rtshcua.adapters.utc import UtcWatch
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.adapters.vehicle.source_time import SourceTime
 from rtshcua.app.fly import connect
-from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.simulation.simulated_mark import marked
 
 
@@ -58,8 +59,8 @@ def test_it_is_not_ready_before_all_that_is_asked_of_it_first_is_known(monkeypat
     utc = UtcWatch(clock, 500_000, kernel_us=lambda: None)
     now = clock.now()
     link: Any = object()
-    never: Any = SimpleNamespace(wish=lambda: None)
-    connect.meet(link, None, vehicle, clock, never, signing=never, hurried=False)  # type: ignore[arg-type]
+    never: Any = None
+    connect.await_heartbeat(context(request(link=link), clock), vehicle, never, hurried=False)  # type: ignore[arg-type]
     connect.await_utc(utc, vehicle, clock, now.utc_us, patient=True)  # type: ignore[arg-type]
     assert vehicle.polls > 2
     assert min(vehicle.ready_from_us) > now.monotonic_us + 10**15
@@ -90,14 +91,14 @@ class Telling(Silent):
         return super().poll(now_us, timeout_us)
 
 
-def met_at(speed: float, custom: tuple[list[int], list[int]] | None, monkeypatch: pytest.MonkeyPatch) -> Telling:
+def met_at(
+    speed: float, custom: tuple[list[int], list[int]] | None, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Telling, Any]:
     monkeypatch.setattr(connect, "ANOTHER_S", 0)
     monkeypatch.setattr(connect, "SPEED_S", 0.02)
-    vehicle, link = Telling(custom), object()
-    never: Any = SimpleNamespace(wish=lambda: None)
-    clock = PacedClock(speed)
-    connect.meet(link, None, vehicle, clock, never, never, hurried=False, speed=speed)  # type: ignore[arg-type]
-    return vehicle
+    vehicle, of, never = Telling(custom), request(link=object(), speed=speed), None
+    found = connect.await_heartbeat(context(of, PacedClock(speed)), vehicle, never, hurried=False)  # type: ignore[arg-type]
+    return vehicle, found
 
 
 @pytest.mark.parametrize("speed", [10, 1.01, 0.5, 2])
@@ -116,18 +117,19 @@ def test_another_speed_than_that_of_life_is_believed_of_no_vehicle_that_does_not
     """An autopilot behind a router at 127.0.0.1 was flown with `--speed 10` on a machine whose time nobody knew: as
     simulated, with a time of day that was true to 0.1 s.
     """
-    with pytest.raises(Refused) as refused:
-        met_at(speed, custom, monkeypatch)
-    assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, slug)
+    _, found = met_at(speed, custom, monkeypatch)
+    assert isinstance(found, Refusal)
+    assert (found.code, found.slug) == (ExitCode.REFUSED, slug)
 
 
 @pytest.mark.parametrize("speed", [10, 1.01, 0.5, 2])
 def test_a_simulated_vehicle_is_met_at_the_speed_that_it_says(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    vehicle = met_at(speed, marked(round(speed * 100)), monkeypatch)
+    vehicle, found = met_at(speed, marked(round(speed * 100)), monkeypatch)
+    assert found == []
     assert vehicle.asked_before_ready, "nothing begins before it is known"
     assert vehicle.driver.asks_first is None
     assert vehicle.driver.issued_from_us == 0
 
 
 def test_at_the_speed_of_life_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not met_at(1, None, monkeypatch).asked_before_ready
+    assert not met_at(1, None, monkeypatch)[0].asked_before_ready

@@ -1,17 +1,17 @@
 """Where `run` decides: in a process of its own before a vehicle of others, where there is a program for it."""
 
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
+from reference.flying import context, request
 from reference.world import loaded
 from rtshcua.adapters.boundary_process import UNBUILT, Measure
-from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
+from rtshcua.app.fly.connect import sign_link
+from rtshcua.app.fly.link_signing import LinkSigning
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import connection, doctor, launch
+from rtshcua.front.cli import doctor, flight_options
 from rtshcua.front.cli.app import main
 from rtshcua.library import root as library
 from rtshcua.onboard.enforcement.load import EnforcementMode
@@ -42,24 +42,23 @@ def test_the_mode_that_counts(
     found: tuple[EnforcementMode, bool],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(connection, "program", lambda: BUILT if built else None)
-    assert connection.mode_of(asked, own=own, named=named) == found
+    monkeypatch.setattr(flight_options, "program", lambda: BUILT if built else None)
+    assert flight_options.mode_of(asked, own=own, named=named) == found
 
 
 @pytest.mark.parametrize("unbuilt", [True, False])
 def test_a_run_says_that_there_is_no_program(tmp_path: Path, unbuilt: bool) -> None:
-    order: Any = SimpleNamespace(
-        signing_key=None, state=tmp_path, unsigned_radio=False, link=None, dry_run=False, unbuilt=unbuilt
-    )
-    assert any(UNBUILT in note for note in launch._sign(order, loaded(), SystemClock()).notes) == unbuilt
+    signing = sign_link(context(request(state=tmp_path, unbuilt=unbuilt)), loaded())
+    assert isinstance(signing, LinkSigning)
+    assert any(UNBUILT in note for note in signing.notes) == unbuilt
 
 
 @pytest.mark.parametrize("built", [True, False])
 def test_the_doctor_says_whether_there_is_one(built: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (doctor, connection):
+    for module in (doctor, flight_options):
         monkeypatch.setattr(module, "program", lambda: BUILT if built else None)
     monkeypatch.setattr(doctor, "measures_here", lambda user: ~Measure(0))
-    mode, _ = connection.mode_of(None, own=False, named=False)
+    mode, _ = flight_options.mode_of(None, own=False, named=False)
     finding, *_ = doctor._boundary(mode)
     assert finding.verdict is (MissionVerdict.OK if built else MissionVerdict.WARN)
     assert (finding.found == UNBUILT) != built

@@ -8,7 +8,7 @@ import pytest
 
 from reference.crashed import LOG_KEY, signer, writes
 from rtshcua.adapters.store.recovery import InUse, recover
-from rtshcua.app.fly.previous_log import Past
+from rtshcua.app.fly.previous_log import LogBefore
 
 
 @pytest.fixture
@@ -18,8 +18,8 @@ def log(tmp_path: Path) -> Path:
     return path
 
 
-def past(tmp_path: Path) -> Past:
-    return Past(tmp_path / "state", "quad-07", LOG_KEY)
+def past(tmp_path: Path) -> LogBefore:
+    return LogBefore.settle(tmp_path / "state", "quad-07", LOG_KEY)
 
 
 def test_a_log_under_way_is_held_and_then_ended_by_the_next(tmp_path: Path, log: Path) -> None:

@@ -10,8 +10,8 @@ import pytest
 from rtshcua import library
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES
 from rtshcua.adapters.store.qualifications import keep_record
-from rtshcua.front.cli import qualify as command
-from rtshcua.front.cli.qualify import _planned
+from rtshcua.app.fly import sorties as sorties_flown
+from rtshcua.app.fly.sorties import plan_sorties
 from rtshcua.front.cli.showing.qualification import told
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.qualification import (
@@ -83,7 +83,7 @@ def test_a_policy_that_permits_no_leg_is_refused(commands: Forked, own_world: No
     ],
 )
 def test_nobody_takes_over_a_real_vehicle_but_its_pilot(words: Any, flown: Any, missing: set[str]) -> None:
-    sorties, why = _planned(**words)
+    sorties, why = plan_sorties(**words)
     assert sorties == flown
     assert why.keys() == missing
     assert all(why.values())
@@ -115,17 +115,16 @@ def test_the_table_says_what_failed_and_why() -> None:
     assert why.startswith("not flown: leg; ")
 
 
-def test_a_partial_record_replaces_no_whole_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command, "data_folder", lambda: tmp_path)
+def test_a_partial_record_replaces_no_whole_one(tmp_path: Path) -> None:
     held = QualificationCheck("land/down", CheckOutcome.HELD, "", "")
     sorties = [QualificationCheck(f"sortie/{name}", CheckOutcome.HELD, "", "") for name in ("climb", "leg")]
-    trial: Any = SimpleNamespace(policy=SimpleNamespace(vehicle=SimpleNamespace(identity="quad-07")))
-    assert not command.Qualifying._was_whole(trial)
+    trial: Any = SimpleNamespace(data=tmp_path, policy=SimpleNamespace(vehicle=SimpleNamespace(identity="quad-07")))
+    assert not sorties_flown.Qualifying._was_whole(trial)
     for checks, whole in (([held, sorties[0]], False), ([held, *sorties], True)):
         keep_record(tmp_path, "quad-07", sign_qualification(record(*checks), case.KEYS[Duty.LOG]))
-        assert command.Qualifying._was_whole(trial) is whole
+        assert sorties_flown.Qualifying._was_whole(trial) is whole
     keep_record(tmp_path, "quad-07", b"nonsense")
-    assert not command.Qualifying._was_whole(trial)
+    assert not sorties_flown.Qualifying._was_whole(trial)
 
 
 def test_a_record_is_shown_unverified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,23 +2,23 @@
 
 import hashlib
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from reference.flying import context, refusal_of, request
 from reference.world import VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store import memory
 from rtshcua.adapters.store.signing import LinkStore, read_link_key, write_link_key
 from rtshcua.adapters.vehicle import address
-from rtshcua.app.fly.connect import unmet
-from rtshcua.app.fly.link_signing import Signing
+from rtshcua.app.fly.clearance import timestamps_lost
+from rtshcua.app.fly.connect import sign_link, stranded_signal, unmet
+from rtshcua.app.fly.link_signing import LinkSigning
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import app, launch
+from rtshcua.front.cli import app
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.mavlink.signing import SignedLink, SigningState
@@ -65,7 +65,7 @@ def test_a_key_of_a_passphrase_is_the_ground_stations(tmp_path: Path) -> None:
 
 def test_without_a_key_nothing_is_signed(tmp_path: Path) -> None:
     of = loaded()
-    signing = Signing(None, of.bundle.policy, of.executor.frames, tmp_path, SystemClock(), unsigned_radio=False)
+    signing = LinkSigning(None, of.bundle.policy, of.executor.frames, tmp_path, SystemClock(), unsigned_radio=False)
     of.executor.frames.observe(HEARTBEAT)
     assert of.executor.frames.seal(OWN, 0) == OWN
     assert signing.verifier is None
@@ -76,7 +76,7 @@ def test_without_a_key_nothing_is_signed(tmp_path: Path) -> None:
 
 def test_with_a_key_what_leaves_is_signed_and_its_timestamps_are_kept(tmp_path: Path, key_file: Path) -> None:
     of = loaded()
-    signing = Signing(key_file, of.bundle.policy, of.executor.frames, tmp_path, SystemClock(), unsigned_radio=False)
+    signing = LinkSigning(key_file, of.bundle.policy, of.executor.frames, tmp_path, SystemClock(), unsigned_radio=False)
     of.executor.frames.observe(HEARTBEAT)
     sealed = of.executor.frames.seal(OWN, SystemClock().now().monotonic_us)
     assert isinstance(sealed, bytes)
@@ -92,7 +92,7 @@ def test_with_a_key_what_leaves_is_signed_and_its_timestamps_are_kept(tmp_path: 
 @pytest.mark.parametrize("policy", [POLICY, replace(POLICY, signals=())], ids=["reads it", "does not"])
 def test_the_radio_may_be_let_in(tmp_path: Path, key_file: Path, policy: Policy) -> None:
     for let_in in (False, True):
-        signing = Signing(key_file, policy, FrameSession(), tmp_path, SystemClock(), unsigned_radio=let_in)
+        signing = LinkSigning(key_file, policy, FrameSession(), tmp_path, SystemClock(), unsigned_radio=let_in)
         assert isinstance(signing.verifier, UnsignedRadio) == let_in
         assert bool(signing.notes) == (not let_in and policy is POLICY), "who needs it is told"
         signing.close()
@@ -109,17 +109,10 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
         key_file.write_bytes(b"no key")
     elif what == "damaged":
         store.path.write_bytes(b"{")
-    of, order = (
-        loaded(),
-        SimpleNamespace(
-            signing_key=key_file, state=tmp_path, unsigned_radio=False, link=None, dry_run=False, unbuilt=False
-        ),
-    )
-    asked: Any = order
-    with pytest.raises(launch.Refused) as refused:
-        launch._expect_kept(launch._sign(asked, of, SystemClock()), resumed=False)
+    signing = sign_link(context(request(signing_key=key_file, state=tmp_path)), loaded())
+    refused = refusal_of(timestamps_lost(signing, resumed=False) if isinstance(signing, LinkSigning) else signing)
     code = ExitCode.INPUT if what == "malformed" else ExitCode.UNTRUSTED
-    assert (refused.value.code, refused.value.slug) == (code, f"link-key-{what}")
+    assert (refused.code, refused.slug) == (code, f"link-key-{what}")
     if what == "in-use":
         store.close()
     if what == "damaged":
@@ -131,10 +124,9 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
 )
 def test_a_link_without_a_key_that_others_may_reach_is_told_of(tmp_path: Path, link: str | None, told: bool) -> None:
     at = None if link is None else address.parse(link)
-    order: Any = SimpleNamespace(
-        signing_key=None, state=tmp_path, unsigned_radio=False, link=at, dry_run=False, unbuilt=False
-    )
-    assert any("speak as the vehicle" in note for note in launch._sign(order, loaded(), SystemClock()).notes) == told
+    signing = sign_link(context(request(state=tmp_path, link=at)), loaded())
+    assert isinstance(signing, LinkSigning)
+    assert any("speak as the vehicle" in note for note in signing.notes) == told
 
 
 def test_letting_the_radio_in_goes_with_a_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -144,7 +136,7 @@ def test_letting_the_radio_in_goes_with_a_key(tmp_path: Path, capsys: pytest.Cap
 
 def test_frames_that_another_key_signed_are_told_of(tmp_path: Path, key_file: Path) -> None:
     clock = SystemClock()
-    signing = Signing(key_file, POLICY, FrameSession(), tmp_path, clock, unsigned_radio=False)
+    signing = LinkSigning(key_file, POLICY, FrameSession(), tmp_path, clock, unsigned_radio=False)
     now = clock.now()
     link, other = signing.verifier, SignedLink(bytes(range(1, 33)), SigningState(0, {}), now.utc_us, now.monotonic_us)
     assert isinstance(link, SignedLink)
@@ -153,7 +145,7 @@ def test_frames_that_another_key_signed_are_told_of(tmp_path: Path, key_file: Pa
     assert signing.rejected == "frames come, and none is believed: 1 not signed"
     link.accept(other.sign(HEARTBEAT, now.monotonic_us), now.monotonic_us)
     assert "1 signed with another key, 1 not signed" in (signing.rejected or "")
-    _, text, help = unmet("a vehicle", 10, None, signing.rejected, "nothing else matters then")
+    _, text, help, _ = unmet("a vehicle", 10, None, signing.rejected, "nothing else matters then")
     assert text.startswith("no heartbeat of a vehicle within 10 s: frames come")
     assert "--signing-key" in help
     right = SignedLink(KEY, SigningState(0, {}), now.utc_us, now.monotonic_us, link=1)
@@ -168,15 +160,15 @@ def test_a_mission_that_would_wait_for_the_radio_in_vain_does_not_begin(
 ) -> None:
     of = loaded(case.policy(), case.mission(case.short_steps()))
     frames = of.executor.frames
-    signing = Signing(key_file, of.bundle.policy, frames, tmp_path, SystemClock(), unsigned_radio=let_in)
-    order: Any = SimpleNamespace(dry_run=dry)
+    signing = LinkSigning(key_file, of.bundle.policy, frames, tmp_path, SystemClock(), unsigned_radio=let_in)
+    found = stranded_signal(request(dry_run=dry), of, signing)
     if flies:
-        launch._hear(order, of, signing)
+        assert found is None
     else:
-        with pytest.raises(launch.Refused, match="RADIO_STATUS") as refused:
-            launch._hear(order, of, signing)
-        assert (refused.value.code, refused.value.slug) == (ExitCode.REFUSED, "signal-unsigned")
-        assert "--unsigned-radio" in (refused.value.help or "")
+        refused = refusal_of(found)
+        assert (refused.code, refused.slug) == (ExitCode.REFUSED, "signal-unsigned")
+        assert "RADIO_STATUS" in refused.text
+        assert "--unsigned-radio" in refused.help
     signing.close()
 
 
@@ -184,13 +176,13 @@ def test_memory_that_is_somebody_elses_is_told_at_the_start(
     tmp_path: Path, key_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(memory, "_FOLDER", tmp_path)
-    signing = Signing(key_file, POLICY, FrameSession(), tmp_path, SystemClock(), unsigned_radio=False)
+    signing = LinkSigning(key_file, POLICY, FrameSession(), tmp_path, SystemClock(), unsigned_radio=False)
     signing.close()
     assert not any("own file" in note for note in signing.notes)
     store = LinkStore(tmp_path, POLICY.vehicle.identity, KEY)
     there = memory.memory_file(store.heard._name)
     store.close()
     there.symlink_to(tmp_path / "elsewhere")
-    signing = Signing(key_file, POLICY, FrameSession(), tmp_path, SystemClock(), unsigned_radio=False)
+    signing = LinkSigning(key_file, POLICY, FrameSession(), tmp_path, SystemClock(), unsigned_radio=False)
     signing.close()
     assert [note for note in signing.notes if "own file" in note and str(there) in note]

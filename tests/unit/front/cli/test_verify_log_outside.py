@@ -10,7 +10,7 @@ from reference.forgery import LOG_KEY, edit, flight, signed
 from reference.marked import mark, note_of
 from rtshcua.adapters.store.recovery import examine
 from rtshcua.app import verify_log
-from rtshcua.app.fly.simulated_flight import SIMULATED, told
+from rtshcua.app.fly.simulated_flight import SIMULATED, pace_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.recovery import ending
 from rtshcua.evidence.report import LogReport
@@ -109,10 +109,10 @@ def test_a_log_that_must_be_anchored_and_too_few_cosigned() -> None:
 
 
 def test_how_fast_a_flight_was() -> None:
-    assert told(1, own=False) is None
-    assert told(1, own=True) == "a simulated vehicle, as fast as life"
-    assert told(10, own=True) == "a simulated vehicle, 10 times as fast as life"
-    assert told(0.5, own=False) == "a simulated vehicle, 0.5 times as fast as life"
+    assert pace_of(1, own=False) is None
+    assert pace_of(1, own=True) == "a simulated vehicle, as fast as life"
+    assert pace_of(10, own=True) == "a simulated vehicle, 10 times as fast as life"
+    assert pace_of(0.5, own=False) == "a simulated vehicle, 0.5 times as fast as life"
 
 
 def test_a_missing_log_is_told_and_the_others_come_all_the_same(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -170,7 +170,7 @@ def test_a_recovered_flight_lasted_until_its_last_record(log: Path, capsys: pyte
 def test_a_simulated_flight_says_so(how: list[str], number: int, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(log, *how) == ExitCode.OK
     assert "simulated vehicle" not in capsys.readouterr().out
-    detail = told(10, own=True)
+    detail = pace_of(10, own=True)
     lines = list(flight())
     lines[number] = edit(lines[number], event=SIMULATED, detail=detail)
     log.write_bytes(b"".join(signed(lines)))

@@ -18,9 +18,8 @@ from rtshcua.adapters.agent_socket import flight_at, hand_in
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.app.fly import waiting
 from rtshcua.app.fly.agents import Agents
-from rtshcua.app.fly.interrupts import Interrupts, Wish
-from rtshcua.app.fly.refused import Refused
-from rtshcua.app.fly.waiting import Admitted, Waiting
+from rtshcua.app.fly.stop_wishes import Interrupts, Wish
+from rtshcua.app.fly.waiting import Admitted, MissionWait
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.console import TerminalConsole
@@ -76,29 +75,22 @@ class World:
         self.agents = Agents(self.path, base, waits=True)
         self.vehicle, self.interrupts = Vehicle(base), Wished()
         self.tried: list[bytes] = []
-        self.superseded: Refused | None = None
+        self.newer: Refusal | None = None
         self.flies = low()
         vehicle: Any = self.vehicle
-        self.waiting = Waiting(
-            base, self.admit, self.expect, vehicle, Clock(), self.interrupts, self.agents,
+        self.waiting = MissionWait(
+            base, self.admit, lambda: self.newer, lambda: None, vehicle, Clock(), self.interrupts, self.agents,
             console=TerminalConsole("json", Path(), None), most_s=most_s, notes=["a note"],
         )  # fmt: skip
-        self.ended: Admitted | Refused | None = None
+        self.ended: Admitted | Refusal | None = None
         self.thread = threading.Thread(target=self.run)
 
     def admit(self, data: bytes) -> Loaded | Refusal:
         self.tried.append(data)
         return self.flies if data == BUNDLE else Refusal("untrusted", "not to be trusted")
 
-    def expect(self) -> None:
-        if self.superseded is not None:
-            raise self.superseded
-
     def run(self) -> None:
-        try:
-            self.ended = self.waiting.follow([])
-        except Refused as refused:
-            self.ended = refused
+        self.ended = self.waiting.follow([])
 
     def hand(self, document: bytes) -> str:
         return hand_in(self.path, document).slug
@@ -192,19 +184,19 @@ def test_who_follows_is_told_that_nothing_flies_and_how_the_vehicle_is(begin: Ca
 def test_a_recall_ends_it(begin: Callable[..., World]) -> None:
     world = begin()
     assert world.hand(recall(world.base)) == "accepted"
-    refused = cast("Refused", world.end())
+    refused = cast("Refusal", world.end())
     assert (refused.code, refused.slug) == (ExitCode.ABORTED, "recalled")
 
 
 def test_ctrl_c_ends_it(begin: Callable[..., World]) -> None:
     world = begin()
     world.interrupts.asked.set()
-    refused = cast("Refused", world.end())
+    refused = cast("Refusal", world.end())
     assert (refused.code, refused.slug) == (ExitCode.INTERRUPTED, "interrupted")
 
 
 def test_it_does_not_wait_for_ever(begin: Callable[..., World]) -> None:
-    refused = cast("Refused", begin(most_s=0.05).end())
+    refused = cast("Refusal", begin(most_s=0.05).end())
     assert (refused.code, refused.slug) == (ExitCode.REFUSED, "nothing-handed-in")
 
 
@@ -223,6 +215,6 @@ def test_lines_that_are_none_are_answered(begin: Callable[..., World]) -> None:
 
 def test_once_the_vehicle_has_another_root_the_wait_is_over(begin: Callable[..., World]) -> None:
     world = begin()
-    world.superseded = Refused(ExitCode.UNTRUSTED, "root-superseded", "the trust root changed meanwhile")
-    assert world.end() is world.superseded
+    world.newer = Refusal("root-superseded", "the trust root changed meanwhile")
+    assert world.end() is world.newer
     assert world.tried == []

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from reference.flying import refusal_of
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.witness_link import Anchor, WitnessTrouble
 from rtshcua.app.fly import witnesses
-from rtshcua.app.fly.refused import Refused
-from rtshcua.app.fly.witnesses import Witnessing, addresses
+from rtshcua.app.fly.witnesses import addresses, find_witnesses
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.onboard.ports import Anchored, Noted
 
@@ -42,16 +42,15 @@ def test_addresses() -> None:
 
 
 def test_without_witnesses_there_is_nothing(tmp_path: Path) -> None:
-    nobody = Witnessing((), frozenset())
+    nobody = find_witnesses((), frozenset())
     nobody.begin(tmp_path / "none", lambda: 0)
     assert nobody.events(0) == []
     nobody.finish(pytest.fail, closed=True)
 
 
 def test_a_root_that_names_none() -> None:
-    with pytest.raises(Refused) as refused:
-        Witnessing([THERE], frozenset())
-    assert (refused.value.code, refused.value.slug) == (ExitCode.UNTRUSTED, "no-witness")
+    refused = refusal_of(find_witnesses([THERE], frozenset()))
+    assert (refused.code, refused.slug) == (ExitCode.UNTRUSTED, "no-witness")
 
 
 def test_a_host_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,15 +58,14 @@ def test_a_host_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
         raise socket.gaierror(-2, "Name or service not known")
 
     monkeypatch.setattr(witnesses.socket, "gethostbyname", unknown)
-    with pytest.raises(Refused) as refused:
-        Witnessing([Address("udpout", "nowhere", 1)], KEYS)
-    assert (refused.value.code, refused.value.slug) == (ExitCode.LINK, "witness-address")
+    refused = refusal_of(find_witnesses([Address("udpout", "nowhere", 1)], KEYS))
+    assert (refused.code, refused.slug) == (ExitCode.LINK, "witness-address")
 
 
 def test_what_comes_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(witnesses, "WitnessClient", Client)
     for closed, waited in ((True, ()), (False, (0,))):
-        made = Witnessing([THERE], KEYS)
+        made = find_witnesses([THERE], KEYS)
         made.begin(tmp_path / "log.jsonl", lambda: 0)
         assert made.events(7) == [Anchored(7, "a note"), Noted(7, "a word")]
         said: list[str] = []

@@ -5,11 +5,12 @@ from msgspec.structs import replace
 from reference.flat_case import CONTRACTS, MISSION, POLICY, TAKEOFF, WIND, M, S, apply, clause, const, signal
 from reference.forgery import edit
 from reference.world import START, FakeVehicle, Run, loaded
+from rtshcua.app.fly.dry_run import FlightRehearsal
 from rtshcua.app.fly.narrator import Teller
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
-from rtshcua.front.cli import dry_run
 from rtshcua.front.cli.live.lines import sentence
+from rtshcua.front.cli.showing import rehearsed
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import State
@@ -72,7 +73,7 @@ def test_a_first_step_that_waits_to_have_observed_enough_would_fly(
 def test_a_rehearsal_says_what_it_waits_for() -> None:
     of, values = waiting(), FakeVehicle().values
     state = State(tuple(values[slot] for slot in range(len(values))), (10_000,) * len(values), (UNKNOWN, UNKNOWN))
-    page = str(dry_run._page(of, rehearse(of, state, START), None, None))
+    page = str(rehearsed._page(FlightRehearsal(of, rehearse(of, state, START), (), None, None, interrupted=False)))
     assert "waits until it was observed for as long as it looks back, from the run on" in " ".join(page.split())
     assert "1 waiting for what will come, 0 would not fly" in page
 

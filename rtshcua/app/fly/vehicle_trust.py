@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 from rtshcua.adapters.store.keystore import KeyStore, read_root
 from rtshcua.adapters.store.roots import RootStore, in_force, opened
 from rtshcua.app.exit_codes import code_of, exit_code_of, untrusted, words_of
-from rtshcua.app.fly.refused import Refused
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire import cose
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
@@ -44,41 +44,37 @@ class Trusted(NamedTuple):
     accepted: bytes | None = None
     keeps: bool = False
     news: str = ""
-    distrust: Refused | None = None
+    distrust: Refusal | None = None
 
-    def before(self, refused: Refused) -> Iterator["Trusted"]:
+    def before(self, refused: Refusal) -> Iterator["Trusted"]:
         """The roots under which the bundle may have begun to fly, where something was revoked or has expired since."""
         if refused.slug in (REVOKED, *LAPSED):
             for signed in (self.signed, *self.others):
                 with suppress(Untrusted):
                     yield Trusted(opened(signed), signed, distrust=self.distrust or refused)
 
-    def expect(self) -> None:
-        """Raises `Refused` where nothing may fly under it."""
-        if self.distrust is not None:
-            raise self.distrust
-
-    def expect_latest(self) -> None:
-        """Raises `Refused` where the vehicle accepted another root since this one was looked up: it may revoke keys."""
+    def superseded(self) -> Refusal | None:
+        """Why nothing new flies under it: the vehicle accepted another root since, which may revoke keys."""
         if self.store is None:
-            return
+            return None
         try:
             accepted = self.store.kept()
         except (Untrusted, OSError) as error:
-            raise _refused(error) from None
+            return _refusal(error)
         if accepted not in (self.accepted, self.signed):
             text = f"the vehicle's trust root changed meanwhile: it is no longer version {self.root.version}"
-            raise Refused(ExitCode.UNTRUSTED, "root-superseded", text, HELPS["superseded"])
+            return Refusal("root-superseded", text, HELPS["superseded"], ExitCode.UNTRUSTED)
+        return None
 
-    def settle(self, *, resumed: bool) -> str:
+    def settle(self, *, resumed: bool) -> str | Refusal:
         """What there is to tell. The vehicle accepts the root, unless it is in the air and comes down as it began.
-
-        Raises `Refused`, and OSError where that cannot be kept.
+        Raises OSError where that cannot be kept.
         """
         if resumed:
-            return f"{self.distrust}; it is brought down all the same" if self.distrust is not None else ""
-        self.expect()
-        self.expect_latest()
+            return f"{self.distrust.text}; it is brought down all the same" if self.distrust is not None else ""
+        refusal = self.distrust or self.superseded()
+        if refusal is not None:
+            return refusal
         if self.store is not None and self.keeps:
             self.store.keep(self.signed)
         return self.news
@@ -95,7 +91,7 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
     try:
         kept = None if store is None else store.kept()
     except (Untrusted, OSError) as error:
-        distrust = _refused(error)
+        distrust = _refusal(error)
     chain = _given(roots, data, needed=kept is None)
     try:
         signed = in_force(kept, chain, named=bool(roots), now_us=now_us)
@@ -103,11 +99,11 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
     except Untrusted as error:
         if error.slug in LAPSED:
             signed = in_force(kept, chain, named=bool(roots), now_us=0)
-            distrust = distrust or Refused(code_of(error.slug), *untrusted(error))
+            distrust = distrust or untrusted(error)
         elif kept is None or not chain:
             raise
         else:
-            signed, distrust = chain[-1], _refused(error)
+            signed, distrust = chain[-1], _refusal(error)
     root = opened(signed)
     others = tuple(each for each in (*reversed(chain), kept) if each not in (None, signed))
     keeps = store is not None and signed != kept and not (kept is None and root.development)
@@ -133,11 +129,11 @@ def _named(path: Path) -> bytes:
     return signed
 
 
-def _refused(error: Untrusted | OSError) -> Refused:
+def _refusal(error: Untrusted | OSError) -> Refusal:
     if isinstance(error, OSError):
-        return Refused(exit_code_of(error), "unread", f"{words_of(error)}: `{error.filename}`", HELPS["damaged"])
-    _, text, help = untrusted(error)
-    return Refused(code_of(error.slug), f"root-{error.slug}", text, HELPS.get(error.slug) or help)
+        return Refusal("unread", f"{words_of(error)}: `{error.filename}`", HELPS["damaged"], exit_code_of(error))
+    help = HELPS.get(error.slug) or untrusted(error).help
+    return Refusal(f"root-{error.slug}", str(error), help, code_of(error.slug))
 
 
 def _open(signed: bytes, now_us: int) -> TrustRoot:

@@ -3,47 +3,44 @@
 import secrets
 import shlex
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtshcua.adapters.clock import LinkClock, StepWatch
+from rtshcua.adapters.clock import StepWatch
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop, append_all
 from rtshcua.adapters.preparation import Preparations
 from rtshcua.adapters.store.owed import OwedParameters
-from rtshcua.adapters.store.runs import LOG, RunFolder
+from rtshcua.adapters.store.runs import BUNDLE, LOG, RunFolder
 from rtshcua.adapters.store.writer import EvidenceWriter
-from rtshcua.adapters.utc import CLOCK, UtcWatch, certain_from_us
-from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.utc import CLOCK, certain_from_us
 from rtshcua.adapters.vehicle.drain import drained
-from rtshcua.app.fly.agents import Agents
-from rtshcua.app.fly.attesting import BoundarySession
-from rtshcua.app.fly.closing import close_log, keep_summary
-from rtshcua.app.fly.console import LiveView
-from rtshcua.app.fly.frame_buffer import Tape
-from rtshcua.app.fly.interrupts import Interrupts, Wish
-from rtshcua.app.fly.log_signer import LogSigner
-from rtshcua.app.fly.narrator import Answering, Teller, plan_of
-from rtshcua.app.fly.parameters import foreign
-from rtshcua.app.fly.previous_log import LOG_BEFORE, Past
-from rtshcua.app.fly.read_back import ReadBack, read_back
-from rtshcua.app.fly.refused import Refused
-from rtshcua.app.fly.simulated_flight import SIMULATED
+from rtshcua.app.fly.clearance import Cleared, bundle_lapsed
+from rtshcua.app.fly.closing import ReadBack, close_log, keep_summary, read_back
+from rtshcua.app.fly.connect import Connected
+from rtshcua.app.fly.flight_request import FlightContext, FlightRequest
+from rtshcua.app.fly.narrator import Answering, Teller, Watching, plan_of
+from rtshcua.app.fly.previous_log import LOG_BEFORE, LogBefore
+from rtshcua.app.fly.setting_notes import foreign
+from rtshcua.app.fly.simulated_flight import SIMULATED, pace_of
+from rtshcua.app.fly.start_boundary import Begun
+from rtshcua.app.fly.stop_wishes import Wish
 from rtshcua.app.fly.story import Note, Plan, Snapshot, Summary
-from rtshcua.app.fly.watching import Watching
-from rtshcua.app.fly.witnesses import Witnessing
+from rtshcua.app.fly.verify_bundle import LogNotSigned
+from rtshcua.app.fly.view_ports import LiveView
+from rtshcua.app.fly.witnesses import FlightWitnesses
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Append, Ending, Event, Interrupted, Presented
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.runtime import Runtime
 
 if TYPE_CHECKING:
-    from rtshcua.app.fly.incidents import Incidents, Watch
+    from rtshcua.app.fly.incidents import Watch
 
 _SEED_BYTES = 32
 
@@ -85,85 +82,85 @@ _KNOWING = (
 )
 
 
-class Flight:
-    """Flies once. `events` happened before the runtime began; `resumed`: an earlier run of the bundle broke off.
-    `simulated`: what the log says of a flight that was. `lapsed` says why the bundle is not to be trusted by the
-    time that the clock has now. `answering`: how a person answers a step that asks.
-
-    Once it is made, the first record is on the disk; not of one that is `resumed`, which waits for no disk. Raises
-    OSError where the disk does not take it.
+class FlightSession:
+    """Flies once, what was cleared. `events` happened before the runtime began. Until it is begun, nothing of it is on
+    the disk, and nothing is sent.
     """
 
     def __init__(
-        self, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, feed: LiveView, interrupts: Interrupts,
-        tape: Tape,
-        *, bundle: bytes, root: bytes, log_key: LogSigner, run: RunFolder, speed: float, live: bool, resumed: bool,
-        events: Sequence[Event], past: Past, boundary: BoundarySession, witnesses: Witnessing, utc: UtcWatch,
-        lapsed: Callable[[], Refused | None], debts: OwedParameters, agents: Agents | None = None,
-        simulated: str | None = None, incidents: "Incidents | None" = None, answering: Answering | None = None,
-        detail_of: Callable[[str, str], str],
+        self, context: FlightContext, begun: Begun, connected: Connected, cleared: Cleared, previous: LogBefore,
+        debts: OwedParameters, witnesses: FlightWitnesses, view: LiveView,
     ) -> None:  # fmt: skip
-        self._loaded = loaded
-        self._vehicle = vehicle
-        self._clock = clock
-        self._feed = feed
-        self._interrupts = interrupts
-        self._tape = tape
-        self._run, self._root = run, root
-        self._speed = speed
-        self._early = list(events)
-        self._agents = agents
-        self._witnesses = witnesses
-        self._recorder = Recorder(log_key.sign, log_key.public, draw)
-        log = run.log()
-        past.begin(log.path, aloft=resumed)
-        self._past = past
-        self._frames = run.telemetry()
-        tape.attach(self._frames)
-        now = clock.now()
-        self._start_us = now.monotonic_us
-        policy, mission = loaded.bundle.policy, loaded.bundle.mission
-        self._teller = Teller(policy, mission, self._start_us, answering, detail_of)
+        request, loaded, clock = context.request, begun.loaded, context.clock
+        self._begun, self._loaded, self._clock = begun, loaded, clock
+        self._context, self._connected, self._cleared = context, connected, cleared
+        self._vehicle, self._agents, self._early = connected.vehicle, connected.agents, list(connected.events)
+        self._feed = view
+        self._past, self._debts, self._witnesses = previous, debts, witnesses
+        self._run, self._boundary = cleared.run, cleared.session
         self._steps = StepWatch()
-        self._sink = EvidenceWriter(log)
-        genesis = self._recorder.genesis(
-            now, bundle=bundle, root=root, boot=loaded.in_force.flight, vehicle=loaded.vehicle,
-            mission=mission.name, mode=loaded.mode, before=past.hash, received_us=loaded.in_force.received_us(0),
-            sync_us=clock.us_in(SYNC_US / 1e6),
-        )  # fmt: skip
-        self._sink.append(genesis, SYNCED_FIRST)
-        self._boundary = boundary
-        session = loaded.attestation.begin(boundary.key)
-        boundary.begun(loaded.attestation.digest, session)
-        self._recorder.attest = loaded.attestation.statement
-        append_all(self._sink, self._recorder.attested(now), WRITTEN)
-        if simulated is not None:
-            self._sink.append(self._recorder.effect(now, SIMULATED, detail=simulated), WRITTEN)
-        if past.note:
-            self._sink.append(self._recorder.effect(now, LOG_BEFORE, detail=past.note), WRITTEN)
-        self._utc, self._lapsed = utc, lapsed
-        self._sink.append(self._recorder.effect(now, CLOCK, detail=utc.bound.told()), WRITTEN)
-        if not resumed:  # what hangs in the air comes down whatever the disk does
-            self._sink.settle()
-        witnesses.begin(log.path, lambda: self._sink.synced)
-        self._incidents = incidents
-        slack = max(1, round(speed / 5))
-        self._preparations = Preparations(
-            loaded, vehicle.driver, clock, debts.left, self._record, self._note, debts.keep, slack,
-            debts.trouble,
-        )  # fmt: skip
         self._preparing, self._told = True, ""
         self._left = ""  # that the operator stopped watching what may be flying
+        self._recorder = Recorder(begun.log_key.sign, begun.log_key.public, draw)
+        self._start_us = clock.now().monotonic_us
+        policy, mission = loaded.bundle.policy, loaded.bundle.mission
+        answering = answered_by(request, cleared.run)
+        self._teller = Teller(policy, mission, self._start_us, answering, context.console.detail_of)
+
+    def begin(self) -> Refusal | None:
+        """Put the first record on the disk, and show the plan; what is resumed waits for no disk. A refusal where the
+        boundary does not sign the log. Raises OSError where the disk does not take it.
+        """
+        run, resumed, loaded, now = self._run, self._cleared.resumed, self._loaded, self._clock.now()
+        log = run.log()
+        self._past.begin(log.path, aloft=resumed)
+        self._frames = run.telemetry()
+        self._context.frames.attach(self._frames)
+        self._sink = EvidenceWriter(log)
+        try:
+            self._record_beginning(now)
+        except LogNotSigned as error:
+            return error.refusal
+        finally:
+            self._begun.log_key.hand_over(_signs_no_more)  # nothing in flight needs it, so nothing in flight holds it
+        if not resumed:  # what hangs in the air comes down whatever the disk does
+            self._sink.settle()
+        self._witnesses.begin(log.path, lambda: self._sink.synced)
+        debts = self._debts
+        self._preparations = Preparations(
+            loaded, self._vehicle.driver, self._clock, debts.left, self._record, self._note, debts.keep,
+            self._context.slack, debts.trouble,
+        )  # fmt: skip
         if debts.trouble is not None:
             self._feed.post(Note(debts.trouble))
-        limits = Limits(stalled_us=Limits().stalled_us * slack)
+        limits = Limits(stalled_us=Limits().stalled_us * self._context.slack)
         self._runtime = Runtime(loaded, self._recorder, limits=limits, resumed=resumed)
-        vehicle.driver.resumes = resumed
+        self._vehicle.driver.resumes = resumed
         self._feed.post(self._plan())
         self._watch = Watching(
-            feed, self._teller, self._runtime.view, self._waits_for, live=live,
-            replan=self._replan, agents=agents,
+            self._feed, self._teller, self._runtime.view, self._waits_for, live=self._context.console.live,
+            replan=self._replan, agents=self._agents,
         )  # fmt: skip
+        return None
+
+    def _record_beginning(self, now: Now) -> None:
+        """The genesis, the boundary's first statement, and what is known of the flight before anything is decided."""
+        loaded, request = self._loaded, self._context.request
+        genesis = self._recorder.genesis(
+            now, bundle=self._begun.bundle, root=self._begun.trusted.signed, boot=loaded.in_force.flight,
+            vehicle=loaded.vehicle, mission=loaded.bundle.mission.name, mode=loaded.mode, before=self._past.hash,
+            received_us=loaded.in_force.received_us(0), sync_us=self._clock.us_in(SYNC_US / 1e6),
+        )  # fmt: skip
+        self._sink.append(genesis, SYNCED_FIRST)
+        session = loaded.attestation.begin(self._boundary.key)
+        self._boundary.begun(loaded.attestation.digest, session)
+        self._recorder.attest = loaded.attestation.statement
+        append_all(self._sink, self._recorder.attested(now), WRITTEN)
+        simulated = pace_of(request.speed, own=request.link is None)
+        known = ((SIMULATED, simulated), (LOG_BEFORE, self._past.note), (CLOCK, self._context.utc.bound.told()))
+        for event, detail in known:
+            if detail:
+                self._sink.append(self._recorder.effect(now, event, detail=detail), WRITTEN)
 
     def fly(self) -> tuple[ExitCode, Summary]:
         """Fly to the end, whatever it is, and close the log."""
@@ -221,7 +218,7 @@ class Flight:
 
     def _plan(self) -> Plan:
         bundle = self._loaded.bundle
-        return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._speed)
+        return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._context.request.speed)
 
     def _replan(self) -> Plan:
         """The mission was replaced: this is the plan from now on."""
@@ -232,8 +229,9 @@ class Flight:
         wait_us = max(_WAIT_US, self._clock.us_in(_FASTEST_WAIT_S))
         held_wait_us = max(HELD_WAIT_US, self._clock.us_in(HELD_WAIT_US / 1e6))
         watch: Watch = self._watch
-        if self._incidents is not None:
-            watch = self._incidents.around(watch, self._start_us)
+        incidents = self._context.request.incidents
+        if incidents is not None:
+            watch = incidents.around(watch, self._start_us)
         problem = self._preparations.begin(self._pass)
         if problem is not None:
             self._tell_once(problem)
@@ -245,7 +243,7 @@ class Flight:
         loop = RunLoop(self._runtime, self._vehicle, self._sink, self._clock, watch, wait_us, held_wait_us)
         also = [*self._early, *self._backlog()]
         while True:
-            match self._interrupts.wish():
+            match self._context.interrupts.wish():
                 case Wish.LAND:
                     self._feed.post(Note(self._what_follows()))
                     also.append(Interrupted(self._clock.now().monotonic_us))
@@ -259,7 +257,7 @@ class Flight:
             also += self._handed_in()
             also += self._witnesses.events(self._clock.now().monotonic_us)
             also += self._steps.events(self._clock.now())
-            if self._utc.waits:
+            if self._context.utc.waits:
                 also += self._look_at_utc()
             ending = loop.turn(also)
             if ending is not None:
@@ -272,7 +270,7 @@ class Flight:
         self._seal_when_due()
         if sum(isinstance(each, Presented) for each in self._early) < _MOST_EARLY:
             self._early += self._handed_in()
-        if self._interrupts.wish() is None:
+        if self._context.interrupts.wish() is None:
             return True
         self._feed.post(Note(_ON_GROUND))
         self._early.append(Interrupted(self._clock.now().monotonic_us))
@@ -298,7 +296,7 @@ class Flight:
         self._seal_when_due()
         if self._agents is not None:
             self._agents.turn_away(self._clock.now())
-        return self._interrupts.wish() is not Wish.LEAVE
+        return self._context.interrupts.wish() is not Wish.LEAVE
 
     def _handed_in(self) -> Sequence[Event]:
         """What agents and operators handed in; whoever came to their sockets is heard and told from now on."""
@@ -342,17 +340,17 @@ class Flight:
         expired that this machine's clock took for good; then nothing flies.
         """
         now, flavour = self._clock.now(), self._vehicle.driver.flavour
-        if flavour is None or not self._utc.look(self._vehicle.driver.source, flavour.name, now.monotonic_us):
+        if flavour is None or not self._context.utc.look(self._vehicle.driver.source, flavour.name, now.monotonic_us):
             return []
         self._vehicle.driver.asks_utc = False
         now = self._clock.now()
         self._vehicle.driver.issued_from_us = certain_from_us(self._loaded.issued_us, now)
         self._catch_up(now)
-        self._sink.append(self._recorder.effect(now, CLOCK, detail=self._utc.bound.told()), WRITTEN)
-        lapsed = self._lapsed()
-        if lapsed is None:
+        self._sink.append(self._recorder.effect(now, CLOCK, detail=self._context.utc.bound.told()), WRITTEN)
+        late = None if self._cleared.resumed else bundle_lapsed(self._context, self._begun)
+        if late is None:
             return []
-        self._feed.post(Note(f"by the vehicle's time: {lapsed}"))
+        self._feed.post(Note(f"by the vehicle's time: {late.text}"))
         return [Interrupted(now.monotonic_us)]
 
     def _what_follows(self) -> str:
@@ -427,6 +425,19 @@ class Flight:
             log=log,
             next=f"rtshcua verify-log {'--audit ' if self._loaded.boundary.lost else ''}{shlex.quote(log)}",
         )
+
+
+def answered_by(request: FlightRequest, run: RunFolder) -> Answering | None:
+    """How a person answers a step of this flight; None where it has no socket."""
+    socket = request.operator_socket or request.agent_socket
+    if socket is None:
+        return None
+    handed_in = request.wait_s is not None  # a file of the run, not of whoever handed it in
+    return Answering(str(run.path / BUNDLE if handed_in else request.bundle), str(socket), ahead=request.speed != 1)
+
+
+def _signs_no_more(_checkpoint: bytes) -> Refusal:
+    return Refusal("log-begun", "the log has begun")
 
 
 def draw() -> bytes:

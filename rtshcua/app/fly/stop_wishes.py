@@ -3,7 +3,10 @@
 import signal
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import Enum, auto
+from threading import current_thread, main_thread
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -11,6 +14,21 @@ from typing import Self
 LEAVE_S = 3.0
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def breakable() -> Iterator[None]:
+    """Within this, in the main thread, Ctrl-C raises KeyboardInterrupt, as Python has it: what is under way is put in
+    order. Elsewhere it ends a command by the signal itself (`entry_point`).
+    """
+    if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 class Wish(Enum):

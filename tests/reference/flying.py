@@ -1,0 +1,36 @@
+"""The context of a flight that a test asks one stage of."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.app.fly.flight_request import FlightContext, FlightRequest, FrameBuffer
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.onboard.enforcement.load import EnforcementMode
+
+
+def request(**changed: Any) -> FlightRequest:
+    """What a flight of the simulated vehicle asks for, with these changes."""
+    usual = {
+        "bundle": Path("short.bundle"), "link": None, "mode": EnforcementMode.SOFTWARE, "data": Path(), "state": Path(),
+        "runs": Path("runs"),
+    }  # fmt: skip
+    return FlightRequest(**(usual | changed))
+
+
+def context(of: FlightRequest | None = None, clock: Any = None, **changed: Any) -> FlightContext:
+    """Its context; what a stage has no use for is not there."""
+    never: Any = SimpleNamespace(wish=lambda: None)
+    usual: dict[str, Any] = {
+        "request": of or request(), "console": None, "clock": clock or SystemClock(), "utc": None, "listening": None,
+        "transport": None, "interrupts": never, "frames": FrameBuffer(), "resources": ExitStack(),
+    }  # fmt: skip
+    return FlightContext(**(usual | changed))
+
+
+def refusal_of(found: object) -> Refusal:
+    """The refusal that a stage gave."""
+    assert isinstance(found, Refusal), found
+    return found

@@ -12,7 +12,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
     "modules": 746,
-    "code lines": 84_040,
+    "code lines": 84_025,
     "shared class names": 35,
     "of them across packages": 21,
     "shared file names": 78,

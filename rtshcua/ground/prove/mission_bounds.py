@@ -179,13 +179,9 @@ def bounds_of(
 def _step_time(proof: ProofContext, mission: Mission, invocation: Invocation) -> int:
     """How long a step takes from its turn to its end, in us."""
     contract, vehicle = invocation.contract, proof.policy.vehicle
-    return _approval(proof, mission, invocation) + contract.deadline_us + longest(contract, vehicle)
-
-
-def _approval(proof: ProofContext, mission: Mission, invocation: Invocation) -> int:
-    """How long a step may wait for an approval."""
     prepared = proof.prepare(invocation, mission.phases)
-    return 0 if isinstance(prepared, Refusal) else approval(proof, prepared)  # the proofs report a refusal
+    waits = 0 if isinstance(prepared, Refusal) else approval(proof, prepared)  # the proofs report a refusal
+    return waits + contract.deadline_us + longest(contract, vehicle)
 
 
 def _chain_time(chain: Iterable[Link], policy: Policy) -> int:

@@ -38,7 +38,6 @@ from rtshcua.ground.prove.step_starts import StartPlace, planned
 from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind
 from rtshcua.model.flat.limits import FULL, MAX_SPEED
-from rtshcua.model.flat.policy import Speeds
 from rtshcua.model.quantity import Dimension, display
 
 SECOND_US: Final = 1_000_000
@@ -72,7 +71,7 @@ def prove_step_bounds(
         """What it takes if it leads to a height."""
         return max(_step_us(proof, step.prepared, start, height, slowest, wind) for start in starts)
 
-    time_us, fits = takes(step.flat.plan.altitude), _energy_us(speeds, contract.energy)
+    time_us, fits = takes(step.flat.plan.altitude), contract.energy * speeds.flight_us // FULL
     if 0 < contract.duration_us < time_us:
         skill = proof.skills[contract.name]
         limit = (step.overrides and step.overrides.duration) or skill.duration
@@ -97,11 +96,6 @@ def prove_step_bounds(
     if home and energy > contract.energy:
         _too_much(proof, step, "the return", contract, energy, code=codes.RETURN_ENERGY)
     return StepBound(contract.name, time_us, energy)
-
-
-def _energy_us(speeds: Speeds, energy: int) -> int:
-    """How long a part of a full charge flies."""
-    return energy * speeds.flight_us // FULL
 
 
 def _nearer(proof: ProofContext, step: MissionStep, here: int, takes: Callable[[int], int], fits: int) -> _Fix | None:

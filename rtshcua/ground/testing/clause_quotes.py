@@ -10,6 +10,7 @@ from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.checker.context import Context
 from rtshcua.ground.lower.tables import shortened
 from rtshcua.ground.testing.case import PolicyUnderTest
+from rtshcua.ground.testing.coverage_goals import clauses_of
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.tests import Expectation
@@ -85,7 +86,7 @@ def clause_meant(quoted: str, texts: Iterable[str]) -> tuple[str | None, str]:
     if near is not None:
         return near, f"did you mean `{near}`?"
     likely = sorted(every, key=lambda text: -SequenceMatcher(None, _spaced(quoted), text).ratio())
-    return None, f"there are {_shown(likely)}" if likely else "no clause decides here"
+    return None, f"there are {shown_clauses(likely)}" if likely else "no clause decides here"
 
 
 def _nearest(words: str, texts: Sequence[str]) -> str | None:
@@ -118,20 +119,22 @@ def _ambiguous(context: Context, expected: Expectation, fitting: Sequence[_Candi
         quoted.span,
         f"`{shortened(quoted.text)}` quotes {'more than one clause' if alike else 'the beginning of several clauses'}"
         f" that can decide here",
-        help=f"say `because`: it stands in {_shown(roles)}" if alike else f"quote more of one: {_shown(texts)}",
+        help=f"say `because`: it stands in {shown_clauses(roles)}"
+        if alike
+        else f"quote more of one: {shown_clauses(texts)}",
     )
 
 
-def _shown(texts: Sequence[str]) -> str:
+def shown_clauses(texts: Sequence[str]) -> str:
+    """The first clauses of some, for a person."""
     return ", ".join(f"`{text}`" for text in texts[:MAX_SHOWN]) + (", ..." if len(texts) > MAX_SHOWN else "")
 
 
 def _decisive(invocation: PreparedInvocation, policy: PolicyUnderTest) -> Iterator[_Candidate]:
     """All clauses that a decision on a request can name."""
     contract = invocation.invocation.contract
-    for role, clauses in (("require", contract.require), ("assume", contract.assume), ("maintain", contract.maintain)):
-        for clause in clauses:
-            yield _Candidate(role, _spaced(policy.text(clause)), clause)
+    for role, clause in clauses_of(contract):
+        yield _Candidate(role, _spaced(policy.text(clause)), clause)
     for rules in invocation.candidates:
         for rule in rules:
             yield _Candidate(RuleKind(rule.rule.kind).name.lower(), _spaced(policy.text(rule.rule)), rule.rule)

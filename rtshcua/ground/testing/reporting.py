@@ -15,7 +15,6 @@ from rtshcua.ground.testing.case_result import CaseResult
 from rtshcua.ground.testing.clause_coverage import PolicyCoverage, ReachedGoals, per_mille
 from rtshcua.ground.testing.coverage_goals import CoverageItem
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
-from rtshcua.model.decision import Decision
 from rtshcua.model.flat.policy import Policy
 
 
@@ -69,12 +68,13 @@ def place_json(span: Span | None, sources: Mapping[str, Source]) -> dict[str, An
 
 def _case_json(ran: CaseResult, sources: Mapping[str, Source]) -> dict[str, Any]:
     case, decision, expected = ran.case, ran.trace.decision, ran.expected
+    policy, clause = case.policy.lowered.policy, decision.clause
     return {
         "name": case.name,
         "test": case.test.name.text,
         "row": case.row,
         "at": place_json(case.span, sources),
-        "policy": policy_name(case.policy.lowered.policy),
+        "policy": policy_name(policy),
         "skill": case.invocation.invocation.contract.name,
         "met": ran.met,
         "expected": {
@@ -85,22 +85,12 @@ def _case_json(ran: CaseResult, sources: Mapping[str, Source]) -> dict[str, Any]
         },
         "decided": {
             "outcome": decision.outcome.name.lower(),
-            "target": _target(ran),
+            "target": None if decision.target is None else policy.contracts[decision.target.skill].name,
             "reason": decision.reason.value,
-            "clause": clause_of(decision),
-            "written": None if decision.clause is None else place_json(case.policy.span(decision.clause), sources),
+            "clause": None if clause is None else " ".join(clause.text.split()),
+            "written": None if clause is None else place_json(case.policy.span(clause), sources),
         },
     }
-
-
-def clause_of(decision: Decision) -> str | None:
-    """The clause that decided, as it is written, on one line."""
-    return None if decision.clause is None else " ".join(decision.clause.text.split())
-
-
-def _target(ran: CaseResult) -> str | None:
-    target = ran.trace.decision.target
-    return None if target is None else ran.case.policy.lowered.policy.contracts[target.skill].name
 
 
 def _outcome(ran: CaseResult, sources: Mapping[str, Source]) -> Outcome:

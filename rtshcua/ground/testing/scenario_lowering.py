@@ -18,7 +18,8 @@ from rtshcua.ground.lower.conditions import ConditionPlace
 from rtshcua.ground.lower.fixed_tables import FixedTables, MissingFromPolicy, knows_zone
 from rtshcua.ground.lower.tables import JointSourceTable, SourceTable, shortened
 from rtshcua.ground.testing.case import PolicyUnderTest
-from rtshcua.ground.testing.clause_quotes import clause_meant, quotes
+from rtshcua.ground.testing.clause_quotes import clause_meant, quotes, shown_clauses
+from rtshcua.ground.testing.coverage_goals import clauses_of
 from rtshcua.model.faults import Approval, Disapproval, Fault, WindStep
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
@@ -65,8 +66,6 @@ from rtshcua.model.scenario import Flies as LoweredFlies
 from rtshcua.model.scenario import OnCondition as LoweredOnCondition
 
 T = TypeVar("T")
-#: of how many clauses a finding tells
-MAX_SHOWN = 6
 
 
 class ScenarioMission(NamedTuple):
@@ -287,7 +286,7 @@ class _Lowering:
             codes.UNKNOWN_CLAUSE,
             quoted.span,
             several if fitting else none,
-            help=f"quote more of one: {_shown_clauses(fitting)}" if fitting else help,
+            help=f"quote more of one: {shown_clauses(fitting)}" if fitting else help,
             fix=None if near is None or '"' in near else (quoted.span, f'"{near}"', "quote this clause"),
         )
         return None
@@ -297,7 +296,7 @@ class _Lowering:
         policy, mission = self._lowered.policy, self._under.mission
         contracts = (*(step.contract for step in mission.invocations), *policy.contracts)
         for contract in contracts:
-            for clause in (*contract.require, *contract.assume, *contract.maintain):
+            for _, clause in clauses_of(contract):
                 yield self._spaced(clause), clause.text
         for rule in policy.rules:
             yield self._spaced(rule), rule.text
@@ -320,7 +319,3 @@ def _all_or_none(parts: Sequence[T | None]) -> tuple[T, ...] | None:
     """The parts, if all of them are there."""
     found = tuple(part for part in parts if part is not None)
     return found if len(found) == len(parts) else None
-
-
-def _shown_clauses(texts: Sequence[str]) -> str:
-    return ", ".join(f"`{text}`" for text in texts[:MAX_SHOWN]) + (", ..." if len(texts) > MAX_SHOWN else "")

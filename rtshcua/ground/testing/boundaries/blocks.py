@@ -222,13 +222,8 @@ def name_of(frame: CaseFrame, variable: SceneVariable) -> str:
 def _is_place(variable: SceneVariable, frame: CaseFrame) -> bool:
     assert variable.at is not None
     if variable.argument:
-        return _wide(frame, variable.at)
+        return parameter_of(frame.scene.invocation, variable.at).kind == PLACE
     return variable.at == frame.policy.vehicle.position
-
-
-def _wide(frame: CaseFrame, cell: int) -> bool:
-    """Whether the parameter at a cell takes two."""
-    return parameter_of(frame.scene.invocation, cell).kind == PLACE
 
 
 def _cell(frame: CaseFrame, variable: SceneVariable, value: Value) -> str | None:

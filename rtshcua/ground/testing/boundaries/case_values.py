@@ -141,7 +141,7 @@ def signal_text(policy: Policy, one: Signal, value: Value) -> str | None:
     assert isinstance(value, int)
     if one.kind == ENUMERATION:
         return dict(one.labels).get(value)
-    return quantity_text(value, one.dimension)
+    return display(value, Dimension(one.dimension))
 
 
 def argument_text(policy: Policy, one: Parameter, value: Value) -> str | None:
@@ -154,12 +154,7 @@ def argument_text(policy: Policy, one: Parameter, value: Value) -> str | None:
         return one.labels[value] if 0 <= value < len(one.labels) else None
     if one.kind == ZONE:
         return policy.zones[value].name if 0 <= value < policy.declared else None
-    return quantity_text(value, one.dimension)
-
-
-def quantity_text(value: int, dimension: str) -> str:
-    """A number in the canonical unit of a dimension, with a unit that a person uses."""
-    return display(value, Dimension(dimension))
+    return display(value, Dimension(one.dimension))
 
 
 def duration_text(us: int) -> str:

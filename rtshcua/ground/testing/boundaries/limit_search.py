@@ -77,11 +77,6 @@ class _Question(NamedTuple):
     whole: PolicyPart
 
 
-def limits(parts: Sequence[PolicyPart], scene: Scene, space: SituationSpace) -> Iterator[ClauseLimit]:
-    """The limits of all parts, as the scene has everything else; each part in its order."""
-    yield from search(parts, parts, scene, space).limits
-
-
 def search(
     chosen: Sequence[PolicyPart],
     parts: Sequence[PolicyPart],

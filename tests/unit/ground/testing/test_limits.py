@@ -15,7 +15,7 @@ from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.solve import Questions
 from rtshcua.ground.testing.boundaries.clause_limits import ClauseLimit
-from rtshcua.ground.testing.boundaries.limit_search import limits
+from rtshcua.ground.testing.boundaries.limit_search import search
 from rtshcua.ground.testing.boundaries.scene import TIME, PolicyPart, Scene, SceneVariable, Value, part_truth, parts_of
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.limits import DAY
@@ -38,7 +38,8 @@ def scene(policy: Policy = flat.POLICY, step: int = TAKEOFF, values: dict[int, i
 
 def found(here: Scene) -> list[ClauseLimit]:
     space = Questions(here.invocation.policy).space(here.invocation.invocation.skill)
-    return list(limits(list(parts_of(here.invocation)), here, space))
+    every = list(parts_of(here.invocation))
+    return list(search(every, every, here, space).limits)
 
 
 def sides(limit: ClauseLimit, here: Scene) -> tuple[int, int]:
@@ -177,7 +178,7 @@ def test_every_place_where_a_condition_turns_is_found(code: flat.Code, wind: int
     assert not isinstance(invocations, Refusal), invocations
     here = Scene(invocations[0], flat.state(HOME | {flat.WIND: wind}), flat.context(step), NOW)
     part = next(each for each in parts_of(here.invocation) if each.clause == clause)
-    ours = list(limits([part], here, Questions(ready).space(flat.TAKEOFF)))
+    ours = list(search([part], [part], here, Questions(ready).space(flat.TAKEOFF)).limits)
     assert [each for each in ours if sides(each, here) != (TRUE, FALSE)] == []
     turned = {frozenset((each.holds, each.fails)) for each in ours if each.variable == SceneVariable(False, flat.WIND)}
     assert turned == set(flips(part, here))

@@ -9,7 +9,7 @@ from base64 import b64encode
 import pytest
 from msgspec.structs import replace
 
-from reference.documents import ASKED, approval, hand, low, low_mission, presented, replacement
+from reference.documents import ASKED, approval, asked, hand, low, low_mission, presented, replacement
 from reference.forgery import edit, expect, read, signed
 from reference.world import (
     FLIGHT,
@@ -68,12 +68,6 @@ def flown_to_the_inspection() -> Loaded:
     for step in range(ASKED):
         answer_to(of, request_for(of, step=step))
     return of
-
-
-def asked(of: Loaded) -> tuple[Outcome, Reason]:
-    answer = answer_to(of, request_for(of, step=ASKED))
-    assert isinstance(answer, Decision)
-    return answer.outcome, answer.reason
 
 
 def test_a_replayed_grant_does_not_undo_a_refusal() -> None:

@@ -6,10 +6,9 @@ The attacker is a person whom the root trusts for one role, or for several, and 
 import pytest
 from msgspec.structs import replace
 
-from reference.documents import ASKED, approval, low_mission, presented
+from reference.documents import ASKED, approval, asked, low_mission, presented
 from reference.flat_case import CONFIRM_RULE, POLICY
 from reference.world import APPROVAL_KEY, ROOT, VEHICLE, answer_to, loaded, renewed, request_for
-from rtshcua.model.decision import Decision
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
@@ -53,12 +52,6 @@ def flying(second: int) -> Loaded:
     for step in range(ASKED):
         answer_to(of, request_for(of, step=step))
     return of
-
-
-def asked(of: Loaded) -> tuple[Outcome, Reason]:
-    answer = answer_to(of, request_for(of, step=ASKED))
-    assert isinstance(answer, Decision)
-    return answer.outcome, answer.reason
 
 
 AWAITED = (Outcome.DEFER, Reason.AWAITING_APPROVAL)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from reference.low_source import low_source
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.roots import opened
@@ -32,19 +33,7 @@ from rtshcua.wire.keys import Duty
 ESCAPES = "\x1b[2K\r\x9b1mapproved\u202e\u2066\u200b\u00ad\ufe0f\U000e0041\u3164\nerror: none"
 PROPOSAL = (root() / "missions" / "proposal.json").read_bytes()
 FLIGHT = ("--flight", bytes(16).hex())
-LOW = """import "lib:policies/bridge_inspection.rts"
-
-mission low under bridge_inspection@7 on quad {
-  intent "Low under the bridge, when a supervisor agrees."
-  proposed by agent openclaw for role operator
-  phase departure { takeoff(altitude = 9 m) }
-  phase inspection {
-    goto(bridge_a.entry, altitude = 9 m)
-    inspect_area(bridge_a, /* only hover(5 s), near home */ altitude = 9 m, pattern = perimeter)
-  }
-  phase recovery { return_home() }
-}
-"""
+LOW = low_source("inspect_area(bridge_a, /* only hover(5 s), near home */ altitude = 9 m, pattern = perimeter)")
 
 
 def harmless(text: str) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from reference.low_source import INSPECTION, low_source
 from rtshcua.app.programs import compile_sources
 from rtshcua.evidence.report import LogVerdict
 from rtshcua.model.flat.mission import Invocation, Mission
@@ -20,25 +21,12 @@ from virtual.flight import Flight, Flown
 from virtual.shipped import simulated
 
 S = case.S
-MISSION = """import "lib:policies/bridge_inspection.rts"
-
-mission low under bridge_inspection@7 on quad {
-  intent "Low under the bridge, when a supervisor agrees."
-  proposed by agent openclaw for role operator
-  phase departure { takeoff(altitude = 9 m) }
-  phase inspection {
-    goto(bridge_a.entry, altitude = 9 m)
-    WORK
-  }
-  phase recovery { return_home() }
-}
-"""
 ASKED = 2
 
 
 def compiled(folder: Path, work: str) -> tuple[Mission, bytes]:
     source = folder / "low.rts"
-    source.write_text(MISSION.replace("WORK", work))
+    source.write_text(low_source(work))
     found, _ = compile_sources([source], mission=None, issued_at_us=case.flat.ISSUED)
     assert found.mission is not None, found.diagnostics
     return found.mission, case.seal(found.mission, found.policy)
@@ -46,7 +34,7 @@ def compiled(folder: Path, work: str) -> tuple[Mission, bytes]:
 
 @pytest.fixture(scope="module")
 def low(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return compiled(tmp_path_factory.mktemp("low"), "inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)")[1]
+    return compiled(tmp_path_factory.mktemp("low"), INSPECTION)[1]
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from reference.low_source import INSPECTION, low_source
 from rtshcua.adapters.agent_socket import GAP_US
 from rtshcua.app.programs import compile_sources
 from rtshcua.evidence.report import LogVerdict
@@ -32,20 +33,6 @@ from virtual.flight import TICK_US, UTC_US, Flown
 from virtual.shipped import simulated
 
 S = case.S
-SOURCE = """import "lib:policies/bridge_inspection.rts"
-
-mission low under bridge_inspection@7 on quad {
-  intent "Low under the bridge, when a supervisor agrees."
-  proposed by agent openclaw for role operator
-  phase departure { takeoff(altitude = 9 m) }
-  phase inspection {
-    goto(bridge_a.entry, altitude = 9 m)
-    WORK
-  }
-  phase recovery { return_home() }
-}
-"""
-ASKS = "inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)"
 HOVERS = "hover(5 s)"
 ASKED = 2
 AGENT_SEED = b"\xa9" * 32
@@ -60,7 +47,7 @@ Play = Generator[None, None, None]
 
 def compiled(folder: Path, work: str) -> tuple[Mission, Policy]:
     source = folder / "low.rts"
-    source.write_text(SOURCE.replace("WORK", work))
+    source.write_text(low_source(work))
     found, _ = compile_sources([source], mission=None, issued_at_us=case.flat.ISSUED)
     assert found.mission is not None, found.diagnostics
     assert found.policy is not None
@@ -70,7 +57,7 @@ def compiled(folder: Path, work: str) -> tuple[Mission, Policy]:
 @pytest.fixture(scope="module")
 def missions(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Mission, Policy]]:
     """By what they do at the bridge: ask a supervisor for an inspection, or hover."""
-    return {work: compiled(tmp_path_factory.mktemp("low"), work) for work in (ASKS, HOVERS)}
+    return {work: compiled(tmp_path_factory.mktemp("low"), work) for work in (INSPECTION, HOVERS)}
 
 
 class Hostile(VirtualFlight):
@@ -236,7 +223,7 @@ def test_an_agent_that_stops_answering_leaves_a_flight_that_ends_by_itself(
     missions: dict[str, tuple[Mission, Policy]],
 ) -> None:
     """What it proposed asks a person, and nobody tells anybody: the wait is bounded, then the fallback flies."""
-    of = Hostile(missions, ASKS)
+    of = Hostile(missions, INSPECTION)
     flown = of.played(iter(()), Ending.ABORTED)  # type: ignore[arg-type]
     assert "inspect_area" not in flown.dispatched()
     assert flown.dispatched()[:2] == ["takeoff", "goto"]
@@ -249,7 +236,7 @@ def test_an_agent_that_answers_3_s_late_changes_what_was_not_released_and_no_mor
     missions: dict[str, tuple[Mission, Policy]], late_us: int
 ) -> None:
     """It meant to change the step that waits for a person; the step was approved and flies meanwhile."""
-    of = Hostile(missions, ASKS)
+    of = Hostile(missions, INSPECTION)
 
     def play() -> Play:
         yield from of.until('"detail":"goto"')
@@ -272,11 +259,11 @@ def test_a_replan_that_races_an_approval_never_flies_what_was_approved_for_other
     missions: dict[str, tuple[Mission, Policy]], first: str
 ) -> None:
     """Both in one turn, before the step's release: the person agreed to the step that is gone."""
-    of = Hostile(missions, ASKS)
+    of = Hostile(missions, INSPECTION)
 
     def play() -> Play:
         yield from of.until('"detail":"goto"')
-        papers = [of.approval(), of.replan(ASKS)]
+        papers = [of.approval(), of.replan(INSPECTION)]
         of.hand(*(papers if first == "approval" else papers[::-1]))
 
     flown = of.played(play(), Ending.ABORTED)
@@ -293,7 +280,7 @@ def test_a_cancellation_that_races_a_replan_ends_it_either_way(
 
     def play() -> Play:
         yield from of.until('"detail":"goto"')
-        papers = [of.cancellation(), of.replan(ASKS)]
+        papers = [of.cancellation(), of.replan(INSPECTION)]
         of.hand(*(papers if first == "cancellation" else papers[::-1]))
 
     flown = of.played(play(), Ending.CANCELLED)
@@ -309,7 +296,7 @@ def test_nothing_that_is_played_again_after_a_cancellation_revives_the_mission(
 
     def play() -> Play:
         yield from of.until('"detail":"goto"')
-        papers = [of.cancellation(), of.replan(ASKS), of.replan(HOVERS), of.approval(), of.bundle]
+        papers = [of.cancellation(), of.replan(INSPECTION), of.replan(HOVERS), of.approval(), of.bundle]
         of.hand(papers[0])
         for _ in range(3):
             yield from of.wait(S)
@@ -328,7 +315,7 @@ def test_a_replan_that_is_played_again_is_refused(missions: dict[str, tuple[Miss
 
     def play() -> Play:
         yield from of.until('"detail":"goto"')
-        first = of.replan(ASKS)
+        first = of.replan(INSPECTION)
         of.hand(first)
         yield
         second = of.replan(HOVERS)

@@ -36,6 +36,17 @@ class Heard:
         return self.received.message
 
 
+def mode(heard: Heard) -> object:
+    """`custom_mode`, and whether it is armed; None of other messages."""
+    m = heard.message
+    return (m.custom_mode, bool(m.base_mode & 128)) if heard.name == "HEARTBEAT" else None
+
+
+def landed(heard: Heard) -> object:
+    """`landed_state`; None of other messages."""
+    return heard.message.landed_state if heard.name == "EXTENDED_SYS_STATE" else None
+
+
 @dataclass(frozen=True)
 class Question:
     """Something that the client sent; `items` are those of an upload, sent as they are asked for."""

@@ -5,10 +5,12 @@ from typing import Any
 from msgspec.structs import replace
 
 from reference.flat_case import BRIDGE, DEPARTURE, GOTO, INSPECT, INSPECTION, MISSION, PATH, TAKEOFF, M, S, invocation
-from reference.world import APPROVAL_KEY, MISSION_KEY, START, VEHICLE, Run, loaded
+from reference.world import APPROVAL_KEY, MISSION_KEY, START, VEHICLE, Run, answer_to, loaded, request_for
+from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission, Plan
 from rtshcua.model.flat.situation import Now
+from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Presented, Reply
 from rtshcua.wire.approval import ApprovalDocument, sign_approval
@@ -102,3 +104,10 @@ def hand(run: Run, document: bytes, sender: int = 1) -> str:
     assert [reply.sender for reply in replies] == ([sender] if replies else [])
     assert replies or run.ending is not None
     return replies[0].slug if replies else "over"
+
+
+def asked(of: Loaded) -> tuple[Outcome, Reason]:
+    """What is decided about the step that the supervisor is asked about."""
+    answer = answer_to(of, request_for(of, step=ASKED))
+    assert isinstance(answer, Decision)
+    return answer.outcome, answer.reason

@@ -10,7 +10,7 @@ import pytest
 
 from recorded import difference
 from recorded.replay import Replay
-from recorded.trace import SECOND, Heard, Trace
+from recorded.trace import SECOND, Heard, Trace, landed, mode
 from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
 from rtshcua.simulation.place import HomePosition
 
@@ -74,16 +74,6 @@ CONFIGS = {
     ),
     "arducopter-signing": COPTER,
 }
-
-
-def mode(heard: Heard) -> object:
-    """`custom_mode`, and whether it is armed."""
-    m = heard.message
-    return (m.custom_mode, bool(m.base_mode & 128)) if heard.name == "HEARTBEAT" else None
-
-
-def landed(heard: Heard) -> object:
-    return heard.message.landed_state if heard.name == "EXTENDED_SYS_STATE" else None
 
 
 @pytest.mark.slow

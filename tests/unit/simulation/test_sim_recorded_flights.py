@@ -13,7 +13,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from recorded import difference
-from recorded.trace import SECOND, Heard, Trace
+from recorded.trace import SECOND, Heard, Trace, landed, mode
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
 from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
@@ -117,15 +117,6 @@ def flown(name: str, until_us: int) -> list[Heard]:
             take(simulation.advance(min(simulation.now_us + 100_000, round(at * SECOND))))
         take(simulation.receive(codec.pack(message), simulation.now_us))
     return heard
-
-
-def mode(heard: Heard) -> object:
-    m = heard.message
-    return (m.custom_mode, bool(m.base_mode & 128)) if heard.name == "HEARTBEAT" else None
-
-
-def landed(heard: Heard) -> object:
-    return heard.message.landed_state if heard.name == "EXTENDED_SYS_STATE" else None
 
 
 def status(heard: Heard) -> object:

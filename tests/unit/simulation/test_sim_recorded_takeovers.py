@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from recorded import difference
 from recorded.flight import LEAD_US, Flight
-from recorded.trace import SECOND, Heard, Trace
+from recorded.trace import SECOND, Heard, Trace, landed, mode
 from rtshcua.codec.frames import Codec
 from rtshcua.model import faults
 from rtshcua.simulation.config import AutopilotKind, SimulationConfig
@@ -97,15 +97,6 @@ def again(name: str) -> Flight:
     )
     stall = (faults.Stall(17_600_000 + LEAD_US, 4_950_000),) if name == STALLED else ()
     return Flight(trace, config, PILOT.get(name, ()), stall)
-
-
-def mode(heard: Heard) -> object:
-    m = heard.message
-    return (m.custom_mode, bool(m.base_mode & 128)) if heard.name == "HEARTBEAT" else None
-
-
-def landed(heard: Heard) -> object:
-    return heard.message.landed_state if heard.name == "EXTENDED_SYS_STATE" else None
 
 
 @pytest.mark.slow

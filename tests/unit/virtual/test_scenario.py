@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from reference import flat_case as flat
+from reference.low_source import low_source
 from rtshcua.app.programs import compile_sources
 from rtshcua.model import faults
 from rtshcua.model.faults import AgentFault, Fault, HostFault
@@ -246,19 +247,7 @@ def test_a_clock_that_is_set_moves_nothing_and_is_told(bothered: ScenarioFlown) 
 
 # ---------------------------------------------------------------- those who hand in documents
 
-LOW = """import "lib:policies/bridge_inspection.rts"
-
-mission low under bridge_inspection@7 on quad {
-  intent "Low under the bridge, when a supervisor agrees."
-  proposed by agent openclaw for role operator
-  phase departure { takeoff(altitude = 9 m) }
-  phase inspection {
-    goto(bridge_a.entry, altitude = 9 m)
-    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)
-  }
-  phase recovery { return_home() }
-}
-"""
+LOW = low_source()
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from reference.low_source import low_source
 from rtshcua.adapters.agent_socket import AgentSocket
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
@@ -26,19 +27,7 @@ from rtshcua.wire.keys import Duty
 from rtshcua.wire.receipt import Receipt, decode
 from rtshcua.wire.trust import open_root
 
-LOW = """import "lib:policies/bridge_inspection.rts"
-
-mission low under bridge_inspection@7 on quad {
-  intent "Low under the bridge, when a supervisor agrees."
-  proposed by agent openclaw for role operator
-  phase departure { takeoff(altitude = 9 m) }
-  phase inspection {
-    goto(bridge_a.entry, altitude = 9 m)
-    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)
-  }
-  phase recovery { return_home() }
-}
-"""
+LOW = low_source()
 #: without the inspection; the intent moves every step in its source
 SHORTER = LOW.replace("    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)\n", "    hover(5 s)\n").replace(
     "when a supervisor agrees", "but the supervisor is away today, so only look"

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from reference.documents import low, replacement
+from reference.low_source import low_source
 from reference.world import Run
 from rtshcua.app.fly.agents import Agents
 from rtshcua.app.fly.story import Happened, Happening
@@ -22,19 +23,7 @@ from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP,
 
 PACKAGE = Path(__file__).resolve().parents[4] / "rtshcua"
 FLIGHT = ("--flight", bytes(16).hex())
-LOW = """import "lib:policies/bridge_inspection.rts"
-
-mission low under bridge_inspection@7 on quad {
-  intent "Low under the bridge, when a supervisor agrees."
-  proposed by agent openclaw for role operator
-  phase departure { takeoff(altitude = 9 m) }
-  phase inspection {
-    goto(bridge_a.entry, altitude = 9 m)
-    inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)
-  }
-  phase recovery { return_home() }
-}
-"""
+LOW = low_source()
 #: the third step is the only one that is asked about, and the only inspection
 ASKED = 3
 

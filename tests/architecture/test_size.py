@@ -11,16 +11,16 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 746,
+    "modules": 743,
     "code lines": 84_025,
     "shared class names": 35,
     "of them across packages": 21,
-    "shared file names": 78,
+    "shared file names": 74,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 26,
-    "functions of more than 60 lines": 21,
+    "modules below 80 lines with one importer": 23,
+    "functions of more than 60 lines": 19,
     "functions of a complexity over 15": 133,
-    "functions of a complexity over 25": 9,
+    "functions of a complexity over 25": 6,
 }
 
 

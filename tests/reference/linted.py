@@ -6,7 +6,7 @@ from pathlib import Path
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.lint.filter import filter_findings
-from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.lint.linter import lint
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 

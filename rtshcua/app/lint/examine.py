@@ -8,7 +8,7 @@ from rtshcua import library
 from rtshcua.app.lint.cache import LintedProgram, ProgramFindings
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.language.load import Program, load
-from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.lint.linter import lint
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 

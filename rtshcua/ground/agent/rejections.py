@@ -109,15 +109,20 @@ def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: P
 
 def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[SchemaMisfit]) -> Iterator[dict[str, Any]]:
     pointer = found.pointer or ""
-    own = [each for each in misfits if pointer == (each.of or each.pointer)]
-    others = [each for each in misfits if not each.of]
-    below = [each for each in others if each.pointer.startswith(f"{pointer}/")]
-    about = own or below or [each for each in others if pointer.startswith(f"{each.pointer}/")]
+    about = _about(pointer, misfits)
     for misfit in about:
         yield _rejection(found, misfit.pointer, value, misfit.limit, misfit.near, misfit.why)
     if not about:
         near = _fixed(found, source)
         yield _rejection(found, pointer, value, None if near is None else {"one_of": [near]}, near)
+
+
+def _about(pointer: str, misfits: list[SchemaMisfit]) -> list[SchemaMisfit]:
+    """The misfits at a place; where there are none those below it, or else those that it is below."""
+    own = [each for each in misfits if pointer == (each.of or each.pointer)]
+    others = [each for each in misfits if not each.of]
+    below = [each for each in others if each.pointer.startswith(f"{pointer}/")]
+    return own or below or [each for each in others if pointer.startswith(f"{each.pointer}/")]
 
 
 def _rejection(

@@ -21,7 +21,6 @@ from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import RuleKind
-from rtshcua.model.flat.zone import Zone
 from rtshcua.model.ir.node import Name
 
 _MOVING = (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)
@@ -92,7 +91,8 @@ def idle_airspaces(subject: LintInput) -> Iterator[Diagnostic]:
                 what = "lies where the vehicle cannot come, so to stay outside of it is no limit"
                 yield _idle_zone(ground, reach, name, what)
                 continue
-            within = next((each for each in declared.inside if _are_apart(zones[name.text], zones[each.text])), None)
+            region = region_of(zones[name.text])
+            within = next((each for each in declared.inside if are_disjoint(region, region_of(zones[each.text]))), None)
             if within is not None:
                 yield _unmeetable_zone(ground, name, within)
         for name in declared.inside:
@@ -111,11 +111,6 @@ def _idle_zone(ground: ProofContext, reach: VehicleReach, name: Name, what: str)
     return Diagnostic(
         codes.IDLE_AIRSPACE, f"`{name.text}` {what}", name.span, help, (Label(zone.name.span, "it is declared here"),)
     )
-
-
-def _are_apart(one: Zone, other: Zone) -> bool:
-    """Whether it is proved that two zones have nothing in common, whenever they exist."""
-    return are_disjoint(region_of(one), region_of(other))
 
 
 def _unmeetable_zone(ground: ProofContext, name: Name, within: Name) -> Diagnostic:

@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 from rtshcua.decision.prepare import Compiler
 from rtshcua.decision.tree import AtMost, Negation, Node
 from rtshcua.ground.analysis.extent import FAR, Bounds, Extents, alternatives
-from rtshcua.ground.report.prose.condition_phrases import conjuncts, describe_condition
+from rtshcua.ground.report.prose.condition_phrases import conjuncts, describe_clauses, describe_condition
 from rtshcua.ground.report.prose.phrases import Vocabulary, listed
-from rtshcua.ground.report.prose.rules_and_skills import approver, conditions_of, sources_of, through
+from rtshcua.ground.report.prose.rules_and_skills import approver, sources_of, through
 from rtshcua.ground.report.report_model import PermittedLimit, PermitView, Restriction, Right, Rights
 from rtshcua.ground.report.reported_policy import ReportedPolicy, within
 from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Contract, Parameter, SourceKind
@@ -44,7 +44,7 @@ def _right(subject: ReportedPolicy, role: str, skill: str) -> Right:
     prohibitions: list[Restriction] = []
     about = [(number, rule) for number, rule in enumerate(subject.rules, 1) if _about(rule, role, skill)]
     for number, rule in about:
-        conditions = conditions_of(rule, rule_names(subject, rule))
+        conditions = describe_clauses(rule.when, rule_names(subject, rule))
         match rule.kind:
             case "permit":
                 ways.append(PermitView(number, through(sources_of(rule)), conditions))

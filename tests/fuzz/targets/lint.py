@@ -16,7 +16,7 @@ from rtshcua.ground.language.parse import parse
 from rtshcua.ground.lint.filter import filter_findings
 from rtshcua.ground.lint.fixes import chosen
 from rtshcua.ground.lint.ignores import comments
-from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.lint.linter import lint
 from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.ir.node import Node

@@ -30,7 +30,6 @@ from rtshcua.model.ir.scenarios import (
 from rtshcua.model.ir.tests import (
     Answer,
     Asker,
-    Assignment,
     Cell,
     Expectation,
     InPhase,
@@ -54,7 +53,7 @@ _OUTCOMES: Final = {
 def describe_premises(premises: Premises, names: Vocabulary) -> Iterator[str]:
     """What holds when the request is decided on, one line each."""
     for each in premises.given:
-        yield describe_assignment(each, names)
+        yield describe_given(each.subject, each.cell, names)
     if premises.instant is not None:
         yield _instant(premises.instant)
     if premises.phase is not None:
@@ -70,13 +69,10 @@ def describe_premises(premises: Premises, names: Vocabulary) -> Iterator[str]:
         yield f"version {premises.in_force.version} of the policy is in force"
     if premises.identity is not None:
         yield f"the vehicle is “{premises.identity.text}”"
-    for deed in (premises.replayed, premises.tampered):
-        if deed is not None:
-            yield _deed(deed.kind)
-
-
-def _deed(kind: str) -> str:
-    return "the request was used before" if kind == "replayed" else "what was presented is not what was signed"
+    if premises.replayed is not None:
+        yield "the request was used before"
+    if premises.tampered is not None:
+        yield "what was presented is not what was signed"
 
 
 def describe_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
@@ -88,13 +84,8 @@ def describe_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
     yield from describe_premises(nominal.premises, names)
 
 
-def describe_assignment(one: Assignment, names: Vocabulary) -> str:
-    """`battery` is 20 %."""
-    return describe_given(one.subject, one.cell, names)
-
-
 def describe_given(subject: Subject, cell: Cell, names: Vocabulary) -> str:
-    """What is given of a signal, a parameter, or a condition over time."""
+    """What is given of a signal, a parameter, or a condition over time: `battery` is 20 %."""
     words = _cell(cell, names)
     if isinstance(subject, Named):
         known = subject.name.text in names.signals

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN
-from rtshcua.ground.report.prose.condition_phrases import describe_clauses, describe_condition
+from rtshcua.ground.report.prose.condition_phrases import describe_condition
 from rtshcua.ground.report.prose.phrases import Vocabulary, between, describe_value, listed, name, named, sentence
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.ir.node import Name, Node
@@ -220,7 +220,6 @@ SOURCES: Final = {
     "onboard": "software on board",
     "reflex": "a reflex on board",
 }
-ANYONE: Final = "anyone"
 
 
 def sources_of(rule: Rule) -> tuple[str, ...]:
@@ -253,7 +252,8 @@ def _rule(rule: Rule, names: Vocabulary) -> str:
     when = "" if rule.when is None else f", if {describe_condition(rule.when, names)}"
     match rule.kind:
         case "permit":
-            return f"{_whom(rule.roles)} may have {skills} done, asking through {through(sources_of(rule))}{when}"
+            whom = f"the role {named(_texts(rule.roles), 'or')}" if rule.roles else "anyone"
+            return f"{whom} may have {skills} done, asking through {through(sources_of(rule))}{when}"
         case "forbid":
             asked = f", asking through {through(sources_of(rule))}" if rule.through else ""
             whom = "nobody" if not rule.roles else f"the role {named(_texts(rule.roles), 'or')}"
@@ -350,15 +350,6 @@ def describe_delegation(one: Delegation, names: Vocabulary) -> str:
     when = "" if one.when is None else f" (if {describe_condition(one.when, names)})"
     grantor, grantee = name(one.grantor.text), name(one.grantee.text)
     return f"by delegation of {skills_of(one.skills)} from {grantor} to {grantee}{asked}{when}"
-
-
-def conditions_of(rule: Rule, names: Vocabulary) -> tuple[str, ...]:
-    """What must hold for a rule, one line each."""
-    return describe_clauses(rule.when, names)
-
-
-def _whom(roles: Sequence[Name]) -> str:
-    return f"the role {named(_texts(roles), 'or')}" if roles else ANYONE
 
 
 def _texts(names: Sequence[Name]) -> list[str]:

@@ -8,7 +8,7 @@ from reference.linted import CHECKOUT, HEAD, POLICY, RISE, found, program
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.language.load import load
 from rtshcua.ground.lint.filter import Linted, agreed
-from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.lint.linter import lint
 from virtual.rows import rows
 
 SHIPPED = sorted(

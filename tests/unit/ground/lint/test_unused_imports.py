@@ -7,7 +7,7 @@ import pytest
 from reference.linted import CHECKOUT, HEAD, POLICY, found, program
 from rtshcua.diagnostics.diagnostic import Applicability
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lint.lint import lint
+from rtshcua.ground.lint.linter import lint
 from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 

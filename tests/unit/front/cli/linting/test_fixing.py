@@ -11,7 +11,7 @@ from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.front.cli.app import main
-from rtshcua.ground.lint import lint as rules
+from rtshcua.ground.lint import linter as rules
 from rtshcua.ground.lint.fixes import fixed
 from virtual.rows import rows
 

@@ -41,7 +41,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl
 
 #: the proofs of a policy, in their order
-_POLICY_PROOFS = (
+POLICY_PROOFS = (
     prove_links, prove_last_links, prove_deferrals, prove_observability, prove_contracts, prove_delegations,
     prove_rules,
 )  # fmt: skip
@@ -55,7 +55,7 @@ def prove_policy(context: Context, lowered: LoweredPolicy) -> ProofContext | Non
         return None
     prepared, questions = found
     proof = ProofContext(context, lowered, prepared, tuple(signals(lowered.policy)), questions.again())
-    for prove in _POLICY_PROOFS:
+    for prove in POLICY_PROOFS:
         prove(proof)
     return proof
 

@@ -15,7 +15,7 @@ from rtshcua.diagnostics.codes import DUPLICATE_NAME
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.elaborate.settings import parse_settings
+from rtshcua.ground.elaborate.parameters import parse_settings
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.pins import PROPOSED, Pins, policies_of

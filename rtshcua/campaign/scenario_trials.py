@@ -13,7 +13,7 @@ from rtshcua.evidence.records import DecisionRecord
 from rtshcua.ground.testing.clause_coverage import ReachedGoals, reached_goals
 from rtshcua.ground.testing.coverage_goals import universe_of
 from rtshcua.ground.testing.reporting import JUDGED, FlightFailure, FlightResult
-from rtshcua.ground.why.recorded import context_of, now_of, state_of
+from rtshcua.ground.why.logged_decisions import context_of, now_of, state_of
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.scenario import Scenario
 from rtshcua.virtual.expectations import expectations

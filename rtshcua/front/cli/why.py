@@ -25,8 +25,7 @@ from rtshcua.front.cli.showing.why import Case, show_why
 from rtshcua.front.cli.stdout import out_json, out_rendered
 from rtshcua.front.cli.subject import Subject, prepared, unpacked
 from rtshcua.front.cli.why_log import from_log
-from rtshcua.ground.why.given import given, settings
-from rtshcua.ground.why.nominal import nominal
+from rtshcua.ground.why.assumed_state import nominal, overridden, read_overrides
 from rtshcua.ground.why.trace import trace
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now
@@ -131,13 +130,13 @@ def _by_hand(
     flat = invocation.invocation
     utc_us = flat.issued_at_us if at_us is None else at_us
     now = Now(waited_ms * 1_000, utc_us, 0)
-    said, spoken = settings(texts), dialect.load()
+    said, spoken = read_overrides(texts), dialect.load()
     if isinstance(said, Refusal):
         return refuse(said)
     situation = nominal(subject.invocations, index, policy, now)
     for last in (False, True):  # what is set over time outweighs what follows from what is set of signals
         for setting in said:
-            changed = given(situation, setting, policy.policy, spoken)
+            changed = overridden(situation, setting, policy.policy, spoken)
             if isinstance(changed, Refusal):
                 return refuse(changed)
             situation = changed

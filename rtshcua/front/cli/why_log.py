@@ -24,8 +24,7 @@ from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.people import People
 from rtshcua.front.cli.showing.why import Case, show_why
 from rtshcua.front.cli.subject import Subject, after, unpacked
-from rtshcua.ground.why.link import of_contingency, trace_link
-from rtshcua.ground.why.recorded import context_of, now_of, state_of
+from rtshcua.ground.why.logged_decisions import context_of, now_of, of_contingency, state_of, trace_link
 from rtshcua.ground.why.trace import trace
 from rtshcua.model.outcome import Reason
 from rtshcua.onboard.runtime.link import STOOD_STILL

@@ -22,9 +22,8 @@ from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.mcp.flight import Following
-from rtshcua.ground.why.reads import reads
-from rtshcua.ground.why.recorded import context_of, now_of, state_of
-from rtshcua.ground.why.trace import trace
+from rtshcua.ground.why.logged_decisions import context_of, now_of, state_of
+from rtshcua.ground.why.trace import read_values, trace
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.quantity import Dimension, display
@@ -390,7 +389,7 @@ def _explained(chosen: Mapping[str, Any], policy: Policy, mission: Mission) -> d
             "age_us": max(state.ages[slot] for slot in each.signal.slots),
             "stale": each.stale,
         }
-        for each in reads(found.decision.clause, policy, flat.contract, flat.arguments, state)
+        for each in read_values(found.decision.clause, policy, flat.contract, flat.arguments, state)
         if each.signal is not None
     ]
     near = [{"subject": each.subject, "value": _near(each)} for each in found.nearest]

@@ -1,25 +1,84 @@
-"""The units of a program with plain rules and steps in the place of what stands for them."""
+"""The units of a program with plain rules and steps in the place of what stands for them. `repeat N { ... }` becomes
+its steps, N times over.
+"""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.context import Context, Instance
+from rtshcua.ground.checker.report import Report
 from rtshcua.ground.elaborate.delegation import delegated
-from rtshcua.ground.elaborate.parameters import ambiguous, assigned, instances
-from rtshcua.ground.elaborate.repeat import unrolled
-from rtshcua.ground.elaborate.settings import Settings
+from rtshcua.ground.elaborate.parameters import ParameterSettings, ambiguous, assigned, instances
 from rtshcua.ground.elaborate.templates import sample, used
-from rtshcua.model.flat.limits import MAX_RULES
-from rtshcua.model.ir.missions import MissionDecl
+from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_RULES
+from rtshcua.model.ir.missions import Item, MissionDecl, Repeat, Step
 from rtshcua.model.ir.policies import PolicyDecl, Rule
 from rtshcua.model.ir.program import Unit
+
+
+def unrolled(report: Report, mission: MissionDecl) -> MissionDecl:
+    """The mission with steps alone; where its repetitions are too many or none, each is taken once, and reported."""
+    repeats = [item for phase in mission.phases for item in _repeats(phase.items)]
+    if not repeats:
+        return mission
+    good = not [repeat for repeat in repeats if not _is_positive(report, repeat)]
+    total = sum(_total(phase.items) for phase in mission.phases) if good else 0
+    if total > MAX_INVOCATIONS:
+        good = False
+        most = max(repeats, key=lambda repeat: repeat.count.value * _total(repeat.items))
+        report.add(
+            codes.MISSION_STEPS,
+            mission.name.span,
+            f"the mission `{mission.name.text}` has {total} steps, and at most {MAX_INVOCATIONS} fit on board",
+            help="repeat less, or split it into several missions",
+            labels=[(most.count.span, f"these are {most.count.value * _total(most.items)} steps")],
+        )
+    phases = tuple(phase.copied(items=tuple(_steps(phase.items, once=not good))) for phase in mission.phases)
+    return mission.copied(phases=phases)
+
+
+def _repeats(items: Sequence[Item]) -> Iterator[Repeat]:
+    for item in items:
+        if isinstance(item, Repeat):
+            yield item
+            yield from _repeats(item.items)
+
+
+def _is_positive(report: Report, repeat: Repeat) -> bool:
+    """Whether a repetition says how often; reports it where it does not."""
+    count = repeat.count
+    if count.value < 1:
+        report.add(
+            codes.NOT_POSITIVE,
+            count.span,
+            f"`{report.text(count.span)}` must be above zero",
+            help="what is never done is left out",
+        )
+        return False
+    return True
+
+
+def _total(items: Sequence[Item]) -> int:
+    """How many steps there are, counted without making them."""
+    return sum(1 if isinstance(item, Step) else item.count.value * _total(item.items) for item in items)
+
+
+def _steps(items: Sequence[Item], *, once: bool) -> Iterator[Step]:
+    """The steps in order. Each is a node of its own: what is found out about a step is kept by its identity."""
+    for item in items:
+        if isinstance(item, Step):
+            yield item.copied()
+        else:
+            for _ in range(1 if once else item.count.value if _total(item.items) else 0):
+                yield from _steps(item.items, once=once)
+
 
 #: a file and all that it imports
 Closure = Callable[[str], frozenset[str]]
 
 
-class Elaborated(NamedTuple):
+class ElaboratedProgram(NamedTuple):
     """The units; of each mission with parameters those that are checked; the rules of templates without a use."""
 
     units: tuple[Unit, ...]
@@ -32,14 +91,14 @@ def elaborate(
     units: Sequence[Unit],
     closure: Closure,
     chosen: str | None = None,
-    settings: Settings | None = None,
-) -> Elaborated:
+    settings: ParameterSettings | None = None,
+) -> ElaboratedProgram:
     """Elaborate a program; `context` has its names as they are written.
 
     The mission `chosen` gets the values of `settings` and its defaults, and must have one for every parameter; all
     other missions are checked for any.
     """
-    missions = _Missions(context, closure, chosen, settings or Settings())
+    missions = _Missions(context, closure, chosen, settings or ParameterSettings())
     seen: set[str] = set()
     found = [
         unit.copied(
@@ -56,7 +115,7 @@ def elaborate(
         if name not in seen
         for rule in sample(context, template)
     ]
-    return Elaborated(tuple(found), missions.instances, tuple(samples))
+    return ElaboratedProgram(tuple(found), missions.instances, tuple(samples))
 
 
 def _policy(context: Context, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
@@ -95,7 +154,7 @@ def _fitting(context: Context, policy: PolicyDecl, rules: tuple[Rule, ...]) -> t
 
 
 class _Missions:
-    def __init__(self, context: Context, closure: Closure, chosen: str | None, settings: Settings) -> None:
+    def __init__(self, context: Context, closure: Closure, chosen: str | None, settings: ParameterSettings) -> None:
         self.instances: dict[str, tuple[Instance, ...]] = {}
         self._context = context
         self._closure = closure
@@ -111,7 +170,7 @@ class _Missions:
         if plain.parameters and ambiguous(self._context, plain):
             self.instances[name] = ()
             return plain
-        if name == self._chosen and (plain.parameters or self._settings != Settings()):
+        if name == self._chosen and (plain.parameters or self._settings != ParameterSettings()):
             one = assigned(self._context, plain, self._settings)
             if one is not None:
                 self.instances[name] = (one,)

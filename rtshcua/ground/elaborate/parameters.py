@@ -1,28 +1,98 @@
-"""A mission with parameters: the one that is compiled, with the values that are given, and those that are checked.
+"""A mission with parameters: the one that is compiled, with the values that are given (`--set height="20 m"`) or its
+defaults, and those that are checked.
 
-A mission is checked for every zone and every choice that its parameters may have, and for both ends of every range:
-at most `MAX_INSTANCES` of these, the defaults first, then each parameter changed alone, then together; fewer of a
-mission with so many steps that it would take minutes.
+The options are read by the language's own parser, and findings underline them: they are a source of their own, one a
+line. A mission is checked for every zone and every choice that its parameters may have, and for both ends of every
+range: at most `MAX_INSTANCES` of these, the defaults first, then each parameter changed alone, then together; fewer of
+a mission with so many steps that it would take minutes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice, product
 
 from rtshcua.diagnostics import codes
-from rtshcua.diagnostics.diagnostic import Diagnostic
-from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.diagnostic import Diagnostic, Label
+from rtshcua.diagnostics.span import Source, Span
+from rtshcua.ground.checker.agent_values import parse_value
+from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.conditions import references
-from rtshcua.ground.checker.context import Context, Instance
-from rtshcua.ground.checker.scope import Argument
+from rtshcua.ground.checker.context import Bound, Context, Instance
+from rtshcua.ground.checker.report import Report
+from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.substitution import names_in, substitute
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import Kind
-from rtshcua.ground.elaborate.settings import Settings
-from rtshcua.ground.elaborate.values import bound_value, value_of
 from rtshcua.model.ir.expression import Coordinates, Quantity, Reference, Value
 from rtshcua.model.ir.missions import MissionDecl, Phase
-from rtshcua.model.ir.places import ENTRY
+from rtshcua.model.ir.node import Name
+from rtshcua.model.ir.places import ENTRY, ZoneDecl
 from rtshcua.model.quantity import display
+
+
+def value_of(bound: Bound, argument: Argument, span: Span) -> Value:
+    """The value of a parameter that is bound to an integer, a zone or a place."""
+    if isinstance(bound, ZoneDecl):
+        return Reference(span=span, name=bound.name.text)
+    if isinstance(bound, Coordinates):
+        return bound.copied(span=span)
+    if argument.type.kind is Kind.ENUMERATION:
+        return Reference(span=span, name=argument.declaration.choices[bound].text)
+    assert argument.type.dimension is not None
+    return Quantity(span=span, value=bound, dimension=argument.type.dimension, datum=argument.type.datum)
+
+
+def bound_value(context: Context, argument: Argument, written: Value, *, heard: bool = True) -> Value | None:
+    """The one value that a written one comes to; None after a finding. A default is heard where it is declared."""
+    report = context.report if heard else Report(context.report.sources)
+    before = len(report.found)
+    bound = bind_value(Scope(context.symbols, report), argument, written)
+    if bound is None or len(report.found) > before:
+        return None
+    return value_of(bound, argument, written.span)
+
+
+#: what the options are called in a finding
+FILE = "--set"
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSettings:
+    """The values by name, the text that they were read from, and what was wrong with it."""
+
+    source: Source = Source(FILE, "")
+    values: tuple[tuple[Name, Value], ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+
+def parse_settings(options: Sequence[str]) -> ParameterSettings:
+    """Options as they are given, `name=value` each."""
+    texts = [" ".join(option.split()) for option in options]
+    values: dict[str, tuple[Name, Value]] = {}
+    found: list[Diagnostic] = []
+    start = 0
+    for text in texts:
+        name, separator, written = text.partition("=")
+        here = Name(span=Span(FILE, start, start + len(name.rstrip())), text=name.strip())
+        at = start + len(name) + 1
+        place = Span(FILE, at, start + len(text))
+        start += len(text) + 1
+        if not separator or not here.text or not written.strip():
+            whole = Span(FILE, here.span.start, place.end)
+            message = f"`{text}` gives no value to a parameter"
+            found.append(Diagnostic(codes.SYNTAX, message, whole, 'write a name and a value, as in `height="20 m"`'))
+            continue
+        value, wrong = parse_value(written, place, at.__add__)
+        found += wrong
+        first = values.get(here.text)
+        if first is not None:
+            message = f"`{here.text}` is given twice"
+            label = Label(first[0].span, "first given here")
+            found.append(Diagnostic(codes.DUPLICATE_ARGUMENT, message, here.span, labels=(label,)))
+        elif value is not None:
+            values[here.text] = (here, value)
+    return ParameterSettings(Source(FILE, "\n".join(texts)), tuple(values.values()), tuple(found))
+
 
 #: for how many combinations of values a mission is checked
 MAX_INSTANCES = 64
@@ -30,7 +100,7 @@ MAX_INSTANCES = 64
 MOST_STEPS = 4_096
 
 
-def assigned(context: Context, mission: MissionDecl, settings: Settings) -> Instance | None:
+def assigned(context: Context, mission: MissionDecl, settings: ParameterSettings) -> Instance | None:
     """The mission with the values that are given and its defaults; None after a finding."""
     before = len(context.report.found)
     given = _given(context, mission, settings)
@@ -60,7 +130,7 @@ def assigned(context: Context, mission: MissionDecl, settings: Settings) -> Inst
     return _instance(mission, values)
 
 
-def _given(context: Context, mission: MissionDecl, settings: Settings) -> Mapping[str, Value]:
+def _given(context: Context, mission: MissionDecl, settings: ParameterSettings) -> Mapping[str, Value]:
     context.report.found += settings.diagnostics
     known = {parameter.name.text for parameter in mission.parameters}
     for name, _ in settings.values:

@@ -11,7 +11,7 @@ from rtshcua.ground.checker.lookup import find_template
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.substitution import names_in, substitute, substitute_roles
 from rtshcua.ground.checker.types import Kind
-from rtshcua.ground.elaborate.values import bound_value, value_of
+from rtshcua.ground.elaborate.parameters import bound_value, value_of
 from rtshcua.model.ir.expression import Reference, Value
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.policies import Rule, TemplateDecl, Use
@@ -21,7 +21,7 @@ from rtshcua.model.ir.skills import Parameter
 ANY_ROLE = "operator"
 
 
-class Given(NamedTuple):
+class TemplateBinding(NamedTuple):
     """The values of a template's parameters, and the roles."""
 
     values: dict[str, Value]
@@ -31,7 +31,7 @@ class Given(NamedTuple):
 def used(context: Context, use: Use) -> tuple[Rule, ...] | None:
     """The rules that a `use` stands for; None after a finding."""
     template = find_template(context, use.template)
-    given = None if template is None else _given(context, template, use)
+    given = None if template is None else _bound(context, template, use)
     return None if template is None or given is None else tuple(_rules(template, given, (use,)))
 
 
@@ -39,7 +39,7 @@ def sample(context: Context, template: TemplateDecl) -> tuple[Rule, ...]:
     """The rules of a template that nothing uses, with values that its parameters may have: its names and types are
     checked with them. Without those that read a parameter which may have none.
     """
-    given = Given({}, {})
+    given = TemplateBinding({}, {})
     known = context.arguments(template)
     for parameter in template.parameters:
         name = parameter.name.text
@@ -66,11 +66,11 @@ def _possible(context: Context, argument: Argument) -> Value | None:
     return value_of(zones[0], argument, parameter.span) if argument.type.kind is Kind.ZONE and zones else None
 
 
-def _given(context: Context, template: TemplateDecl, use: Use) -> Given | None:
+def _bound(context: Context, template: TemplateDecl, use: Use) -> TemplateBinding | None:
     pairs = pair(context, template, use.arguments, use.span)
     if pairs is None:
         return None
-    given = Given({}, {})
+    given = TemplateBinding({}, {})
     known = context.arguments(template)
     good = True
     for parameter in template.parameters:
@@ -110,7 +110,7 @@ def _role(context: Context, parameter: Parameter, written: Value) -> str | None:
     return None
 
 
-def _rules(template: TemplateDecl, given: Given, origin: tuple[Node, ...]) -> Iterator[Rule]:
+def _rules(template: TemplateDecl, given: TemplateBinding, origin: tuple[Node, ...]) -> Iterator[Rule]:
     for rule in template.rules:
         put = substitute_roles(substitute(rule, given.values), given.roles)
         yield put.copied(origin=origin)

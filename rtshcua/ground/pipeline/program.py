@@ -16,7 +16,7 @@ from rtshcua.ground.checker.lookup import find_mission
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import collect, with_uses
 from rtshcua.ground.elaborate.elaborate import elaborate
-from rtshcua.ground.elaborate.settings import Settings
+from rtshcua.ground.elaborate.parameters import ParameterSettings
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.lower.mission import lower_mission
 from rtshcua.ground.lower.policy import LoweredPolicy, lower_policy
@@ -55,7 +55,7 @@ class Compiled:
     declared: frozenset[tuple[str, int]] = frozenset()
 
 
-class Planned(NamedTuple):
+class PlannedMission(NamedTuple):
     """A mission whose way is planned, whatever else is wrong with it, and the policy that it is under."""
 
     under: LoweredPolicy
@@ -74,7 +74,7 @@ class Checked:
     bounds: Mapping[str, Bounds]
     policies: tuple[LoweredPolicy, ...] = ()
     grounds: tuple[ProofContext, ...] = ()  # the same, prepared as on board, with what was asked about them
-    planned: tuple[Planned, ...] = ()
+    planned: tuple[PlannedMission, ...] = ()
 
 
 def compile_program(
@@ -83,7 +83,7 @@ def compile_program(
     *,
     mission: str | None,
     issued_at_us: int,
-    settings: Settings | None = None,
+    settings: ParameterSettings | None = None,
     pins: Pins | None = None,
 ) -> Compiled:
     """Compile one mission (None: the only one of the file that was asked for) and the policy that it is under.
@@ -91,7 +91,7 @@ def compile_program(
     `settings` are values for that mission's parameters; what it claims beyond `pins` is a finding. All declarations are
     checked, and all missions. Never raises for what the sources say.
     """
-    settings = settings or Settings()
+    settings = settings or ParameterSettings()
     candidates = _candidates(program)
     name = mission if mission is not None or len(candidates) != 1 else candidates[0].name.text
     run = Compilation(program, dialect, issued_at_us, name, settings)
@@ -150,18 +150,18 @@ class Compilation:
         dialect: Dialect,
         issued_at_us: int,
         chosen: str | None = None,
-        settings: Settings | None = None,
+        settings: ParameterSettings | None = None,
         issues: Mapping[str, int] | None = None,
     ) -> None:
         self.program = program
         self.issued_at_us = issued_at_us
         self.issues = issues or {}
-        given = settings or Settings()
+        given = settings or ParameterSettings()
         options = {given.source.file: given.source} if given.source.text else {}
         self.report = Report({**program.sources, **options}, program.data)
         self.report.found += program.diagnostics
         self.bounds: dict[str, Bounds] = {}
-        self.planned: dict[str, Planned] = {}
+        self.planned: dict[str, PlannedMission] = {}
         self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], ProofContext | None] = {}
@@ -240,7 +240,7 @@ class Compilation:
             return None
         under = replace(under, lowered=replace(under.lowered, files=lowered.files))
         flat = lowered.mission
-        self.planned.setdefault(mission.name.text, Planned(under.lowered, flat, mission))
+        self.planned.setdefault(mission.name.text, PlannedMission(under.lowered, flat, mission))
         bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat))
         self.bounds[mission.name.text] = greatest(bounds, self.bounds.get(mission.name.text))
         tested = PolicyUnderTest(under.lowered, under.prepared)

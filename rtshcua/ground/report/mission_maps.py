@@ -13,7 +13,7 @@ from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.load import Program
-from rtshcua.ground.pipeline.program import Planned
+from rtshcua.ground.pipeline.program import PlannedMission
 from rtshcua.ground.report.chapter import chapter, mission_view
 from rtshcua.ground.report.drawing.zone_map import ZoneMap, mission_map
 from rtshcua.ground.report.html_page import rendered
@@ -62,7 +62,7 @@ class MissionMap:
 class CheckedProgram:
     """A program, the missions in it whose way is planned, and all that was found."""
 
-    def __init__(self, program: Program, planned: Sequence[Planned], found: Sequence[Diagnostic]) -> None:
+    def __init__(self, program: Program, planned: Sequence[PlannedMission], found: Sequence[Diagnostic]) -> None:
         self._program, self._planned, self._found = program, planned, found
         self._sources: Mapping[str, Source] = program.sources
 

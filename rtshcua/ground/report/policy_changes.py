@@ -14,9 +14,8 @@ from rtshcua.ground.report.prose.phrases import degrees, listed, name, named, ti
 from rtshcua.ground.report.prose.rules_and_skills import describe_evidence, describe_limits, describe_silence
 from rtshcua.ground.report.prose.zones_and_vehicle import describe_fitted, utc
 from rtshcua.ground.report.report_model import ChangeView
-from rtshcua.ground.versions.differences import Difference, compared
+from rtshcua.ground.versions.differences import Difference, Fields, PolicyMeaning, compared
 from rtshcua.ground.versions.direction import direction
-from rtshcua.ground.versions.meaning import Fields, Meaning
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import CHOICE, QUANTITY, Contract, Link, MotionKind, Parameter, TimingClass
 from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind, Speeds, WithoutEvidence
@@ -251,7 +250,7 @@ def changes(old: Policy, new: Policy) -> PolicyChanges:
     common = frozenset(zone.name for zone in old.zones[: old.declared])
     common &= {zone.name for zone in new.zones[: new.declared]}
     moved = old.projection != new.projection
-    before, after = Meaning(old, common, moved=moved), Meaning(new, common, moved=moved)
+    before, after = PolicyMeaning(old, common, moved=moved), PolicyMeaning(new, common, moved=moved)
     known = {rule.meaning for rule in before.rules()}
     return PolicyChanges(
         describe_changes(old, new),

@@ -33,7 +33,7 @@ from rtshcua.ground.report.reported_policy import ReportedPolicy, place_of
 from rtshcua.ground.testing.boundaries.draft import GENERATED
 from rtshcua.ground.testing.case import PolicyUnderTest
 from rtshcua.ground.testing.case_result import CaseResult
-from rtshcua.ground.versions.raised import before
+from rtshcua.ground.versions.raised import newest_earlier
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl
@@ -172,7 +172,7 @@ def policy_report(
             flown.get(digest, {}),
             *nominals_and_cases(tried.get(digest, ())),
             scenarios.get(digest, {}),
-            before(subject.policy, earlier),
+            newest_earlier(subject.policy, earlier),
             since,
         )
         for digest, subject in shared.items()

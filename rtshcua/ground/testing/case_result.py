@@ -8,8 +8,7 @@ from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Label
 from rtshcua.ground.testing.case import PolicyCase
-from rtshcua.ground.why.reads import reads
-from rtshcua.ground.why.trace import Trace, trace
+from rtshcua.ground.why.trace import Trace, read_values, trace
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.policy import Rule
 from rtshcua.model.ir.tests import Expectation
@@ -110,7 +109,7 @@ def _result_help(case: PolicyCase, found: Trace) -> str | None:
             return nothing
         return f"`{allowing[0].text}` allows it, and {nothing}, or a narrower `permit`"
     flat = case.invocation.invocation
-    read = reads(decision.clause, case.policy.prepared.policy, flat.contract, flat.arguments, case.state)
+    read = read_values(decision.clause, case.policy.prepared.policy, flat.contract, flat.arguments, case.state)
     stale = [f"`{each.name}` is stale" for each in read if each.stale and None not in each.values]
     missing = [f"`{each.name}` is unknown" for each in read if None in each.values]
     return ", ".join((*missing, *stale)) or None

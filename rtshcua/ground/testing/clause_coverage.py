@@ -29,7 +29,7 @@ from rtshcua.ground.testing.coverage_goals import (
     Universe,
     universe_of,
 )
-from rtshcua.ground.why.trace import Check, Trace
+from rtshcua.ground.why.trace import ConditionCheck, Trace
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.policy import Airspace, Policy, Rule, RuleKind
@@ -136,7 +136,7 @@ def _reached(universe: Universe, invocation: PreparedInvocation, trace: Trace) -
         yield universe.rules[degrade], Goal.DECIDED
 
 
-def _item_of(universe: Universe, skill: int, check: Check) -> int | None:
+def _item_of(universe: Universe, skill: int, check: ConditionCheck) -> int | None:
     """The item that a check is about; None for a clause that a step of a mission has on its own."""
     clause = check.clause
     if isinstance(clause, Rule):

@@ -1,10 +1,221 @@
-"""In what two policies differ, in a few words each, what matters most first."""
+"""In what two policies differ, in a few words each, what matters most first.
 
-from collections.abc import Iterator, Mapping
+Compared is what a flat policy means, without what only says where and how it was written. Names stand where the flat
+form has indexes, so that a declaration put in between changes nothing but itself. Files, offsets, digests and quoted
+texts are left out; so is what follows from the rest: slots, sets, tables, derived zones.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-from rtshcua.ground.versions.meaning import Fields, Meaning, Written
-from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.code import Clause, Op
+from rtshcua.model.flat.contract import PLACE, ZONE, Contract, Link, Parameter
+from rtshcua.model.flat.policy import Policy, Rule, RuleKind
+from rtshcua.model.flat.signal import POSITION
+
+Part = object
+Fields = Mapping[str, Part]
+
+
+class RuleMeaning(NamedTuple):
+    """What a rule means, and its text."""
+
+    meaning: tuple[Part, ...]
+    kind: int
+    skills: frozenset[str]
+    text: str
+
+
+class PolicyMeaning:
+    """The parts of a policy by name; `zones` are the declared zones that count as members of sets.
+
+    `moved` leaves out local coordinates, for they count from home.
+    """
+
+    def __init__(self, policy: Policy, zones: frozenset[str], *, moved: bool) -> None:
+        self._policy = policy
+        self._common = zones
+        self._moved = moved
+        self._slots: dict[int, str] = {}
+        for signal in policy.signals:
+            self._slots[signal.slot] = signal.name
+            if signal.kind == POSITION:
+                self._slots[signal.slot + 1] = f"{signal.name}.y"
+
+    def vehicle(self) -> Fields:
+        """The vehicle by field, and its home."""
+        vehicle, projection = self._policy.vehicle, self._policy.projection
+        return {
+            "name": vehicle.name,
+            "identity": vehicle.identity,
+            "home": (projection.latitude, projection.longitude, projection.east, projection.north, vehicle.home_within),
+            "speed": vehicle.speed,
+            "climb": vehicle.climb,
+            "position error": vehicle.position_error,
+            "energy": vehicle.endurance_us,
+            "reserve": vehicle.reserve,
+            "local time": vehicle.time_zone or vehicle.utc_offset_us,
+            "brakes": (vehicle.braking, vehicle.reaction_us),
+            "return": vehicle.return_altitude,
+            "speeds": vehicle.speeds,
+        }
+
+    def zones(self) -> Mapping[str, Fields]:
+        """The declared zones."""
+        return {
+            zone.name: {
+                "shape": (zone.shape, () if self._moved else zone.data),
+                "floor": zone.floor,
+                "ceiling": zone.ceiling,
+                "active": (zone.daily, zone.weekly, zone.dates),
+            }
+            for zone in self._policy.zones[: self._policy.declared]
+        }
+
+    def signals(self) -> Mapping[str, Fields]:
+        """The signals that are read."""
+        return {
+            signal.name: {
+                "type": (signal.kind, signal.dimension, tuple(sorted(signal.labels))),
+                "stale": signal.stale_us,
+                "source": signal.sources,
+            }
+            for signal in self._policy.signals
+        }
+
+    def skills(self) -> Mapping[str, Fields]:
+        """The contracts."""
+        return {contract.name: self._contract(contract) for contract in self._policy.contracts}
+
+    def rules(self) -> tuple[RuleMeaning, ...]:
+        """The rules in their order."""
+        return tuple(map(self._rule, self._policy.rules))
+
+    def airspace(self) -> Part:
+        """The zones to be inside and outside of."""
+        airspace = self._policy.airspace
+        return None if airspace is None else (self._names(airspace.inside), self._names(airspace.outside))
+
+    def contingency(self) -> Part:
+        """The links that fly when a step is denied in the air."""
+        return self._chain(self._policy.contingency)
+
+    def without_evidence(self) -> Part:
+        """What a flight does while its records are not kept."""
+        return self._policy.without_evidence
+
+    def without_link(self) -> Part:
+        """What follows after a long silence of the vehicle, and after how long."""
+        return self._policy.silence_us, self._policy.after_silence
+
+    def without(self) -> frozenset[str]:
+        """The signals whose sensors the vehicle lacks."""
+        return frozenset(self._policy.vehicle.without)
+
+    def _contract(self, contract: Contract) -> Fields:
+        own = contract.parameters
+        return {
+            "parameters": tuple(map(_parameter, own)),
+            "motion": contract.motion,
+            "class": contract.timing_class,
+            "deadline": contract.deadline_us,
+            "valid": (contract.validity_us, frozenset(contract.phases)),
+            "lasts": contract.duration_us,
+            "grace": contract.grace_us,
+            "require": self._clauses(contract.require, own),
+            "assume": self._clauses(contract.assume, own),
+            "maintain": self._clauses(contract.maintain, own),
+            "fallback": self._chain(contract.fallback),
+            "energy": contract.energy,
+            "record": frozenset(contract.record),
+        }
+
+    def _rule(self, rule: Rule) -> RuleMeaning:
+        policy = self._policy
+        skills = frozenset(policy.contracts[number].name for number in rule.skills)
+        parameters = policy.contracts[rule.skills[0]].parameters if rule.skills else ()
+        meaning = (
+            rule.kind,
+            skills,
+            frozenset(policy.roles[number] for number in rule.roles),
+            frozenset(rule.sources),
+            None if rule.when is None else self._code(rule.when, parameters),
+            "" if rule.approver == -1 else policy.roles[rule.approver],
+            "" if rule.second == -1 else policy.roles[rule.second],
+            rule.within_us,
+            None if rule.target is None else self._link(rule.target),
+        )
+        return RuleMeaning(meaning, rule.kind, skills, rule.text)
+
+    def _chain(self, links: Iterable[Link]) -> Part:
+        return tuple(map(self._link, links))
+
+    def _link(self, link: Link) -> Part:
+        contract = self._policy.contracts[link.skill]
+        given = tuple(self._argument(parameter, link.arguments) for parameter in contract.parameters)
+        return contract.name, given, link.limit_us
+
+    def _argument(self, parameter: Parameter, cells: tuple[int, ...]) -> Part:
+        value = cells[parameter.cell]
+        if parameter.kind == ZONE:
+            return self._zone(value)
+        if parameter.kind == PLACE:
+            return None if self._moved else (value, cells[parameter.cell + 1])
+        return value
+
+    def _clauses(self, clauses: Iterable[Clause], parameters: tuple[Parameter, ...]) -> Part:
+        return tuple(self._code(clause, parameters) for clause in clauses)
+
+    def _code(self, clause: Clause, parameters: tuple[Parameter, ...]) -> Part:
+        code = clause.code
+        zones = frozenset(parameter.cell for parameter in parameters if parameter.kind == ZONE)
+        return tuple(
+            (op, *self._operands(op, a, b, zones)) for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True)
+        )
+
+    def _operands(self, op: int, a: int, b: int, zones: frozenset[int]) -> tuple[Part, ...]:
+        policy = self._policy
+        match op:
+            case Op.SIGNAL | Op.KNOWN:
+                return (self._slots[a],)
+            case Op.SIGNAL_IN:
+                return self._slots[a], policy.sets[b]
+            case Op.ARGUMENT_IN if a in zones:
+                return a, self._names(policy.sets[b]) & self._common
+            case Op.ARGUMENT_IN:
+                return a, policy.sets[b]
+            case Op.POSITION_IN:
+                return (self._zone(a),)
+            case Op.POSITION_IN_ARGUMENT:
+                return a, frozenset(
+                    (self._zone(n), self._zone(to))
+                    for n, to in enumerate(policy.tables[b])
+                    if self._zone(n) in self._common
+                )
+            case Op.ARGUMENT_POINT_IN:
+                return a, self._zone(b)
+            case Op.WEEK_IN:
+                return (policy.sets[a],)
+            case Op.PHASE_IN:
+                return (frozenset(policy.phases[number] for number in policy.sets[b]),)
+            case Op.MONITOR:
+                monitor = policy.monitors[a]
+                return monitor.kind, monitor.window_us, self._code(monitor.when, ())
+            case _:
+                return a, b
+
+    def _zone(self, number: int) -> str:
+        return self._policy.zones[number].name
+
+    def _names(self, zones: Iterable[int]) -> frozenset[str]:
+        return frozenset(map(self._zone, zones))
+
+
+def _parameter(parameter: Parameter) -> Part:
+    """A parameter; one that is a zone may be any, so how many there are says nothing of it."""
+    ends = None if parameter.kind == ZONE else (parameter.low, parameter.high)
+    return parameter.name, parameter.kind, parameter.dimension, parameter.cell, ends, parameter.labels
+
 
 #: so much of a rule's text is quoted
 _QUOTED = 60
@@ -36,10 +247,10 @@ def compared(old: Policy, new: Policy) -> tuple[Difference, ...]:
     zones = frozenset(zone.name for zone in old.zones[: old.declared])
     common = zones & {zone.name for zone in new.zones[: new.declared]}
     moved = old.projection != new.projection
-    return tuple(_differences(Meaning(old, common, moved=moved), Meaning(new, common, moved=moved)))
+    return tuple(_differences(PolicyMeaning(old, common, moved=moved), PolicyMeaning(new, common, moved=moved)))
 
 
-def _differences(old: Meaning, new: Meaning) -> Iterator[Difference]:
+def _differences(old: PolicyMeaning, new: PolicyMeaning) -> Iterator[Difference]:
     # what is no longer watched comes first: a finding tells of few differences
     for name in sorted(new.without() - old.without()):
         words = f"looser: the vehicle is now without the signal `{name}`, and clauses `where fitted` on it are left out"
@@ -79,7 +290,7 @@ def _fields(old: Fields, new: Fields) -> tuple[str, ...]:
     return tuple(name for name, value in new.items() if value != old[name])
 
 
-def _rules(old: tuple[Written, ...], new: tuple[Written, ...]) -> Iterator[Difference]:
+def _rules(old: tuple[RuleMeaning, ...], new: tuple[RuleMeaning, ...]) -> Iterator[Difference]:
     gone, more = _without(old, new), _without(new, old)
     for rule in more:
         before = next((each for each in gone if each.kind == rule.kind and _alike(each, rule)), None)
@@ -95,16 +306,16 @@ def _rules(old: tuple[Written, ...], new: tuple[Written, ...]) -> Iterator[Diffe
             yield Difference(f"the order of its `{kind.name.lower()}` rules", "order", kind.name.lower())
 
 
-def _without(rules: tuple[Written, ...], others: tuple[Written, ...]) -> list[Written]:
+def _without(rules: tuple[RuleMeaning, ...], others: tuple[RuleMeaning, ...]) -> list[RuleMeaning]:
     """The rules whose meaning none of the others has; one that is written twice says no more than once."""
     known = {rule.meaning for rule in others}
     return [rule for rule in rules if rule.meaning not in known]
 
 
-def _alike(one: Written, other: Written) -> bool:
+def _alike(one: RuleMeaning, other: RuleMeaning) -> bool:
     return one.skills == other.skills or not one.skills.isdisjoint(other.skills)
 
 
-def _quoted(rule: Written) -> str:
+def _quoted(rule: RuleMeaning) -> str:
     text = " ".join(rule.text.split())
     return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 3]}..."

@@ -9,8 +9,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from rtshcua.ground.versions.differences import Difference
-from rtshcua.ground.versions.meaning import Fields, Meaning, Written
+from rtshcua.ground.versions.differences import Difference, Fields, PolicyMeaning, RuleMeaning
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind
 from rtshcua.model.flat.zone import CIRCLE, Zone
@@ -38,7 +37,7 @@ def direction(one: Difference, old: Policy, new: Policy) -> str:
     """What one difference does: `STRICTER`, `LOOSER` or `CANNOT_TELL`."""
     common = {zone.name for zone in old.zones[: old.declared]} & {zone.name for zone in new.zones[: new.declared]}
     moved = old.projection != new.projection
-    before, after = (Meaning(policy, frozenset(common), moved=moved) for policy in (old, new))
+    before, after = (PolicyMeaning(policy, frozenset(common), moved=moved) for policy in (old, new))
     match one.what:
         case "sensor":
             return LOOSER if one.name in new.vehicle.without else STRICTER
@@ -80,12 +79,12 @@ def _turned(found: str) -> str:
 # ------------------------------------------------------------------------------------------ rules
 
 
-def _written(meaning: Meaning, text: str) -> Written | None:
+def _written(meaning: PolicyMeaning, text: str) -> RuleMeaning | None:
     return next((each for each in meaning.rules() if text and each.text == text), None)
 
 
-def _rule(old: Written | None, new: Written | None) -> str:
-    kind = (new or old or Written((), RuleKind.DEGRADE, frozenset(), "")).kind
+def _rule(old: RuleMeaning | None, new: RuleMeaning | None) -> str:
+    kind = (new or old or RuleMeaning((), RuleKind.DEGRADE, frozenset(), "")).kind
     if kind == RuleKind.DEGRADE:  # what flies instead may be safer or not
         return CANNOT_TELL
     if old is None or new is None:

@@ -24,7 +24,7 @@ _VERSION = re.compile(
 )
 
 
-class Compared(NamedTuple):
+class VersionComparison(NamedTuple):
     """A policy that an earlier one was found for, and what is wrong with its version."""
 
     name: str
@@ -37,21 +37,21 @@ class Compared(NamedTuple):
 
 def compare(
     policies: Iterable[LoweredPolicy], earlier: Sequence[Policy], where: str, sources: Mapping[str, Source]
-) -> tuple[Compared, ...]:
+) -> tuple[VersionComparison, ...]:
     """Each policy against the earlier one of its name and vehicle; `where` says in a message where that is from.
 
     A policy for another vehicle is another policy: it is not compared. Of several earlier ones the newest counts.
     """
-    found: list[Compared] = []
+    found: list[VersionComparison] = []
     for lowered in policies:
-        old = before(lowered.policy, earlier)
+        old = newest_earlier(lowered.policy, earlier)
         if old is not None:
             finding = _finding(lowered, old, where, sources)
-            found.append(Compared(old.name, lowered.policy.version, old.version, finding, old, lowered.policy))
+            found.append(VersionComparison(old.name, lowered.policy.version, old.version, finding, old, lowered.policy))
     return tuple(found)
 
 
-def before(policy: Policy, earlier: Iterable[Policy]) -> Policy | None:
+def newest_earlier(policy: Policy, earlier: Iterable[Policy]) -> Policy | None:
     """The earlier policy that one is held against: of its name and vehicle the newest."""
     own = [each for each in earlier if _same(each, policy)]
     return max(own, key=lambda each: (each.version, not differences(each, policy)), default=None)

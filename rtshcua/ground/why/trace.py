@@ -1,4 +1,5 @@
-"""A decision step by step: what each step of design 4.1 looked at, what it found, and what decided.
+"""A decision step by step: what each step of design 4.1 looked at, what it found, and what decided; and what a
+condition read, by name and value.
 
 It calls the very steps that `decide` calls, and the conditions that they call; nothing is decided here.
 """
@@ -15,7 +16,73 @@ from rtshcua.decision.prepare import Guards, PreparedInvocation, PreparedPolicy
 from rtshcua.decision.situation import environment, ranging, situation
 from rtshcua.decision.values import EVERYWHERE, Truth
 from rtshcua.model.decision import Decision, Decisive
+from rtshcua.model.flat.code import Clause, Op
+from rtshcua.model.flat.contract import Contract
+from rtshcua.model.flat.policy import Airspace, Policy, Rule
+from rtshcua.model.flat.signal import POSITION, Signal
 from rtshcua.model.flat.situation import Context, Now, State
+
+
+class ReadValue(NamedTuple):
+    """A signal with the cells that it owns (None: nothing valid), or an argument of the request; stale if too old."""
+
+    name: str
+    signal: Signal | None
+    values: tuple[int | None, ...]
+    stale: bool
+
+
+def read_values(
+    clause: Decisive, policy: Policy, contract: Contract, arguments: tuple[int, ...], state: State
+) -> list[ReadValue]:
+    """Signals and arguments in the order in which they are named, each once."""
+    found: dict[str, ReadValue] = {}
+    code = _code(clause)
+    for at in range(0, len(code), 3):
+        op, a = code[at], code[at + 1]
+        if op in (Op.SIGNAL, Op.SIGNAL_IN, Op.KNOWN):
+            _note_signal(found, a, policy, state)
+        elif op in (Op.ARGUMENT, Op.ARGUMENT_IN, Op.ARGUMENT_POINT_IN):
+            _note_argument(found, a, contract, arguments)
+        elif op in (Op.POSITION_IN, Op.POSITION_IN_ARGUMENT):
+            _note_place(found, policy, state)
+            if op == Op.POSITION_IN_ARGUMENT:
+                _note_argument(found, a, contract, arguments)
+        elif op == Op.MONITOR:
+            for read in read_values(policy.monitors[a].when, policy, contract, arguments, state):
+                found.setdefault(read.name, read)
+    if isinstance(clause, Airspace):
+        _note_place(found, policy, state)
+    return list(found.values())
+
+
+def _code(clause: Decisive) -> tuple[int, ...]:
+    if isinstance(clause, Rule):
+        return () if clause.when is None else clause.when.code
+    return clause.code if isinstance(clause, Clause) else ()
+
+
+def _note_place(found: dict[str, ReadValue], policy: Policy, state: State) -> None:
+    for slot in (policy.vehicle.position, policy.vehicle.height):
+        if slot != -1:
+            _note_signal(found, slot, policy, state)
+
+
+def _note_signal(found: dict[str, ReadValue], slot: int, policy: Policy, state: State) -> None:
+    signal = next(each for each in policy.signals if slot - _width(each) < each.slot <= slot)
+    slot, width = signal.slot, _width(signal)
+    stale = max(state.ages[slot : slot + width]) > signal.stale_us
+    found.setdefault(signal.name, ReadValue(signal.name, signal, state.values[slot : slot + width], stale))
+
+
+def _width(signal: Signal) -> int:
+    return 2 if signal.kind == POSITION else 1
+
+
+def _note_argument(found: dict[str, ReadValue], cell: int, contract: Contract, arguments: tuple[int, ...]) -> None:
+    parameter = next(each for each in contract.parameters if each.cell == cell)
+    found.setdefault(parameter.name, ReadValue(parameter.name, None, arguments[cell : cell + 1], False))
+
 
 #: the steps in their order, by the numbers and names of design 4.1
 NAMES = (
@@ -30,7 +97,7 @@ NAMES = (
 )
 
 
-class Check(NamedTuple):
+class ConditionCheck(NamedTuple):
     """One thing that a step looked at: a word for its role, its clause (None: a field), and its truth."""
 
     role: str
@@ -38,16 +105,16 @@ class Check(NamedTuple):
     truth: Truth
 
 
-class Traced(NamedTuple):
+class TracedStep(NamedTuple):
     """A step: `passed` is None where an earlier one decided, so that this one was not reached."""
 
     number: str
     name: str
     passed: bool | None
-    checks: tuple[Check, ...]
+    checks: tuple[ConditionCheck, ...]
 
 
-class Tried(NamedTuple):
+class TriedLink(NamedTuple):
     """A link of the fallback chain, and whether it may fly now."""
 
     text: str
@@ -58,8 +125,8 @@ class Trace(NamedTuple):
     """A decision, the way to it, the links that it chose from, and the nearest values that would have passed."""
 
     decision: Decision
-    steps: tuple[Traced, ...]
-    chain: tuple[Tried, ...]
+    steps: tuple[TracedStep, ...]
+    chain: tuple[TriedLink, ...]
     nearest: tuple[Nearest, ...]
 
 
@@ -68,28 +135,28 @@ def trace(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, 
     decision = decide(invocation, state, policy, context, now)
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
-    traced: list[Traced] = []
+    traced: list[TracedStep] = []
     decided = False
     found = steps(invocation, policy, context, sets, at, exact=True)
     for number, name in NAMES:
         if decided:
-            traced.append(Traced(number, name, None, ()))
+            traced.append(TracedStep(number, name, None, ()))
             continue
         decided = next(found)[1][0] is not PASS
-        traced.append(Traced(number, name, not decided, tuple(_checks(name, invocation, at))))
-    chain = tuple(Tried(link.link.text, link_admissible(link, state, policy, now)) for link in invocation.chain)
+        traced.append(TracedStep(number, name, not decided, tuple(_checks(name, invocation, at))))
+    chain = tuple(TriedLink(link.link.text, link_admissible(link, state, policy, now)) for link in invocation.chain)
     return Trace(decision, tuple(traced), chain, nearest(decision, invocation, state, policy, now))
 
 
-def _checks(step: str, invocation: PreparedInvocation, at: Environment) -> Iterator[Check]:
+def _checks(step: str, invocation: PreparedInvocation, at: Environment) -> Iterator[ConditionCheck]:
     """The conditions of a step, in the order in which it looks at them."""
     candidates = invocation.candidates
     if step == "authority":
         for rule in (*candidates.forbids, *candidates.permits):
-            yield Check("forbid" if rule in candidates.forbids else "permit", rule.rule, rule.condition(at))
+            yield ConditionCheck("forbid" if rule in candidates.forbids else "permit", rule.rule, rule.condition(at))
     elif step == "confirmation":
         for rule in candidates.confirms:
-            yield Check("confirm", rule.rule, rule.condition(at))
+            yield ConditionCheck("confirm", rule.rule, rule.condition(at))
     elif step == "state":
         yield from _clauses("require", invocation.require, at)
         yield from _clauses("assume", invocation.assume, at)
@@ -97,20 +164,22 @@ def _checks(step: str, invocation: PreparedInvocation, at: Environment) -> Itera
         yield from _safety(invocation, at)
 
 
-def _clauses(role: str, guards: Guards, at: Environment) -> Iterator[Check]:
+def _clauses(role: str, guards: Guards, at: Environment) -> Iterator[ConditionCheck]:
     for clause, condition in guards:
-        yield Check(role, clause, EVERYWHERE[condition(at)])
+        yield ConditionCheck(role, clause, EVERYWHERE[condition(at)])
 
 
-def _safety(invocation: PreparedInvocation, at: Environment) -> Iterator[Check]:
+def _safety(invocation: PreparedInvocation, at: Environment) -> Iterator[ConditionCheck]:
     policy = invocation.policy
     known = policy.tables.known
     volume = invocation.planner.volume(at.slots, known)
     through = longest(invocation.invocation.contract, policy.policy.vehicle)
     if policy.airspace is not None:
-        yield Check("airspace", policy.airspace.airspace, EVERYWHERE[policy.airspace.keeps(volume.place, at, through)])
+        yield ConditionCheck(
+            "airspace", policy.airspace.airspace, EVERYWHERE[policy.airspace.keeps(volume.place, at, through)]
+        )
     yield from _clauses("maintain", invocation.maintain, ranging(at, volume, known.height, through))
     enough = invocation.energy.suffices(at.slots[known.battery], volume, at.slots[known.drain])
-    yield Check("energy", None, EVERYWHERE[enough])
+    yield ConditionCheck("energy", None, EVERYWHERE[enough])
     for rule in invocation.candidates.degrades:
-        yield Check("degrade", rule.rule, rule.condition(at))
+        yield ConditionCheck("degrade", rule.rule, rule.condition(at))

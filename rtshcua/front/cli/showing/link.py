@@ -5,8 +5,7 @@ from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.why import truth_of
-from rtshcua.ground.why.link import LinkTrace
-from rtshcua.ground.why.recorded import state_of
+from rtshcua.ground.why.logged_decisions import LinkTrace, state_of
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
 from rtshcua.model.flat.situation import State

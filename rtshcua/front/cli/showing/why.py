@@ -10,8 +10,7 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.front.cli.showing.people import NOBODY, People
-from rtshcua.ground.why.reads import Read, reads
-from rtshcua.ground.why.trace import Check, Trace, Traced
+from rtshcua.ground.why.trace import ConditionCheck, ReadValue, Trace, TracedStep, read_values
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Policy
@@ -93,14 +92,14 @@ def _subject(policy: Policy, invocation: PreparedInvocation) -> str:
     return f"Step {number_of(flat.step)}, {flat.contract.name}({arguments})"
 
 
-def _step(page: Page, step: Traced, case: Case, decisive: Decisive) -> dict[str, object]:
+def _step(page: Page, step: TracedStep, case: Case, decisive: Decisive) -> dict[str, object]:
     invocation, state = case.invocation, case.state
     verdict = {True: "passes", False: "decides", None: "not reached"}[step.passed]
     fact = "" if step.passed is None else _fact(step.number, case)
     page.row(f"{step.number:<2} {step.name}", f"{verdict}{': ' * bool(fact)}{fact}", width=16)
     checks: list[dict[str, object]] = []
     for check in step.checks:
-        read = reads(
+        read = read_values(
             check.clause,
             invocation.policy.policy,
             invocation.invocation.contract,
@@ -160,7 +159,7 @@ def _answer(policy: Policy, given: ConfirmAnswer, now: Now, people: People) -> s
     return f"{said} as {role}{f' by {by}' if by else ''}, {utc(now.utc_us - ago_us)}, {ago_us / 1_000_000:.1f} s before"
 
 
-def truth_of(check: Check) -> str:
+def truth_of(check: ConditionCheck) -> str:
     """A check's truth in a word: rules that count against a step match, or do not."""
     word = _TRUTHS.get(check.truth, "unknown")
     if check.role in _AGAINST:
@@ -179,7 +178,7 @@ def _place(policy: Policy, clause: Decisive) -> str:
     return f"in {policy.sources[clause.source]}, from character {clause.start}"
 
 
-def _read(invocation: PreparedInvocation, read: Read) -> str:
+def _read(invocation: PreparedInvocation, read: ReadValue) -> str:
     policy = invocation.policy.policy
     if read.signal is None:
         contract = invocation.invocation.contract
@@ -189,7 +188,7 @@ def _read(invocation: PreparedInvocation, read: Read) -> str:
     return f"{read.name} = {value}{' (stale)' if read.stale else ''}"
 
 
-def _value(policy: Policy, read: Read) -> str:
+def _value(policy: Policy, read: ReadValue) -> str:
     assert read.signal is not None
     known = [value for value in read.values if value is not None]
     if read.signal.kind == POSITION:
@@ -199,7 +198,7 @@ def _value(policy: Policy, read: Read) -> str:
     return words.quantity(known[0], read.signal.dimension)
 
 
-def _for_program(read: list[Read]) -> list[dict[str, object]]:
+def _for_program(read: list[ReadValue]) -> list[dict[str, object]]:
     return [{"name": each.name, "values": list(each.values), "stale": each.stale} for each in read]
 
 

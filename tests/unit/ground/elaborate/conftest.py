@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.ground.elaborate.settings import parse_settings
+from rtshcua.ground.elaborate.parameters import parse_settings
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.pipeline.program import Checked, Compiled, compile_program, examine_program
 from rtshcua.mavlink import dialect

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from rtshcua.diagnostics.render import render
 from rtshcua.ground.checker.context import Instance
 from rtshcua.ground.elaborate import parameters
-from rtshcua.ground.elaborate.parameters import MAX_INSTANCES, MOST_STEPS, _combinations, _instance
-from rtshcua.ground.elaborate.settings import parse_settings
+from rtshcua.ground.elaborate.parameters import MAX_INSTANCES, MOST_STEPS, _combinations, _instance, parse_settings
 from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.model.ir.expression import Value
 from rtshcua.model.ir.missions import MissionDecl

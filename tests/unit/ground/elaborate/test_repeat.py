@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.elaborate.repeat import unrolled
+from rtshcua.ground.elaborate.elaborate import unrolled
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.model.flat.limits import MAX_INVOCATIONS

@@ -12,7 +12,7 @@ from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.ground.versions.differences import compared as parted
 from rtshcua.ground.versions.differences import differences
 from rtshcua.ground.versions.direction import CANNOT_TELL, LOOSER, STRICTER, direction
-from rtshcua.ground.versions.raised import Compared, compare
+from rtshcua.ground.versions.raised import VersionComparison, compare
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
 
@@ -202,7 +202,7 @@ def test_a_zone_that_lies_elsewhere_in_the_list_is_not_another(before: LoweredPo
     assert differences(after, before.policy) == ("the zone `shed`, which is gone",)
 
 
-def compared(before: LoweredPolicy, text: str) -> Compared:
+def compared(before: LoweredPolicy, text: str) -> VersionComparison:
     program = load_text(text)
     checked = examine_program(program, dialect.load())
     (found,) = compare(checked.policies, [before.policy], "old.bundle", program.sources)

@@ -1,9 +1,15 @@
-"""A state changed by hand: `battery=20 %`, `gps.fix=fix_3d`, `position=47.39 N, 8.54 E`, `wind.speed=unknown`."""
+"""A state to begin from: where the plan has the vehicle before a step, signals as the contract requires them, and what
+is set by hand: `battery=20 %`, `gps.fix=fix_3d`, `position=47.39 N, 8.54 E`, `wind.speed=unknown`.
+"""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from rtshcua.decision.nearest import ChangeSearch, nearest_in
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.situation import environment, situation
+from rtshcua.decision.temporal import lasting
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import nearest
@@ -12,12 +18,92 @@ from rtshcua.ground.checker.ranges import accepted
 from rtshcua.ground.checker.symbols import Extent
 from rtshcua.ground.language.exact_values import exact
 from rtshcua.mavlink.dialect import Dialect
-from rtshcua.model.flat.limits import MAX_VALUE
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.limits import FULL, MAX_VALUE
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
-from rtshcua.model.flat.situation import State
+from rtshcua.model.flat.signal import CELL, ENUMERATION, POSITION, Signal
+from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.flat.zone import MAX_COORDINATE, project
 from rtshcua.model.quantity import UNITS, Dimension
+
+#: one clause may undo what another was content with, so they are gone through again, a few times
+_ROUNDS = 4
+
+#: what a full cell of a lithium battery gives, mV
+_FULL_CELL = 4_200
+
+
+def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: PreparedPolicy, now: Now) -> State:
+    """A fresh state in which the step's own clauses hold, as far as changes of single signals can bring that about."""
+    invocation, flat = invocations[step], policy.policy
+    values = _start(flat)
+    x, y, height = place_before(invocations, step)
+    for slot, value in ((flat.vehicle.position, x), (flat.vehicle.position + 1, y), (flat.vehicle.height, height)):
+        values[slot] = value
+    values[flat.vehicle.battery] = FULL
+    for signal in flat.signals:
+        if signal.name == CELL:
+            values[signal.slot] = _FULL_CELL
+    fixed = {flat.vehicle.position, flat.vehicle.position + 1, flat.vehicle.height}
+    for _ in range(_ROUNDS):
+        for clause in _clauses_of(invocation):
+            _satisfy(clause, invocation, policy, now, values, fixed)
+    return lasting(_fresh_state(values), policy, now)
+
+
+def place_before(invocations: Sequence[PreparedInvocation], step: int) -> tuple[int, int, int]:
+    """Where the plans of the steps before have taken the vehicle: local x, y and height, mm; at home to begin with."""
+    x, y, height = 0, 0, 0
+    for invocation in invocations[:step]:
+        plan = invocation.invocation.plan
+        if plan.path:
+            x, y = plan.path[-2:]
+        if plan.kind in (MotionKind.HOME, MotionKind.LAND):
+            height = 0
+        elif plan.kind != MotionKind.HOLD:
+            height = plan.altitude
+    return x, y, height
+
+
+def _start(policy: Policy) -> list[int | None]:
+    values: list[int | None] = [0] * policy.slots
+    for signal in policy.signals:
+        if signal.kind == ENUMERATION and signal.labels:
+            known = {unknown for source in signal.sources for unknown in source.unknown}
+            values[signal.slot] = next((value for value, _ in signal.labels if value not in known), signal.labels[0][0])
+        elif signal.kind == POSITION:
+            values[signal.slot + 1] = 0
+    return values
+
+
+def _fresh_state(values: Sequence[int | None]) -> State:
+    return State(tuple(values), (0,) * len(values))
+
+
+def _clauses_of(invocation: PreparedInvocation) -> Iterator[Clause]:
+    for guards in (invocation.require, invocation.assume, invocation.maintain):
+        yield from (clause for clause, _ in guards)
+
+
+def _satisfy(
+    clause: Clause,
+    invocation: PreparedInvocation,
+    policy: PreparedPolicy,
+    now: Now,
+    values: list[int | None],
+    fixed: set[int],
+) -> None:
+    """Change the signals that a clause reads, but for where the vehicle is, so that it is true."""
+    sets = situation(_fresh_state(values), policy, now)
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
+    node = policy.compiler.node(clause, invocation.invocation.contract)
+    for change in ChangeSearch(at, policy.tables, signals_only=True).find(node, True) or ():
+        if change.argument or change.at is None or change.at in fixed:
+            continue
+        choices = change.choices
+        values[change.at] = min(choices) if choices else nearest_in(change, at.slots[change.at])
+
 
 NOT_KNOWN = "unknown"
 _TRUTHS = {"true": TRUE, "false": FALSE, NOT_KNOWN: UNKNOWN}
@@ -25,27 +111,27 @@ _NUMBER = re.compile(r"(-?)\s*([0-9][0-9_]*(?:\.[0-9]+)?)\s*(\S*)(?:\s+above\s+h
 _PLACE = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([NS])\s*,\s*([0-9]+(?:\.[0-9]+)?)\s*([EW])")
 
 
-class Setting(NamedTuple):
+class SignalOverride(NamedTuple):
     """What is set, and to what, as written."""
 
     name: str
     text: str
 
 
-def settings(texts: Sequence[str]) -> tuple[Setting, ...] | Refusal:
+def read_overrides(texts: Sequence[str]) -> tuple[SignalOverride, ...] | Refusal:
     """What is set by hand, each signal and each condition once."""
-    found: dict[str, Setting] = {}
+    found: dict[str, SignalOverride] = {}
     for each in texts:
         name, equals, text = (" ".join(part.split()) for part in each.rpartition("="))
         if not equals:
             return Refusal("usage", f"`{each}` sets nothing", "write a signal and its value: `battery=20 %`")
         if name in found:
             return Refusal("usage", f"`{name}` is given twice", "keep one of them")
-        found[name] = Setting(name, text)
+        found[name] = SignalOverride(name, text)
     return tuple(found.values())
 
 
-def given(state: State, setting: Setting, policy: Policy, dialect: Dialect) -> State | Refusal:
+def overridden(state: State, setting: SignalOverride, policy: Policy, dialect: Dialect) -> State | Refusal:
     """The state with one signal changed; `name=unknown` for one that is missing, `CONDITION=true` over time.
 
     As in a test, what the signal has under `unknown at` is missing, and what its fields cannot carry is refused.
@@ -59,7 +145,7 @@ def given(state: State, setting: Setting, policy: Policy, dialect: Dialect) -> S
     if text == NOT_KNOWN:
         found: tuple[int | None, ...] | Refusal = (None,) * len(slots)
     else:
-        found = _value(signal, text, policy, dialect)
+        found = _signal_value(signal, text, policy, dialect)
         if not isinstance(found, Refusal) and means_unknown(signal, found[0]):
             found = (None,)
     if isinstance(found, Refusal):
@@ -87,19 +173,19 @@ def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Re
     return State(state.values, state.ages, monitors)
 
 
-def _value(signal: Signal, text: str, policy: Policy, dialect: Dialect) -> tuple[int, ...] | Refusal:
+def _signal_value(signal: Signal, text: str, policy: Policy, dialect: Dialect) -> tuple[int, ...] | Refusal:
     if signal.kind == POSITION:
-        return _place(signal, text, policy)
+        return _place_value(signal, text, policy)
     if signal.kind == ENUMERATION:
         value = next((value for value, label in signal.labels if label == text), None)
         labels = [label for _, label in signal.labels]
         near = nearest(text, labels)
         help = f"did you mean `{near}`?" if near is not None else f"it is one of {', '.join(labels)}"
         return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help) if value is None else (value,)
-    return _number(signal, text, reported_range(signal, dialect))
+    return _number_value(signal, text, reported_range(signal, dialect))
 
 
-def _number(signal: Signal, text: str, values: Extent) -> tuple[int, ...] | Refusal:
+def _number_value(signal: Signal, text: str, values: Extent) -> tuple[int, ...] | Refusal:
     dimension = Dimension(signal.dimension)
     measured = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
     units = ", ".join(f"`{name}`" for name, unit in UNITS.items() if unit.dimension is measured)
@@ -116,7 +202,7 @@ def _number(signal: Signal, text: str, values: Extent) -> tuple[int, ...] | Refu
     return (found.value,)
 
 
-def _place(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refusal:
+def _place_value(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] | Refusal:
     match = _PLACE.fullmatch(text)
     help = "write `47.39774 N, 8.54559 E`, within 500 km of home"
     if match is None:

@@ -1,4 +1,5 @@
-"""A decision on a link, of a step's fallback or of the contingency: what it looked at, and what else might have flown.
+"""Decisions of a log: the inputs that a record holds; and a decision on a link, of a step's fallback or of the
+contingency, with what it looked at and what else might have flown.
 
 Links skip most steps of design 4.1 (`decision.fallbacks`): their own `require`, and the airspace where they move.
 """
@@ -12,10 +13,35 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedLink, PreparedP
 from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.values import EVERYWHERE
 from rtshcua.evidence.records import DecisionRecord
-from rtshcua.ground.why.recorded import now_of, state_of
-from rtshcua.ground.why.trace import Check, Tried
+from rtshcua.ground.why.trace import ConditionCheck, TriedLink
 from rtshcua.model.flat.policy import Rule
+from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.wire.request import CONTINGENCY_LINK
+
+
+def state_of(record: DecisionRecord) -> State:
+    """The state that was read."""
+    return State(record.state.values, record.state.ages, record.state.monitors)
+
+
+def now_of(record: DecisionRecord) -> Now:
+    """The moment of the decision."""
+    return Now(record.at_us, record.utc_us, record.utc_error_us)
+
+
+def context_of(record: DecisionRecord) -> Context:
+    """Where the mission stood. Raises ValueError where the binding is not hexadecimal."""
+    given = record.context
+    return Context(
+        bytes.fromhex(record.binding),
+        given.vehicle,
+        given.policy_version,
+        given.consumed,
+        given.released_us,
+        given.phase,
+        given.remaining_us,
+        tuple(ConfirmAnswer(*approval) for approval in given.approvals),
+    )
 
 
 class LinkTrace(NamedTuple):
@@ -25,9 +51,9 @@ class LinkTrace(NamedTuple):
 
     link: PreparedLink
     rule: Rule | None
-    checks: tuple[Check, ...]
+    checks: tuple[ConditionCheck, ...]
     admissible: bool
-    chain: tuple[Tried, ...]
+    chain: tuple[TriedLink, ...]
 
 
 def trace_link(
@@ -54,8 +80,8 @@ def trace_link(
     else:
         return None
     at = environment(situation(state, policy, now), policy, link.arguments, phase)
-    checks = tuple(Check("require", clause, EVERYWHERE[condition(at)]) for clause, condition in link.require)
-    tried = tuple(Tried(each.link.text, link_admissible(each, state, policy, now, phase)) for each in chain)
+    checks = tuple(ConditionCheck("require", clause, EVERYWHERE[condition(at)]) for clause, condition in link.require)
+    tried = tuple(TriedLink(each.link.text, link_admissible(each, state, policy, now, phase)) for each in chain)
     return LinkTrace(link, rule, checks, link_admissible(link, state, policy, now, phase), tried)
 
 

@@ -12,6 +12,7 @@
 | `unseen` | motion after a takeover | a velocity or a pause in its takeoff |
 | `unseen` | motion after a takeover | a go-to in its takeoff to where that ends |
 | `unseen` | motion after a takeover | sticks that nudge; PX4's pause in a stop, or a climb's end |
+| `unseen` | motion after a takeover | PX4's pause or go-to in Hold while its report of the target stands still |
 | `unseen` | motion after a takeover | the mode is the one that our last frame asked for, which was lost |
 | `report` | standing down in the air | a HEARTBEAT or position is stuck, or a target is told no more |
 | `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
@@ -271,6 +272,8 @@ class Excuses:
         climb itself does, near the height of it.
         """
         since_us = failure.at_us - failure.amount - _TICK_US  # what a pilot told it before changed nothing
+        if self._target_stands_still(since_us, failure.at_us):
+            return "unseen"
         told = [*self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)]
         if any(
             fault.at_us >= since_us and not self._ends_the_climb(fault) and not self._stands(fault) for fault in told
@@ -286,6 +289,17 @@ class Excuses:
             if sample is not None and climbs and any(abs(up - sample.up_mm) <= _SAME_MM for up in self._climbs()):
                 return "unseen"
         return None
+
+    def _target_stands_still(self, since_us: int, at_us: int) -> bool:
+        """Whether a pilot did nothing but give PX4 another target in Hold, while it reported an old one, or none."""
+        acts = [each for each in self._before(at_us, faults.PilotFault) if each.at_us >= since_us]
+        return not self._is_copter and bool(acts) and all(self._shows_nowhere(each, at_us) for each in acts)
+
+    def _shows_nowhere(self, act: Fault, until_us: int) -> bool:
+        before = self._sample(act.at_us - _TICK_US)
+        in_hold = before is not None and before.mode is FlightMode.LOITER
+        stuck = (each.fault for each in self._happened if each.at_us <= act.at_us and _ends_us(each) >= until_us)
+        return isinstance(act, faults.PilotPause | faults.PilotGoto) and in_hold and any(map(_hides_target, stuck))
 
     def _is_silent(self, failure: JudgedFailure) -> bool:
         """Whether what a pilot did to ArduCopter may not have shown. A pause on a leg does, once it stands, unless
@@ -451,6 +465,16 @@ class Excuses:
             if life.ending is None and 0 <= life.ended_us - failure.at_us <= _UNWRITTEN_US:
                 return "process"
         return None
+
+
+def _hides_target(fault: Fault) -> bool:
+    """Whether a report of the autopilot's target is an old one, or does not come."""
+    match fault:
+        case faults.Freeze():
+            return True
+        case faults.MessageSilence(message=message) | faults.MessageStuck(message=message):
+            return message == "POSITION_TARGET_GLOBAL_INT"
+    return False
 
 
 def _ends_us(happened: IncidentOccurrence) -> int:

@@ -225,3 +225,20 @@ def test_a_landing_is_not_sent_again_to_a_vehicle_that_was_landed_by_others(take
     was = flown(of("ardupilot", at(35, faults.LinkSilence(0, None, Direction.UP)), taken))
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
     assert judge(was).exceptions == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("hides", "cause"),
+    [
+        (faults.Freeze(0), "unseen"),
+        (faults.MessageStuck(0, "POSITION_TARGET_GLOBAL_INT"), "unseen"),
+        (faults.MessageStuck(0, "GPS_RAW_INT"), None),
+    ],
+)
+def test_a_pause_of_px4_shows_nowhere_while_its_target_is_an_old_one(hides: Fault, cause: str | None) -> None:
+    """Its mode is Hold as before. What hides the target excuses what flies over the pause, and nothing else does."""
+    was = flown(of("px4", at(23, hides), at(24, PAUSE), at(24.7, faults.Recall(0))))
+    motion = [each for each in judge(was).exceptions if each.slug == "motion-after-takeover"]
+    assert "motion-after-takeover" not in slugs(was)
+    assert {each.cause for each in motion} == ({cause} if cause else set())

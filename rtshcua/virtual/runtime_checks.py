@@ -2,7 +2,7 @@
 
 | slug | is a failure |
 |---|---|
-| `untrue` | the log says that a command succeeded, or a position was taken over as measured later than it was so |
+| `untrue` | the log says that a command succeeded, or a place, height or charge taken over was not so since |
 | `no-stop` | a stop got to the vehicle, and it flew on; or it could have got there, and was not sent again |
 | `not-watched` | what a running step rests on did not hold, as heard, and nothing followed |
 | `needless` | a running step was broken off for something that, as heard, held or had grace left |
@@ -28,7 +28,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import step_words
 from rtshcua.virtual.excuses import JudgedFailure
-from rtshcua.virtual.flight_record import Life, ScenarioFlown, SentFrame, TruthSample, records_of
+from rtshcua.virtual.flight_record import HeardReadings, Life, ScenarioFlown, SentFrame, TruthSample, records_of
 from rtshcua.virtual.naive_supervision import DURATION, JudgedState, RunningStep, Span, WatchedStep, supervise
 from rtshcua.virtual.zone_truth import local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
@@ -38,6 +38,8 @@ Motion = Sequence[tuple[SentFrame, frozenset[MotionKind]]]
 
 #: mm: what noise, lag and a position's own error make of a place that is told, and of one that was reached
 TOLD_MM: Final = 4_000
+#: mm and 1/10000: what noise and rounding make of a height and a charge that are told
+_TOLD_UP_MM, _TOLD_CHARGE = 1_500, 250
 REACHED_MM: Final = 6_000
 #: us: how long after a fact a report of it may come on a good link
 _LATER_US: Final = 1_500_000
@@ -194,29 +196,43 @@ class RuntimeChecks:
         return local_mm(self._flown.policy, sample.latitude, sample.longitude)
 
     def _told(self, life: Life) -> Iterator[JudgedFailure]:
-        """A place was taken over, and the vehicle was nowhere near since it is said to have been measured."""
-        slot = self._flown.policy.vehicle.position
-        worst: JudgedFailure | None = None
-        count = 0
+        """A place, height or charge was taken over, and was nowhere near the truth since it is said to be measured."""
+        found: dict[str, list[tuple[float, int]]] = {}
         for turn in life.turns[::3]:
+            if self._before(turn.at_us, *_DECEIVES, faults.EstimatorUnhealthy):
+                break
             for heard in turn.heard:
-                values = dict(heard.values)
-                x, y = values.get(slot), values.get(slot + 1)
-                if x is None or y is None:
-                    continue
-                if self._before(turn.at_us, *_DECEIVES, faults.EstimatorUnhealthy):
-                    return
-                samples = self._between(heard.measured_us - self._flown.start_us, turn.at_us)
-                if not samples or not samples[0].in_air:
-                    continue
-                off = min(hypot(x - east, y - north) for east, north in map(self._place, samples))
-                if off > TOLD_MM:
-                    count += 1
-                    if worst is None or off > worst.amount:
-                        text = f"a place was heard that is {off / 1000:.1f} m from where it was since it was measured"
-                        worst = JudgedFailure("untrue", turn.at_us, text, round(off))
-        if worst is not None and count >= 3:
-            yield worst
+                for what, off in self._off(heard, turn.at_us):
+                    found.setdefault(what, []).append((off, turn.at_us))
+        for what, all_off in found.items():
+            off, at_us = max(all_off)
+            if len(all_off) >= 3:
+                much = f"{off / 100:.1f} %" if what == "charge" else f"{off / 1000:.1f} m"
+                was = "where" if what == "place" else "what"
+                text = f"a {what} was heard that is {much} from {was} it was since it was measured"
+                yield JudgedFailure("untrue", at_us, text, round(off))
+
+    def _off(self, heard: HeardReadings, at_us: int) -> Iterator[tuple[str, float]]:
+        """What was heard that is too far off, and how far, in mm or 1/10000."""
+        vehicle, values = self._flown.policy.vehicle, dict(heard.values)
+        x, y = values.get(vehicle.position), values.get(vehicle.position + 1)
+        height, charge = values.get(vehicle.height), values.get(vehicle.battery)
+        if (x, height, charge) == (None, None, None):
+            return
+        samples = self._between(heard.measured_us - self._flown.start_us, at_us)
+        if not samples or not samples[0].in_air:
+            return
+        if x is not None and y is not None:
+            off = min(hypot(x - east, y - north) for east, north in map(self._place, samples))
+            if off > TOLD_MM:
+                yield "place", off
+        if height is not None and (off := min(abs(height - each.up_mm) for each in samples)) > _TOLD_UP_MM:
+            yield "height", off
+        if charge is not None:  # it comes without a time of its own
+            since = self._between(at_us - self._delayed_us(at_us), at_us)
+            off = min(abs(charge - each.battery) for each in since)
+            if off > _TOLD_CHARGE:
+                yield "charge", off
 
     def _stops(self, flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
         """From the first frame of a stop that got there: so long later it is slower."""

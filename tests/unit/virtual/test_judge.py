@@ -15,7 +15,14 @@ from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.zone import AREA, Zone, unproject
 from rtshcua.model.scenario import Start
-from rtshcua.virtual.flight_record import IncidentOccurrence, Reaction, ScenarioFlown, SentFrame, TruthSample
+from rtshcua.virtual.flight_record import (
+    HeardReadings,
+    IncidentOccurrence,
+    Reaction,
+    ScenarioFlown,
+    SentFrame,
+    TruthSample,
+)
 from rtshcua.virtual.judge import SLUGS, Judgement, judge, moves
 from rtshcua.virtual.zone_truth import inside_mm
 from virtual import case
@@ -593,6 +600,32 @@ def test_a_decision_that_is_not_derived(good: ScenarioFlown, monkeypatch: pytest
 
 def test_a_fault_of_the_runtime(good: ScenarioFlown) -> None:
     assert slugs(judge(replace(good, fault="ZeroDivisionError"))) == ["fault"]
+
+
+@pytest.mark.parametrize(
+    ("signal", "by", "words"),
+    [("position", 5_000, "a place"), ("height", 2_000, "a height"), ("battery", 300, "a charge")],
+)
+def test_what_the_loop_is_given_is_compared_with_what_was(signal: str, by: int, words: str) -> None:
+    was = once("judged-flight", lambda: flown(scenario()))
+    slot = getattr(was.policy.vehicle, signal)
+
+    def off(heard: HeardReadings) -> HeardReadings:
+        return heard._replace(
+            values=tuple(
+                (each, value + by if each == slot and value is not None else value) for each, value in heard.values
+            )
+        )
+
+    turns = tuple(turn._replace(heard=tuple(map(off, turn.heard))) for turn in was.lives[0].turns)
+    untrue = [
+        each.text
+        for each in judge(replace(was, lives=(replace(was.lives[0], turns=turns),))).failures
+        if each.slug == "untrue"
+    ]
+    assert untrue
+    assert all(each.startswith(words) for each in untrue)
+    assert not [each for each in judge(was).failures if each.slug == "untrue"]
 
 
 def test_every_slug_has_a_test() -> None:

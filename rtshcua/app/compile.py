@@ -20,12 +20,13 @@ from rtshcua.wire.keys import SigningKey
 
 class CompileRequest(NamedTuple):
     """A source and what further sources bring, which mission of it, with which parameters, what it may claim, and where
-    the bundle is to go.
+    the bundle is to go: else beside the source, with a `suffix` of its own.
     """
 
     source: Path
     further: Sequence[Path]
-    target: Path
+    output: Path | None
+    suffix: str
     pins: Pins
     issued_at_us: int
     mission: str | None = None
@@ -33,11 +34,14 @@ class CompileRequest(NamedTuple):
 
 
 class Compilation(NamedTuple):
-    """What came of compiling, its findings as whoever wrote the sources should read them, and the sources."""
+    """What came of compiling, its findings as whoever wrote the sources should read them, the sources, and the file that the
+    bundle goes to.
+    """
 
     compiled: Compiled
     diagnostics: tuple[Diagnostic, ...]
     sources: Mapping[str, Source]
+    target: Path
 
 
 class SignedBundle(NamedTuple):
@@ -62,14 +66,18 @@ def claimed_pins(proposer: str | None, role: str | None, policy: str | None) -> 
 def compile_mission(request: CompileRequest) -> Compilation | Refusal:
     """Compile a mission; what cannot be begun with, or claims what nothing declares, is refused."""
     given = [request.source, *request.further]
-    refused = no_source(request.source) or _no_target(request.target, given)
+    refused = no_source(request.source)
+    if refused is not None:
+        return refused
+    target = request.output or request.source.with_suffix(request.suffix)
+    refused = _no_target(target, given)
     if refused is not None:
         return refused
     compiled, sources = compile_sources(
         given, mission=request.mission, issued_at_us=request.issued_at_us, values=request.values, pins=request.pins
     )
     unknown = undeclared(request.pins, compiled.declared, compiled.diagnostics)
-    return unknown or Compilation(compiled, meant(compiled.diagnostics, sources, given), sources)
+    return unknown or Compilation(compiled, meant(compiled.diagnostics, sources, given), sources, target)
 
 
 def sign_bundle(

@@ -109,12 +109,12 @@ def compile(
         return findings.end(pins)
     if len({first is None, flight is None, not replaces}) > 1:
         return findings.refuse(ExitCode.USAGE, "usage", "`--replaces`, `--from` and `--flight` go together")
-    target = output or source.with_suffix(".replacement" if replaces else ".bundle")
-    request = CompileRequest(source, with_ or (), target, pins, issued_at, mission, tuple(set_ or ()))
+    suffix = ".replacement" if replaces else ".bundle"
+    request = CompileRequest(source, with_ or (), output, suffix, pins, issued_at, mission, tuple(set_ or ()))
     made = compile_mission(request)
     if isinstance(made, Refusal):
         return _refused(made, findings)
-    compiled = made.compiled
+    compiled, target = made.compiled, made.target
     if findings.report(made.diagnostics, made.sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
     store = KeyStore(data_folder())

@@ -8,6 +8,7 @@ from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore
 from rtshcua.app.programs import compile_sources, meant, no_source
 from rtshcua.app.signing_keys import check_trusted, strangers
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.pipeline.pins import Pins, undeclared
@@ -34,8 +35,8 @@ class CompileRequest(NamedTuple):
 
 
 class Compilation(NamedTuple):
-    """What came of compiling, its findings as whoever wrote the sources should read them, the sources, and the file that the
-    bundle goes to.
+    """What came of compiling, its findings as whoever wrote the sources should read them, the sources, and where the
+    bundle goes.
     """
 
     compiled: Compiled
@@ -92,7 +93,7 @@ def sign_bundle(
 def _no_target(target: Path, given: Sequence[Path]) -> Refusal | None:
     """Why no bundle can be written to a file."""
     if not target.parent.is_dir():
-        return Refusal("no-folder", f"there is no folder `{target.parent}` to write to")
+        return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
     if not target.exists() or (target.is_file() and not any(each.exists() and target.samefile(each) for each in given)):
         return None
     what = "one of the sources" if target.is_file() else "no regular file"

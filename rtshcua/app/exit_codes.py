@@ -30,7 +30,8 @@ _REMEDIES = {
 #: of what is refused for another reason than that it is not to be trusted, by slug
 _CODES = dict.fromkeys(("usage", "output", "no-approver", "several-approvers"), ExitCode.USAGE)
 _CODES |= dict.fromkeys(
-    ("changed", "configuration", "input", "malformed", "no-source", "outside", "since", "wrong-kind"), ExitCode.INPUT
+    ("changed", "configuration", "input", "malformed", "no-policy", "no-source", "outside", "since", "wrong-kind"),
+    ExitCode.INPUT,
 )
 _CODES |= {"not-flown": ExitCode.TESTS, "not-generated": ExitCode.DIAGNOSTICS}
 

@@ -113,7 +113,7 @@ def compile(
     request = CompileRequest(source, with_ or (), output, suffix, pins, issued_at, mission, tuple(set_ or ()))
     made = compile_mission(request)
     if isinstance(made, Refusal):
-        return _refused(made, findings)
+        return findings.end(made)
     compiled, target = made.compiled, made.target
     if findings.report(made.diagnostics, made.sources) or compiled.policy is None or compiled.mission is None:
         return findings.finish(exit_code(compiled.diagnostics))
@@ -146,13 +146,6 @@ def compile(
         warnings=signed.warnings,
         bounds=None if compiled.bounds is None else bounds_dict(compiled.bounds),
     )
-
-
-def _refused(refusal: Refusal, findings: Findings) -> ExitCode:
-    """Ends with a refusal; a folder that is missing is bad input, unlike a file that may not be replaced."""
-    if refusal.slug == "no-folder":
-        return findings.refuse(ExitCode.INPUT, "output", refusal.text)
-    return findings.end(refusal)
 
 
 def _told(policy: Policy, mission: Mission, target: Path) -> str:

@@ -2,35 +2,21 @@
 
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
-from rtshcua import __version__
 from rtshcua.adapters.store.writing import replace_inside
-from rtshcua.app.check import EarlierPolicies, earlier_policies
-from rtshcua.app.exit_codes import exit_code
-from rtshcua.app.files import overwriting_a_source, source_files
-from rtshcua.app.programs import RootProgram, examine, programs, read_sources
+from rtshcua.app.report_service import ReportRequest, check_report
 from rtshcua.app.wording import moment
-from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.diagnostics.span import Source
 from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.stdout import out, out_rendered
-from rtshcua.ground.language.paths import shown
-from rtshcua.ground.pipeline.program import Checked, compile_program
-from rtshcua.ground.pipeline.suite import suite
-from rtshcua.ground.report.policy_report import CompiledMission, DecidedCases, ReportPart, distinct_names, policy_report
-from rtshcua.ground.testing.case_result import run_case
-from rtshcua.ground.versions.raised import compare
-from rtshcua.mavlink import dialect
-from rtshcua.model.ir.scenarios import ScenarioDecl
+from rtshcua.ground.report.policy_report import distinct_names
 
 app = typer.Typer(add_completion=False)
 
@@ -67,53 +53,15 @@ def docs(
     made_at = time.time_ns() // 1_000 if at is None else moment(at)
     if made_at is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    files = source_files(paths)
-    if isinstance(files, Refusal):
-        return findings.end(files)
-    target = _target(output, paths[0], as_json)
-    refused = _refusal(target, files)
-    if refused is not None:
-        return findings.end(refused)
-    if target is not None and not target.parent.is_dir():
-        return findings.refuse(ExitCode.INPUT, "output", f"there is no folder `{target.parent}` to write to")
-    earlier = EarlierPolicies("", ()) if since is None else earlier_policies(since)
-    if isinstance(earlier, Refusal):
-        return findings.end(earlier)
-    asked = programs(files)
-    checked = [examine(each.reading) for each in asked]
-    sources: dict[str, Source] = {}
-    for each in asked:
-        sources |= each.reading.program.sources
-    imported = None if target is None else overwriting_a_source(target, sources, "a page")
-    if imported is not None:
-        return findings.end(imported)
-    trials = _trials(asked, files)
-    found: dict[tuple[object, ...], Diagnostic] = {}
-    versions = (
-        compared.finding
-        for each, one in zip(asked, checked, strict=True)
-        for compared in compare(one.policies, earlier.policies, earlier.name, each.reading.program.sources)
-        if compared.finding is not None
-    )
-    for finding in (*(each for one in checked for each in one.diagnostics), *versions, *trials.diagnostics):
-        found.setdefault((finding.code, finding.span, finding.message), finding)
-    failed = [ran.finding for one in trials.tried.values() for each in one for ran in each.ran if ran.finding]
-    if findings.report((*found.values(), *failed), sources | trials.sources):
-        wrong = tuple(found.values())
-        return findings.finish(exit_code(wrong) if has_errors(wrong) else ExitCode.TESTS)
-    parts = [_part(each, one, trials) for each, one in zip(asked, checked, strict=True)]
-    if not any(part.policies for part in parts):
-        help = "a policy and a vehicle make what is signed; the sources may import both"
-        return findings.refuse(ExitCode.INPUT, "no-policy", "the sources have no policy with a vehicle", help)
-    made_by = f"rtshcua {__version__}"
-    book = policy_report(
-        parts,
-        made_at_us=made_at,
-        made_by=made_by,
-        title=title,
-        earlier=earlier.policies,
-        since=Path(earlier.name).resolve().name,
-    )
+    request = ReportRequest(paths, since, _target(output, paths[0], as_json), made_at, title)
+    report = check_report(request)
+    if isinstance(report, Refusal):
+        return findings.end(report)
+    if findings.report((*report.diagnostics, *report.failures), report.sources):
+        return findings.finish(report.code)
+    book, target = report.book(), request.target
+    if isinstance(book, Refusal):
+        return findings.end(book)
     if since is not None and not any(chapter.since for chapter in book.chapters) and not as_json:
         say(f"nothing in {since} is an earlier version of a policy here")
     if as_json:
@@ -138,62 +86,3 @@ def _target(output: Path | None, first: Path, as_json: bool) -> Path | None:
     if as_json or not sys.stdout.isatty():
         return None
     return Path(f"{first.resolve().name}.html") if first.is_dir() else first.with_suffix(".html")
-
-
-def _refusal(target: Path | None, files: Sequence[Path]) -> Refusal | None:
-    """Why there is no page of these files, or none is written there."""
-    if any(path.suffix.lower() == ".json" for path in files):
-        help = "name the policy that it is under, or a source with the mission"
-        return Refusal("usage", "a specification has no page of its own", help)
-    if target is not None and target.exists() and not target.is_file():
-        return Refusal("output", f"`{target}` is no regular file, and is not replaced by a page")
-    return None if target is None else overwriting_a_source(target, files, "a page")
-
-
-class _Trials(NamedTuple):
-    """The cases of the files that were asked for, decided, and their scenarios, by the program that each file is part
-    of; what is wrong with the cases, and the texts that this is about.
-    """
-
-    tried: dict[str, list[DecidedCases]]
-    scenarios: dict[str, list[ScenarioDecl]]
-    diagnostics: list[Diagnostic]
-    sources: dict[str, Source]
-
-
-def _trials(asked: Sequence[RootProgram], files: Sequence[Path]) -> _Trials:
-    """Each file's own tests in its own program, as `rtshcua test` runs them; those of what it imports are not asked."""
-    paths = {shown(str(path)): path for path in files}
-    trials = _Trials({}, {}, [], {})
-    for each in asked:
-        own = trials.tried[each.name] = []
-        scenarios = trials.scenarios[each.name] = []
-        for unit in each.reading.program.units:
-            path = paths.pop(unit.file, None)
-            if path is None:
-                continue
-            scenarios += unit.scenarios
-            if not unit.tests:
-                continue
-            program = each.reading.program if unit.file == each.name else read_sources([path]).program
-            cases = suite(program, dialect.load())
-            trials.diagnostics.extend(cases.diagnostics)
-            trials.sources.update(cases.sources)
-            own.append(DecidedCases(program, tuple(run_case(case) for case in cases.cases)))
-    return trials
-
-
-def _part(asked: RootProgram, checked: Checked, trials: _Trials) -> ReportPart:
-    """A program with those of its missions that need no further values."""
-    program = asked.reading.program
-    tried, scenarios = trials.tried[asked.name], trials.scenarios[asked.name]
-    flown = []
-    for unit in program.units:
-        for mission in unit.missions:
-            if any(parameter.default is None for parameter in mission.parameters):
-                continue
-            name = mission.name.text
-            compiled = compile_program(program, dialect.load(), mission=name, issued_at_us=0)
-            if compiled.policy is not None and compiled.mission is not None:
-                flown.append(CompiledMission(compiled.policy, compiled.mission, mission, checked.bounds.get(name)))
-    return ReportPart(program, checked.policies, tuple(flown), checked.diagnostics, tuple(tried), tuple(scenarios))

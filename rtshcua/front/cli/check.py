@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.checked import check_sources
+from rtshcua.front.cli.check_report import check_sources
 
 app = typer.Typer(add_completion=False)
 

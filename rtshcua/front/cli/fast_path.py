@@ -104,7 +104,7 @@ def check(words: Sequence[str]) -> ExitCode | None:
     found = read(words, CHECK)
     if found is None or not found[0]:
         return None
-    from rtshcua.front.cli.checked import check_sources
+    from rtshcua.front.cli.check_report import check_sources
 
     return check_sources(found[0], **found[1])
 

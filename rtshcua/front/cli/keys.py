@@ -7,11 +7,11 @@ import re
 import secrets
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from getpass import getpass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 
@@ -37,9 +37,8 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.console import TerminalConsole
 from rtshcua.front.cli.document_options import AsJson
-from rtshcua.front.cli.faults import fail, misaddressed, refuse
+from rtshcua.front.cli.faults import fail, misaddressed, refuse, say
 from rtshcua.front.cli.flight_options import System
-from rtshcua.front.cli.known_roles import warn_of_unknown
 from rtshcua.front.cli.showing.keys import as_object, speaks
 from rtshcua.front.cli.stdout import out, out_json, out_rendered
 from rtshcua.front.cli.unlock import read_passphrase, unlock
@@ -48,6 +47,36 @@ from rtshcua.mavlink.signing import KEY_OCTETS
 from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import HUMAN, LINK_ID_BYTES, PERSON, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
+
+#: where a project has its sources (`rtshcua init`)
+_FOLDERS: Final = (Path(), Path("policies"), Path("missions"))
+#: of more sources than these nothing is said: it is no project, or takes too long
+_MOST: Final = 40
+
+
+def warn_of_unknown(roles: Iterable[str]) -> None:
+    """Say of roles that no policy here knows: a key in such a role signs nothing that anybody asks for. It is no error,
+    for a policy may come later, or lie elsewhere.
+    """
+    known = _known()
+    for role in sorted(set(roles) - known) if known else ():
+        names = ", ".join(f"`{name}`" for name in sorted(known))
+        say(f"warning: no policy here knows the role `{role}`; its roles are {names}")
+
+
+def _known() -> set[str]:
+    try:
+        files = [path for folder in _FOLDERS for path in sorted(folder.glob("*.rts")) if path.is_file()]
+    except OSError:
+        return set()
+    if not 0 < len(files) <= _MOST:
+        return set()
+    from rtshcua.app.programs import examine, programs
+
+    return {
+        role for each in programs(files) for lowered in examine(each.reading).policies for role in lowered.policy.roles
+    }
+
 
 app = typer.Typer(add_completion=False)
 

@@ -4,11 +4,93 @@ import json
 import socket
 import threading
 from collections import deque
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from rtshcua.front.mcp.flight_lines import understood
+import msgspec
+
+from rtshcua.evidence.records import DecisionRecord
 from rtshcua.ground.language.size_limits import values_of, without_texts
+
+_Count = Annotated[int, msgspec.Meta(ge=0, lt=1 << 53)]
+_Step = Annotated[int, msgspec.Meta(ge=-1, lt=1 << 31)]
+_Octets = Annotated[str, msgspec.Meta(pattern=r"^(?:[0-9a-f]{2})*\Z")]
+
+
+class _Hello(msgspec.Struct):
+    flight: _Octets
+    vehicle: str = ""
+    mode: str = ""
+
+
+class _Waiting(msgspec.Struct):
+    policy: str = ""
+
+
+class _Vehicle(msgspec.Struct):
+    ready: bool = False
+    unready: str | None = None
+    armed: bool | None = None
+    airborne: bool | None = None
+    signals: Any = None
+
+
+class _Mission(msgspec.Struct):
+    digest: _Octets
+
+
+class _Decided(msgspec.Struct):
+    """What is asked of a decision beyond its record's types."""
+
+    binding: _Octets
+    invocation: _Octets
+    step: _Step
+
+
+class _Effect(msgspec.Struct):
+    seq: _Count
+    event: str
+    step: _Step = -1
+    detail: str = ""
+
+
+class _Sealing(msgspec.Struct):
+    seq: _Count
+
+
+class _Close(msgspec.Struct):
+    seq: _Count
+    ending: str
+
+
+_TYPES: Final[Mapping[str, type[msgspec.Struct]]] = {
+    "hello": _Hello,
+    "waiting": _Waiting,
+    "vehicle": _Vehicle,
+    "mission": _Mission,
+    "decision": DecisionRecord,
+    "effect": _Effect,
+    "seal": _Sealing,
+    "recover": _Sealing,
+    "close": _Close,
+}
+
+
+def understood(told: Any) -> dict[str, Any]:
+    """A line that has a type which is read here, else an empty one. Raises msgspec.ValidationError for one whose fields
+    are not those of its type.
+    """
+    found: dict[str, Any] = told if isinstance(told, dict) else {}
+    kind = found.get("type")
+    fields = _TYPES.get(kind) if isinstance(kind, str) else None
+    if fields is None:
+        return {}
+    msgspec.convert(found, fields)
+    if fields is DecisionRecord:
+        msgspec.convert(found, _Decided)
+    return found
+
 
 #: how long until it is tried again to follow, in seconds
 AGAIN_S: Final = 0.3

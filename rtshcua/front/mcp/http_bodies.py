@@ -10,8 +10,7 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from contextlib import AsyncExitStack
 from typing import Any, Final
 
-from rtshcua.front.mcp.messages import MOST_OCTETS, NO_REQUEST, Wrong, read_message
-from rtshcua.front.mcp.methods import unknown_method
+from rtshcua.front.mcp.messages import MOST_OCTETS, NO_REQUEST, Wrong, read_message, unknown_method
 
 #: how long a body may take to come, and to wait for another large one, in seconds
 PATIENCE_S: Final = 10.0

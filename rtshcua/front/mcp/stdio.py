@@ -14,8 +14,7 @@ from anyio.abc import ObjectReceiveStream, ObjectSendStream
 from mcp import types
 from mcp.shared.message import SessionMessage
 
-from rtshcua.front.mcp.messages import ENDS, MOST_OCTETS, NO_REQUEST, Wrong, line_of, read_message
-from rtshcua.front.mcp.methods import unknown_method
+from rtshcua.front.mcp.messages import ENDS, MOST_OCTETS, NO_REQUEST, Wrong, line_of, read_message, unknown_method
 
 #: octets that are read at once, and written: a pipe that can be written to has room for these (pipe(7), PIPE_BUF)
 _READ: Final = 1 << 16

@@ -3,10 +3,8 @@
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.documents import claimed
-from rtshcua.front.cli.showing.mission import show_mission
-from rtshcua.front.cli.showing.named import named
-from rtshcua.front.cli.showing.page import Page
-from rtshcua.front.cli.showing.policy import show_policy
+from rtshcua.front.cli.showing.page import Page, named
+from rtshcua.front.cli.showing.policy import show_mission, show_policy
 from rtshcua.wire.bundle import open_bundle
 from rtshcua.wire.trust import open_root
 from rtshcua.wire.untrusted import Untrusted

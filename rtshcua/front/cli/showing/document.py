@@ -4,8 +4,7 @@ from base64 import b64decode
 from typing import NamedTuple
 
 from rtshcua.app.wording import utc
-from rtshcua.front.cli.showing.named import named
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import Page, named
 from rtshcua.front.cli.showing.people import NOBODY, People
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
 from rtshcua.model.flat.mission import Invocation

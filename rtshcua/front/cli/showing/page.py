@@ -4,6 +4,8 @@ import os
 import sys
 from collections.abc import Iterable
 
+import msgspec
+
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.front.cli.width import fitted
 
@@ -46,3 +48,12 @@ class Page:
 def for_terminal() -> Page:
     """A page with bold headings where the standard output shows them."""
     return Page(bold=sys.stdout.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb")
+
+
+def named(value: object) -> object:
+    """The value made of what JSON has."""
+    if isinstance(value, msgspec.Struct):
+        return {field: named(getattr(value, field)) for field in value.__struct_fields__}
+    if isinstance(value, (tuple, list)):
+        return [named(each) for each in value]
+    return value.hex() if isinstance(value, bytes) else value

@@ -1,12 +1,67 @@
 """A policy, in full: what is permitted, to whom, where, and what every skill then means."""
 
+from collections.abc import Sequence
+
 from rtshcua.adapters.loop import WAIT_US
+from rtshcua.app.wording import utc
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.contract import show_contract
 from rtshcua.front.cli.showing.page import Page
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.contract import Contract, TimingClass
+from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
 from rtshcua.model.flat.policy import AfterSilence, Policy, WithoutEvidence
 from rtshcua.model.flat.signal import Signal, SignalSource
+from rtshcua.model.step_number import number_of
 from rtshcua.onboard.runtime.limits import Limits, falling_us
+
+_NOTHING = "nothing"
+
+
+def show_contract(page: Page, policy: Policy, contract: Contract) -> None:
+    """Adds a contract to the page."""
+    parameters = [words.parameter(policy, parameter) for parameter in contract.parameters]
+    page.text(f"{contract.name}({'' if parameters else ')'}")
+    for parameter in parameters:
+        page.text(parameter + ",", indent=6)
+    if parameters:
+        page.text(")")
+    for name, value in fields(policy, contract):
+        page.row(name, value, indent=6, width=9)
+
+
+def fields(policy: Policy, contract: Contract) -> list[tuple[str, str]]:
+    """The fields but for the parameters, by the words of the language; a name is empty where it goes on."""
+    during = f" during {', '.join(contract.phases)}" if contract.phases else ", in any phase"
+    chain = [f"{n} {words.link(policy, link)}" for n, link in enumerate(contract.fallback)]
+    left_out = [
+        f"{clause.part} {clause.text}: the vehicle is without a sensor for it"
+        for clause in policy.left_out
+        if clause.skill >= 0 and policy.contracts[clause.skill].name == contract.name
+    ]
+    return [
+        ("motion", words.motion(contract)),
+        ("class", TimingClass(contract.timing_class).name.lower()),
+        ("deadline", f"{words.duration(contract.deadline_us)} after release"),
+        ("valid", f"for {words.duration(contract.validity_us)} after issue{during}"),
+        ("lasts", f"at most {words.duration(contract.duration_us)}"),
+        ("grace", f"{words.duration(contract.grace_us)}: how long a signal may be unknown while it runs"),
+        *_list("require", _texts(contract.require)),
+        *_list("assume", _texts(contract.assume)),
+        *_list("maintain", _texts(contract.maintain)),
+        *(_list("left out", left_out) if left_out else ()),
+        *_list("fallback", chain),
+        ("energy", f"at most {words.ratio(contract.energy)}"),
+        ("record", ", ".join(contract.record) or _NOTHING),
+    ]
+
+
+def _texts(clauses: Sequence[Clause]) -> list[str]:
+    return [clause.text for clause in clauses]
+
+
+def _list(name: str, values: Sequence[str]) -> list[tuple[str, str]]:
+    return [(name if number == 0 else "", value) for number, value in enumerate(values or [_NOTHING])]
+
 
 #: what `without evidence` says, and means
 _WITHOUT_EVIDENCE: dict[int, str] = {
@@ -100,3 +155,47 @@ def _signal(signal: Signal) -> str:
     if unknown:
         parts.append(f"unknown where it is {', '.join(map(str, unknown))}")
     return "; ".join(parts)
+
+
+def show_mission(page: Page, mission: Mission, policy: Policy) -> None:
+    """Adds a mission to the page."""
+    page.head(f"Mission {mission.name}")
+    page.row("intent", mission.intent or "not said")
+    page.row("proposed by", mission.proposer or "a person")
+    page.row("vehicle", f"`{mission.vehicle}`")
+    page.row("policy", f"{mission.policy} version {mission.policy_version}, digest {mission.policy_digest.hex()}")
+    page.row("issued", utc(mission.issued_at_us))
+    page.rows("sources", mission.sources)
+    phase = -1
+    for invocation in mission.invocations:
+        if invocation.phase != phase:
+            phase = invocation.phase
+            page.head(f"Phase {mission.phases[phase]}")
+        _show_step(page, invocation, mission, policy)
+
+
+def _show_step(page: Page, step: Invocation, mission: Mission, policy: Policy) -> None:
+    contract = step.contract
+    page.text(
+        f"{number_of(step.step):>2} {contract.name}({words.arguments(policy, contract.parameters, step.arguments)})"
+    )
+    phases = [name for number, name in enumerate(mission.phases) if step.phases >> number & 1]
+    rows = [
+        ("asked by", f"role {policy.roles[step.role]} through {words.source(step.source)}"),
+        ("goes", words.plan(policy, step.plan)),
+        ("valid", f"until {utc(step.issued_at_us + contract.validity_us)}, during {', '.join(phases)}"),
+        ("otherwise", f"{OnInadmissible(step.on_inadmissible).name.lower()}, when it is not admitted in the air"),
+        ("id", step.invocation_id.hex()),
+        ("binding", step.binding.hex()),
+        *_tightened(step, policy),
+    ]
+    for name, value in rows:
+        page.row(name, value, indent=6, width=9)
+
+
+def _tightened(step: Invocation, policy: Policy) -> list[tuple[str, str]]:
+    """How the step's contract differs from its skill's."""
+    own, skill = fields(policy, step.contract), fields(policy, policy.contracts[step.skill])
+    if own == skill:
+        return [("contract", "the skill's own")]
+    return [("contract", "tighter than the skill's in:"), *(each for each in own if each not in skill)]

@@ -5,8 +5,7 @@ from typing import get_args
 import pytest
 from mcp import types
 
-from rtshcua.front.mcp.messages import NO_METHOD
-from rtshcua.front.mcp.methods import METHODS, unknown_method
+from rtshcua.front.mcp.messages import METHODS, NO_METHOD, unknown_method
 
 
 def test_an_unknown_method_is_answered_as_that() -> None:

@@ -13,8 +13,7 @@ import pytest
 
 from rtshcua.app.propose import Missions, ProposalAnswer
 from rtshcua.front.mcp import tools as desks
-from rtshcua.front.mcp.flight import Following
-from rtshcua.front.mcp.flight_lines import understood
+from rtshcua.front.mcp.flight import Following, understood
 from rtshcua.front.mcp.tools import Misused, Signer, Tools
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.wire import cose, names

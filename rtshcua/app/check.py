@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.app.files import SOURCE, SPECIFICATION, overwriting_a_source, source_files
-from rtshcua.app.programs import RootProgram, examine, programs
+from rtshcua.app.programs import RootProgram, examine, keep_once, programs
+from rtshcua.app.wording import many
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.refusal import Refusal
@@ -55,11 +56,8 @@ class LeftOutCounts(NamedTuple):
 
     def told(self) -> str:
         """In words."""
-        counts = [
-            f"{count} {what}{'s' * (count != 1)}"
-            for count, what in ((self.clauses, "clause"), (self.rules, "rule"))
-            if count
-        ]
+        counted = ((self.clauses, "clause"), (self.rules, "rule"))
+        counts = [many(count, what) for count, what in counted if count]
         without = ", ".join(self.without)
         return f"{self.policy} on {self.vehicle}: {' and '.join(counts)} `where fitted` left out, without {without}"
 
@@ -203,9 +201,7 @@ def check_all(
             changes = versions.setdefault((one.name, one.version, one.earlier), {})
             changes |= dict.fromkeys(describe_changes(one.old, one.new))
         left_out |= {_left_out(lowered.policy): None for lowered in checked.policies if lowered.policy.left_out}
-        wrong = [*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)]
-        for diagnostic in wrong:  # a file that two programs share has its findings once
-            found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        keep_once(found, (*checked.diagnostics, *(one.finding for one in compared if one.finding is not None)))
         if not issued_at_us and checked.bounds and any(_dated(one.policy, now_us) for one in checked.policies):
             wrong = [one for one in examine(each.reading, now_us).diagnostics if one.code.severity is Severity.ERROR]
             now |= {(one.code, one.span, one.message): one for one in wrong}

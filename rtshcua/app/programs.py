@@ -64,6 +64,12 @@ class SourceReader:
         return Reading(load(names, read, self._library, readable.listing, packs=readable.pack), tuple)
 
 
+def keep_once(found: dict[tuple[object, ...], Diagnostic], more: Iterable[Diagnostic]) -> None:
+    """Add findings to those of other programs: a file that two programs share has its findings once."""
+    for each in more:
+        found.setdefault((each.code, each.span, each.message), each)
+
+
 def read_sources(paths: Sequence[Path], pins: Pins = PROPOSED) -> Reading:
     """Sources and all that they import; see `SourceReader.program`."""
     return SourceReader(paths).program([str(path) for path in paths], pins=pins)

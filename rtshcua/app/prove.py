@@ -36,12 +36,9 @@ PROOF_CODES: Final = {
     "proof/no-log": ExitCode.INPUT,
     "genesis/format": ExitCode.UNTRUSTED,
 }
-_HELPS = {
-    "proof/log": "`rtshcua verify-log` says what is wrong with the log",
-    "proof/path": "`rtshcua verify-log` says what is wrong with the log",
-    "proof/consistency": "`rtshcua verify-log` says what is wrong with the log",
-    "proof/unsealed": "`rtshcua recover` ends a log that a crash left open",
-}
+_WRONG = "`rtshcua verify-log` says what is wrong with the log"
+_HELPS = dict.fromkeys(("proof/log", "proof/path", "proof/consistency"), _WRONG)
+_HELPS |= {"proof/unsealed": "`rtshcua recover` ends a log that a crash left open"}
 
 
 class ProofRequest(NamedTuple):

@@ -8,7 +8,7 @@ from rtshcua import __version__
 from rtshcua.app.check import EarlierPolicies, earlier_policies
 from rtshcua.app.exit_codes import exit_code
 from rtshcua.app.files import overwriting_a_source, source_files
-from rtshcua.app.programs import RootProgram, examine, programs, read_sources
+from rtshcua.app.programs import RootProgram, examine, keep_once, programs, read_sources
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -102,8 +102,7 @@ def check_report(request: ReportRequest) -> CheckedReport | Refusal:
         if compared.finding is not None
     )
     found: dict[tuple[object, ...], Diagnostic] = {}
-    for finding in (*(each for one in checked for each in one.diagnostics), *versions, *trials.diagnostics):
-        found.setdefault((finding.code, finding.span, finding.message), finding)
+    keep_once(found, (*(each for one in checked for each in one.diagnostics), *versions, *trials.diagnostics))
     every = tuple(found.values())
     return CheckedReport(request, roots, checked, trials, earlier, every, sources | trials.sources)
 

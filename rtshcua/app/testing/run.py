@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from rtshcua.adapters.store.project import Projects
 from rtshcua.app.exit_codes import exit_code
 from rtshcua.app.files import SPECIFICATION, source_files
-from rtshcua.app.programs import Reading, examine, read_sources
+from rtshcua.app.programs import Reading, examine, keep_once, read_sources
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
@@ -132,8 +132,7 @@ def run_all(
     for each in progress(work):
         made = _suite(each.reading)
         sources |= {**each.reading.program.sources, **made.sources}
-        for diagnostic in made.diagnostics:  # a file that two programs share has its findings once
-            found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+        keep_once(found, made.diagnostics)
         cases = [case for case in made.cases if chosen.casefold() in case.name.casefold()]
         left_out += len(made.cases) - len(cases)
         names |= {case.name for case in made.cases}
@@ -152,8 +151,7 @@ def run_all(
         for each in work:
             policies, wrong = _untested(each, tested)
             _count_policies(tally, policies, each.reading)
-            for diagnostic in wrong:
-                found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+            keep_once(found, wrong)
         sources |= tally.sources
     covered = None if tally is None else tally.all()
     return TestResults(tuple(ran), flown, tuple(found.values()), sources, covered, left_out, frozenset(names))
@@ -178,8 +176,7 @@ def _scenarios(
         return ()
     made = scenarios_of(program, dialect.load(), ISSUED_AT_US, LATER_US)
     sources |= {**program.sources, **made.sources}
-    for diagnostic in made.diagnostics:
-        found.setdefault((diagnostic.code, diagnostic.span, diagnostic.message), diagnostic)
+    keep_once(found, made.diagnostics)
     return made.found
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.archiving.given import logs_in, time_of, unknown, with_extra
+from rtshcua.front.cli.archiving.given import VerifyingOptions, logs_in, time_of, unknown, with_extra
 from rtshcua.front.cli.archiving.told import Shape, tell
 from rtshcua.front.cli.faults import distrust, fail
 from rtshcua.front.cli.stdout import out_rendered
@@ -66,10 +66,8 @@ def add(
         from rtshcua.adapters.archive import adding
         from rtshcua.front.cli.archiving.checking import checked
 
-        return checked(
-            archive, lambda folder, check: adding.add(folder, found.logs, check),
-            make=True, skipped=found.skipped, root=root, audit=audit, jobs=jobs, cluster=cluster, as_json=as_json,
-        )  # fmt: skip
+        how = VerifyingOptions(root, audit, jobs, cluster, as_json)
+        return checked(archive, lambda folder, check: adding.add(folder, found.logs, check), how, found.skipped)
 
     return _answered(work)
 
@@ -93,10 +91,8 @@ def verify(
         from rtshcua.adapters.archive import adding
         from rtshcua.front.cli.archiving.checking import checked
 
-        return checked(
-            archive, adding.reindex if anew else adding.verify,
-            make=False, skipped=[], root=root, audit=audit, jobs=jobs, cluster=cluster, as_json=as_json,
-        )  # fmt: skip
+        how = VerifyingOptions(root, audit, jobs, cluster, as_json)
+        return checked(archive, adding.reindex if anew else adding.verify, how)
 
     return _answered(work)
 

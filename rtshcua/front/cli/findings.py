@@ -19,6 +19,7 @@ from rtshcua.front.cli.stdout import out_json
 from rtshcua.front.cli.width import columns, fitted
 
 _BOLD, _RED, _YELLOW, _BLUE, _CYAN, _END = "\033[1m", "\033[1;31m", "\033[1;33m", "\033[1;34m", "\033[36m", "\033[0m"
+_COLOURS = {"error": _RED, "warning": _YELLOW, "note": _CYAN}
 
 
 class Findings:
@@ -102,15 +103,10 @@ def _coloured(text: str) -> str:
 def _line(line: str) -> str:
     """Colour one rendered line by how it begins; the text itself stays as it is."""
     head, bar, rest = line.partition(" | ")
-    if line.startswith("error["):
+    severity, bracket, _ = line.partition("[")
+    if bracket and severity in _COLOURS:
         kind, _, message = line.partition(": ")
-        return f"{_RED}{kind}{_END}{_BOLD}: {message}{_END}"
-    if line.startswith("warning["):
-        kind, _, message = line.partition(": ")
-        return f"{_YELLOW}{kind}{_END}{_BOLD}: {message}{_END}"
-    if line.startswith("note["):
-        kind, _, message = line.partition(": ")
-        return f"{_CYAN}{kind}{_END}{_BOLD}: {message}{_END}"
+        return f"{_COLOURS[severity]}{kind}{_END}{_BOLD}: {message}{_END}"
     if bar and not head.strip() and set(rest.lstrip()[:1]) <= {"^", "-"}:
         return f"{_BLUE}{head}{bar}{_END}{_RED if '^' in rest else _BLUE}{rest}{_END}"
     if bar and (not head.strip() or head.strip().isdigit()):

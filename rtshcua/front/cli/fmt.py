@@ -12,6 +12,7 @@ from rtshcua.app.documents import kind_of
 from rtshcua.app.exit_codes import exit_code_of, words_of
 from rtshcua.app.files import SPECIFICATION, source_files
 from rtshcua.app.layout import Laid, of_file, of_text
+from rtshcua.app.wording import many
 from rtshcua.diagnostics.codes import UNSAFE_FORMAT
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -160,11 +161,7 @@ def _object(laid: Laid) -> dict[str, object]:
 
 def _count(changed: int, rest: int, *, check: bool) -> str:
     """The last line: how many files there are of each kind."""
-
-    def files(number: int) -> str:
-        return f"{number} file{'s' * (number != 1)}"
-
     if not changed:
-        return f"{files(rest)} already formatted"
+        return f"{many(rest, 'file')} already formatted"
     done = "would be formatted" if check else "formatted"
-    return f"{files(changed)} {done}" + (f", {files(rest)} already" if rest else "")
+    return f"{many(changed, 'file')} {done}" + (f", {many(rest, 'file')} already" if rest else "")

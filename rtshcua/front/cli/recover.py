@@ -13,8 +13,8 @@ from rtshcua.app.documents import no_log
 from rtshcua.app.fly.previous_log import signer_of
 from rtshcua.app.logs import is_log, logs_meant
 from rtshcua.app.recover import recover_log, recovery_code
+from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.recovery import RECOVERABLE, FoundLog, LogState
 from rtshcua.front.cli.faults import fail, of_each, tell
 from rtshcua.front.cli.stdout import out, out_json
@@ -89,9 +89,9 @@ def _why(found: FoundLog) -> str:
 def _told(path: Path, done: Recovered) -> list[str]:
     found = done.found
     if found.state is LogState.CLOSED:
-        return [f"{path}: closed, {_many(found.records)}; nothing to recover"]
+        return [f"{path}: closed, {many(found.records, 'record')}; nothing to recover"]
     loose = found.records - found.sealed
-    said = [f"{path}: {'recovered' if done.done else 'can be recovered'}, {_many(found.records)} kept"]
+    said = [f"{path}: {'recovered' if done.done else 'can be recovered'}, {many(found.records, 'record')} kept"]
     if loose:
         said.append(f"  the last {loose} were not sealed yet: nothing but the chain speaks for them before this")
     if found.reason is not None:
@@ -113,14 +113,6 @@ def _object(path: Path, done: Recovered, code: ExitCode) -> dict[str, object]:
         "discarded_bytes": found.discarded,
         "discarded_sha256": found.discarded_digest.hex(),
         "discarded": None if done.discarded is None else str(done.discarded),
-        "reason": _finding(found.reason),
+        "reason": None if found.reason is None else found.reason._asdict(),
         "last": done.last,
     }
-
-
-def _finding(reason: Finding | None) -> dict[str, object] | None:
-    return None if reason is None else reason._asdict()
-
-
-def _many(records: int) -> str:
-    return f"{records} record{'' if records == 1 else 's'}"

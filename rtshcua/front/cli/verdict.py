@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rtshcua.app.logs import lasted_us
 from rtshcua.app.pin import Pin
-from rtshcua.app.wording import shorten, utc
+from rtshcua.app.wording import many, shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
@@ -130,7 +130,7 @@ def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
     title, style = _TITLES[report.verdict]
     finding = report.failure or report.shortfall
     if finding is None:
-        lines.append((style, f"{title}  {_many(report.records, 'record')}, closed and signed; {_anchored(report)}"))
+        lines.append((style, f"{title}  {many(report.records, 'record')}, closed and signed; {_anchored(report)}"))
         lines += [("yellow", f"  {_gapped(report)}")] if report.gaps else []
     else:
         lines.append((style, f"{title}  at record {finding.record}, line {finding.record + 1}: {finding.slug}"))
@@ -182,24 +182,20 @@ def _anchored(report: LogReport) -> str:
     if not report.anchored:
         return (report.outside and cosigned(report.outside)) or "unanchored"
     tail = report.records - report.anchored
-    return f"anchored but for the last {_many(tail, 'record')}" if tail else "anchored to its end"
+    return f"anchored but for the last {many(tail, 'record')}" if tail else "anchored to its end"
 
 
 def _counts(report: LogReport) -> Iterable[tuple[str, str]]:
     counts = report.counts
     if not counts:
         return
-    epochs = f", in {_many(report.epochs, 'sealed epoch')}" if report.epochs else ""
+    epochs = f", in {many(report.epochs, 'sealed epoch')}" if report.epochs else ""
     if set(counts) <= _SIGNED:
-        yield "", f"  {_many(report.records, 'record')}{epochs}; those that sign were read"
+        yield "", f"  {many(report.records, 'record')}{epochs}; those that sign were read"
         return
     outcomes = ", ".join(f"{counts[name]} {name}" for name in _OUTCOMES if counts.get(name))
-    decisions = f"{_many(counts.get('decision', 0), 'decision')}{f' ({outcomes})' if outcomes else ''}"
+    decisions = f"{many(counts.get('decision', 0), 'decision')}{f' ({outcomes})' if outcomes else ''}"
     yield (
         "",
-        f"  {_many(report.records, 'record')} read: {decisions}, {_many(counts.get('effect', 0), 'effect')}{epochs}",
+        f"  {many(report.records, 'record')} read: {decisions}, {many(counts.get('effect', 0), 'effect')}{epochs}",
     )
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -16,7 +16,7 @@ from rtshcua.app.pin import Pin, pin
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.archiving.given import Skipped
+from rtshcua.front.cli.archiving.given import Skipped, VerifyingOptions
 from rtshcua.front.cli.archiving.told import code_of, counted
 from rtshcua.front.cli.faults import distrust, fail
 from rtshcua.front.cli.stdout import out, out_json
@@ -33,29 +33,25 @@ _TOLD = 20  # logs that are told of one by one
 def checked(
     where: Path,
     work: "Callable[[ArchiveFolder, VerificationOptions], Iterator[Done]]",
-    *,
-    make: bool,
-    skipped: list[Skipped],
-    root: str | None,
-    audit: bool,
-    jobs: int | None,
-    cluster: str | None,
-    as_json: bool,
+    how: VerifyingOptions,
+    skipped: list[Skipped] | None = None,
 ) -> ExitCode:
-    """Does `work` on an archive, and tells what came of it."""
+    """Does `work` on an archive, and tells what came of it; the archive is made where logs come with it, of which some
+    may be `skipped`.
+    """
     from rtshcua.adapters.archive.adding import VerificationOptions
     from rtshcua.adapters.archive.entry import AUDIT, RECORDS
     from rtshcua.adapters.archive.folder import ArchiveFolder
 
     try:
-        pinned = pin(root)
+        pinned = pin(how.root)
     except Untrusted as error:
         return distrust(error, "`--root` takes the trust root of whoever flew, or its public key")
-    folder = ArchiveFolder(where, make=make)
+    folder = ArchiveFolder(where, make=skipped is not None)
     done: list[Done] = []
     try:
-        with closing(_workers(jobs, cluster)) as workers:
-            check = VerificationOptions(pinned.key, AUDIT if audit else RECORDS, time.time_ns() // 1000, workers)
+        with closing(_workers(how.jobs, how.cluster)) as workers:
+            check = VerificationOptions(pinned.key, AUDIT if how.audit else RECORDS, time.time_ns() // 1000, workers)
             for each in work(folder, check):
                 done.append(each)
                 _progress(len(done))
@@ -69,7 +65,7 @@ def checked(
         raise
     finally:
         _progress(0)
-    return _told(folder, done, skipped, pinned, check.root, as_json=as_json)
+    return _told(folder, done, skipped or [], pinned, check.root, as_json=how.as_json)
 
 
 def _workers(jobs: int | None, cluster: str | None) -> "LogVerifiers":

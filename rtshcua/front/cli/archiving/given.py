@@ -18,6 +18,16 @@ _EXTRAS = {"duckdb": "archive", "distributed": "cluster"}
 T = TypeVar("T")
 
 
+class VerifyingOptions(NamedTuple):
+    """By which root logs are verified, whether decisions are derived again, by how many processes or which cluster."""
+
+    root: str | None
+    audit: bool
+    jobs: int | None
+    cluster: str | None
+    as_json: bool
+
+
 class Skipped(NamedTuple):
     """A file below a folder that is not taken in, and why."""
 

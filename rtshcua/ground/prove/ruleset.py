@@ -299,9 +299,10 @@ class Ruleset:
     def wider(self, candidate: int, number: int, skill: int) -> bool:
         """Whether a rule is about a skill, and about all roles and sources of another rule."""
         one, other = self.rule(candidate), self.rule(number)
-        return skill in self.skills(candidate) and all(
-            not wide or (bool(narrow) and set(narrow) <= set(wide))
-            for wide, narrow in ((one.roles, other.roles), (one.sources, other.sources))
+        return (
+            skill in self.skills(candidate)
+            and _has_all(one.roles, other.roles)
+            and _has_all(one.sources, other.sources)
         )
 
     def covered(
@@ -368,7 +369,7 @@ class Ruleset:
         """Whether a rule is about a key; none is about the skill that it flies itself."""
         rule = self.rule(number)
         return (
-            self.flown(number) != key.skill
+            (rule.target is None or rule.target.skill != key.skill)
             and (not rule.skills or key.skill in rule.skills)
             and (not rule.roles or key.role in rule.roles)
             and (not rule.sources or key.source in rule.sources)
@@ -388,6 +389,11 @@ class Ruleset:
                 f"it could not be decided whether this rule {what}",
                 help=f"{why}; a simpler condition would do",
             )
+
+
+def _has_all(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
+    """Whether a list of roles or sources, where none means any, has all of another."""
+    return not wider or (bool(narrower) and set(narrower) <= set(wider))
 
 
 def _corners(space: SituationSpace, exact: Conjunction, cells: Sequence[Cell]) -> Iterable[tuple[int, ...]]:

@@ -25,8 +25,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop
-from rtshcua.adapters.store.evidence import EvidenceFile
-from rtshcua.adapters.store.writer import EvidenceWriter
+from rtshcua.adapters.store.evidence_file import EvidenceFile, EvidenceWriter
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.onboard.enforcement.frames import FrameSession

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from rtshcua.adapters.loop import RunLoop
-from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.evidence_file import EvidenceFile
 from rtshcua.model.durability import WRITTEN
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Plan

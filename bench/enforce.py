@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.world import LOG_KEY, START, loaded, renewed
-from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.evidence_file import EvidenceFile
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.durability import WRITTEN
 from rtshcua.onboard.enforcement.load import Loaded

@@ -17,7 +17,7 @@ from pathlib import Path
 from statistics import mean, median, quantiles
 from time import perf_counter_ns
 
-from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.evidence_file import EvidenceFile
 from rtshcua.adapters.store.writing import sync_data
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision

@@ -32,9 +32,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.loop import RunLoop
-from rtshcua.adapters.store.evidence import EvidenceFile, LogFile
+from rtshcua.adapters.store.evidence_file import EvidenceFile, EvidenceWriter, LogFile
 from rtshcua.adapters.store.telemetry import TelemetryFile
-from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.app.fly.narrator import Teller, Watching

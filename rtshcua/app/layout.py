@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rtshcua import library
-from rtshcua.adapters.store.readable import Readable
+from rtshcua.adapters.store.source_access import ReadableSources
 from rtshcua.adapters.store.writing import rewrite
 from rtshcua.diagnostics.codes import TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic
@@ -41,7 +41,7 @@ class Laid:
 def of_file(path: Path, width: int, *, write: bool) -> Laid:
     """Lays a file out, and replaces it if that is asked for and it changes."""
     try:
-        data = Readable(str(library.root()), [path]).read(str(path))
+        data = ReadableSources(str(library.root()), [path]).read(str(path))
     except OSError as error:
         from rtshcua.ground.language.file_findings import (
             unreadable,  # with the model, for which the usual case has no need

@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from rtshcua import library
-from rtshcua.adapters.store.readable import Readable
 from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.source_access import ReadableSources
 from rtshcua.app.files import SPECIFICATION, root_programs
 from rtshcua.diagnostics.codes import DUPLICATE_NAME
 from rtshcua.diagnostics.diagnostic import Diagnostic

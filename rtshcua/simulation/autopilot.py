@@ -24,15 +24,14 @@ from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
 from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
 from rtshcua.simulation.handling import Handling
 from rtshcua.simulation.mission import MissionProgress, MissionRules
+from rtshcua.simulation.mission_protocol import MISSION, PlanItem, Plans, Transfer, TransferRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.parameters import AutopilotParameter, Parameters
 from rtshcua.simulation.place import HomePosition, Point
-from rtshcua.simulation.plans import MISSION, PlanItem, Plans
 from rtshcua.simulation.sensors import FAST_S, BootPlan, Sensors
 from rtshcua.simulation.signing import VehicleSigning
 from rtshcua.simulation.streams import Reports, Streams
 from rtshcua.simulation.surroundings import Air, Surroundings
-from rtshcua.simulation.transfer import Transfer, TransferRules
 from rtshcua.simulation.vehicle import Landed, Multirotor, VehicleEvent
 
 TICK_US = 20_000

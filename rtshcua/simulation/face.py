@@ -15,8 +15,8 @@ from rtshcua.simulation.autopilot import Autopilot
 from rtshcua.simulation.command import from_message
 from rtshcua.simulation.commands import UNSUPPORTED
 from rtshcua.simulation.config import Equipment
+from rtshcua.simulation.mission_protocol import Peer, Transfer
 from rtshcua.simulation.telemetry import radio_status
-from rtshcua.simulation.transfer import Peer, Transfer
 
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 FENCE_PREFIXES = ("FENCE_", "GF_")

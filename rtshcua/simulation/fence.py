@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from math import hypot, inf
 from typing import Self
 
-from rtshcua.simulation.place import HomePosition, Point
-from rtshcua.simulation.plans import (
+from rtshcua.simulation.mission_protocol import (
     EXCLUDED,
     FENCE,
     INCLUDED,
@@ -20,6 +19,7 @@ from rtshcua.simulation.plans import (
     PlanItem,
     Plans,
 )
+from rtshcua.simulation.place import HomePosition, Point
 from rtshcua.simulation.vehicle import Multirotor
 
 Place = tuple[float, float]

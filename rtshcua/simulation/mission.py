@@ -9,9 +9,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import FlightMode
-from rtshcua.simulation import plans
+from rtshcua.simulation import mission_protocol
+from rtshcua.simulation.mission_protocol import AMSL_FRAMES, FENCE, MISSION, PlanItem, Plans
 from rtshcua.simulation.place import HomePosition, Point
-from rtshcua.simulation.plans import AMSL_FRAMES, FENCE, MISSION, PlanItem, Plans
 from rtshcua.simulation.vehicle import Landed, Multirotor
 
 _MISSION_CURRENT = maker(mavlink.MAVLink_mission_current_message)
@@ -139,7 +139,7 @@ class MissionProgress:
     def tell_current(self) -> None:
         """Says which item begins, if it is one that takes time and the flavour says so."""
         item = self.items[self.current]
-        text = self._rules.text(self.current, item) if item.command in plans.NAVIGATION else None
+        text = self._rules.text(self.current, item) if item.command in mission_protocol.NAVIGATION else None
         if text is not None:
             self._say(mavlink.MAV_SEVERITY_INFO, text)
 
@@ -211,19 +211,19 @@ class MissionProgress:
             self._begin(item, here)
         if not self._is_done(item, here):
             return False
-        if item.command in plans.NAVIGATION or self._rules.tells_all:
+        if item.command in mission_protocol.NAVIGATION or self._rules.tells_all:
             self._send(mavlink.MAVLink_mission_item_reached_message(self.current))
         return self._advance(item)
 
     def _advance(self, item: PlanItem) -> bool:
         self._begun = False
         following = self.current + 1
-        if item.command == plans.JUMP:
+        if item.command == mission_protocol.JUMP:
             done = self._jumps.get(self.current, 0)
             if (item.p2 < 0 or done < item.p2) and self._rules.first <= item.p1 < len(self.items):
                 self._jumps[self.current] = done + 1
                 following = int(item.p1)
-        if following < len(self.items) and (item.command != plans.RETURN or not self._rules.return_is_mode):
+        if following < len(self.items) and (item.command != mission_protocol.RETURN or not self._rules.return_is_mode):
             self.current = following
             self._send(self.message())
             return True
@@ -239,19 +239,19 @@ class MissionProgress:
 
     def _begin(self, item: PlanItem, here: Point) -> None:
         vehicle, command = self._vehicle, item.command
-        if command == plans.TAKEOFF or (command in plans.WAYPOINTS and not vehicle.in_air):
+        if command == mission_protocol.TAKEOFF or (command in mission_protocol.WAYPOINTS and not vehicle.in_air):
             self._climb(self._up(item, here))
-        elif command in plans.WAYPOINTS:
+        elif command in mission_protocol.WAYPOINTS:
             vehicle.go_to(self._place(item, here))
-        elif command == plans.LAND and item.has_place:
+        elif command == mission_protocol.LAND and item.has_place:
             vehicle.go_to(Point(*self._home.local(item.x, item.y), here.up))
-        elif command == plans.LAND:
+        elif command == mission_protocol.LAND:
             vehicle.land_here()
-        elif command == plans.RETURN and self._rules.return_is_mode:
+        elif command == mission_protocol.RETURN and self._rules.return_is_mode:
             vehicle.set_mode(FlightMode.RETURN)
-        elif command == plans.RETURN:
+        elif command == mission_protocol.RETURN:
             vehicle.return_home()
-        elif command == plans.SPEED and item.p2 > 0:
+        elif command == mission_protocol.SPEED and item.p2 > 0:
             vehicle.speed = item.p2
 
     def _climb(self, up: float) -> None:
@@ -263,28 +263,32 @@ class MissionProgress:
     def _is_done(self, item: PlanItem, here: Point) -> bool:
         vehicle, command = self._vehicle, item.command
         climbing = not vehicle.in_air or vehicle.landed is Landed.TAKEOFF
-        if command == plans.TAKEOFF:
+        if command == mission_protocol.TAKEOFF:
             return not climbing
-        if command in plans.WAYPOINTS:
+        if command in mission_protocol.WAYPOINTS:
             if climbing:
                 return False
             place = self._place(item, here)
             if vehicle.target != place:  # on the ground it had to climb first
                 vehicle.go_to(place)
-            return self._has_arrived(item, place, here) and command != plans.LOITER and self._has_waited(item.p1)
-        if command == plans.DELAY:
+            return (
+                self._has_arrived(item, place, here)
+                and command != mission_protocol.LOITER
+                and self._has_waited(item.p1)
+            )
+        if command == mission_protocol.DELAY:
             return self._has_waited(item.p1)
-        if command == plans.LAND:
+        if command == mission_protocol.LAND:
             if item.has_place and vehicle.landed is Landed.IN_AIR and self._is_near(vehicle.target, here):
                 vehicle.land_here()
             return not vehicle.in_air
-        return command != plans.RETURN or self._rules.return_is_mode or not vehicle.in_air
+        return command != mission_protocol.RETURN or self._rules.return_is_mode or not vehicle.in_air
 
     def _has_arrived(self, item: PlanItem, place: Point, here: Point) -> bool:
         """Whether it is there, or was: gusts may carry it off while it waits."""
         if self._arrived_us is not None:
             return True
-        accept = item.p2 if item.command == plans.WAYPOINT and item.p2 > 0 else self._rules.accept_m
+        accept = item.p2 if item.command == mission_protocol.WAYPOINT and item.p2 > 0 else self._rules.accept_m
         return self._is_near(place, here, accept) and abs(place.up - here.up) < _ARRIVED_UP_M
 
     def _is_near(self, place: Point, here: Point, accept_m: float | None = None) -> bool:

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from rtshcua.adapters.store.evidence import EvidenceFile
-from rtshcua.adapters.store.writer import EvidenceWriter
+from rtshcua.adapters.store.evidence_file import EvidenceFile, EvidenceWriter
 from rtshcua.model.durability import WRITTEN
 
 

@@ -21,7 +21,6 @@ from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.replay import FileReplayStore, looked_up
-from rtshcua.adapters.store.roots import RootStore, opened
 from rtshcua.adapters.store.signing import fingerprint, read_link_key
 from rtshcua.app.fly import waiting
 from rtshcua.app.fly.clearance import revoked_link_key, run_folder
@@ -92,7 +91,7 @@ def version() -> int:
     """Of the root that the vehicle accepted last."""
     kept = RootStore(state_folder(), QUAD).kept()
     assert kept is not None
-    return opened(kept).version
+    return opened_root(kept).version
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
@@ -186,7 +185,7 @@ def test_what_the_vehicle_accepts_meanwhile_counts(fleet: KeyStore, capsys: pyte
 
 
 def test_two_roots_of_one_version_are_a_fork(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
-    key, first = fleet.signing_key(Duty.ROOT), opened(fleet.root())
+    key, first = fleet.signing_key(Duty.ROOT), opened_root(fleet.root())
     assert main(["keys", "revoke", "approval-owner-operator"]) == ExitCode.OK
     assert main(["keys", "accept", str(fleet.root_path), "--vehicle", QUAD]) == ExitCode.OK
     Path("fork.trust").write_bytes(replace(first, version=2).sign(key))
@@ -201,7 +200,7 @@ def test_two_roots_of_one_version_are_a_fork(fleet: KeyStore, capsys: pytest.Cap
 
 
 def test_a_revoked_root_key_signs_no_root_that_is_taken(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
-    stolen, first = fleet.signing_key(Duty.ROOT), opened(fleet.root())
+    stolen, first = fleet.signing_key(Duty.ROOT), opened_root(fleet.root())
     assert main(["keys", "rotate-root", "--days", "7"]) == ExitCode.OK
     chain = [str(fleet.earlier_path(2)), str(fleet.root_path)]
     assert main(["keys", "accept", *chain, "--vehicle", QUAD]) == ExitCode.OK
@@ -312,7 +311,7 @@ class Late(SystemClock):
 
 def expiring(fleet: KeyStore, duty: Duty) -> None:
     """The next root, by which each key of a duty expires within the year; of the root's, the root itself does."""
-    root, soon = opened(fleet.root()), SystemClock().now().utc_us + 86_400_000_000
+    root, soon = opened_root(fleet.root()), SystemClock().now().utc_us + 86_400_000_000
     keys = tuple(replace(key, expires_us=soon) if key.duty is duty is not Duty.ROOT else key for key in root.keys)
     until = root.expires_at_us if duty is Duty.ROOT else 1 << 60
     newer = replace(root, version=2, keys=keys, expires_at_us=until)

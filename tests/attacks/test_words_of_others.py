@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from reference.low_source import low_source
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.adapters.store.roots import opened
+from rtshcua.adapters.store.vehicle_records import opened_root
 from rtshcua.app.fly.story import Plan
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
@@ -91,7 +91,7 @@ def test_what_is_approved_is_told_before_it_is_signed(
 def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Whoever has a mission key signs what no compiler would: a name that reads as the step, and pushes ours away."""
     store = KeyStore(data_folder())
-    trusted, data = opened(store.root()), (low / "low.bundle").read_bytes()
+    trusted, data = opened_root(store.root()), (low / "low.bundle").read_bytes()
     bundle = open_bundle(data, root=trusted, vehicle=None, now_us=0)
     key = store.signing_key(Duty.MISSION, whose="agent")
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.adapters.store.roots import opened
+from rtshcua.adapters.store.vehicle_records import opened_root
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.wire.keys import Duty
 
@@ -77,7 +77,7 @@ def test_a_run_whose_root_expired_while_it_was_in_the_air_comes_down_too(ground:
     first.until("dispatched", step=1)
     first.signal(signal.SIGKILL)
     assert first.process.wait() == -signal.SIGKILL
-    store, root = ground.store, opened(ground.store.root())
+    store, root = ground.store, opened_root(ground.store.root())
     store.root_path.write_bytes(replace(root, expires_at_us=root.issued_at_us + 1).sign(store.signing_key(Duty.ROOT)))
 
     second = ground.run(bundle, *words, speed=SPEED).end()

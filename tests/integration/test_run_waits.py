@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import hand_in
 from rtshcua.adapters.boundary_process import program
-from rtshcua.adapters.store.roots import opened
+from rtshcua.adapters.store.vehicle_records import opened_root
 from rtshcua.wire.keys import Duty
 from virtual import case
 
@@ -84,7 +84,7 @@ def test_a_flight_that_broke_off_is_brought_down_by_the_wait_that_is_begun_again
     first.until("dispatched", step=1)
     first.signal(signal.SIGKILL)
     assert first.process.wait() == -signal.SIGKILL
-    store, root = ground.store, opened(ground.store.root())
+    store, root = ground.store, opened_root(ground.store.root())
     store.root_path.write_bytes(replace(root, expires_at_us=root.issued_at_us + 1).sign(store.signing_key(Duty.ROOT)))
 
     second = ground.run(base, *words, speed=SPEED).end()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 
-from rtshcua.adapters.store.evidence import SYSTEM, LogFile
+from rtshcua.adapters.store.evidence_file import SYSTEM, LogFile
 
 PATIENCE_S = 20.0
 

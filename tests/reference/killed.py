@@ -17,9 +17,8 @@ from tempfile import TemporaryDirectory
 from typing import NoReturn
 
 from reference.crashed import LOG_KEY, signer, unverified, writes
-from rtshcua.adapters.store.evidence import SYSTEM, Disk, EvidenceFile, LogFile, SystemFile
+from rtshcua.adapters.store.evidence_file import SYSTEM, Disk, EvidenceFile, EvidenceWriter, LogFile, SystemFile
 from rtshcua.adapters.store.recovery import examine, recover
-from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.adapters.store.writing import open_new
 from rtshcua.evidence.recovery import LogState
 

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from reference.faulty_disk import FaultyDisk
-from rtshcua.adapters.store.evidence import EvidenceFile
-from rtshcua.adapters.store.writer import SYNC_S, Keeper, Lateness
+from rtshcua.adapters.store.evidence_file import SYNC_S, EvidenceFile, Keeper, Lateness
 from rtshcua.virtual.vehicle import VirtualClock
 
 

@@ -1,5 +1,6 @@
 """The verification of the logs of an archive, in whatever process: octets, trust, records, seals, anchors."""
 
+import errno
 import os
 from base64 import b64decode
 from collections.abc import Iterator, Sequence
@@ -9,6 +10,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from distributed import Client
 from msgspec.structs import replace
 
 from rtshcua.adapters.archive.entry import AUDIT, FAILED, ArchiveEntry, StepRecords, VerifiedLog
@@ -215,3 +217,22 @@ class VerifierProcesses:
 def _cores() -> int:
     """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class SchedulerWorkers:
+    """The workers of a scheduler, at an address such as `tcp://10.0.0.1:8786`. Raises OSError where there is none."""
+
+    def __init__(self, address: str) -> None:
+        try:
+            self._client = Client(address, timeout=10)
+        except (OSError, ValueError):
+            raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
+
+    def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
+        """Verifies these logs; one whose worker is lost is given to another."""
+        futures = self._client.map(examine, tasks, pure=False)
+        yield from self._client.gather(futures)
+
+    def close(self) -> None:
+        """Leaves the cluster."""
+        self._client.close()

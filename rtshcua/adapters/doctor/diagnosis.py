@@ -8,9 +8,8 @@ from typing import Final
 import msgspec
 
 from rtshcua.adapters.doctor.examination import ExaminingDriver, Talker
-from rtshcua.adapters.doctor.identity import firmware_of, those_that_matter
+from rtshcua.adapters.doctor.identity import Standing, firmware_of, those_that_matter
 from rtshcua.adapters.doctor.settings import SETTINGS, VehicleSetting
-from rtshcua.adapters.doctor.standing import Standing
 from rtshcua.adapters.utc import TimeSources
 from rtshcua.adapters.vehicle.bounds import FlightReach, reach_of
 from rtshcua.adapters.vehicle.drain import drained

@@ -20,7 +20,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import NamedTuple
 
-from rtshcua.adapters.store.evidence import SYSTEM, Disk, LogFile, write_all
+from rtshcua.adapters.store.evidence_file import SYSTEM, Disk, LogFile, write_all
 from rtshcua.adapters.store.logs import lines, read_anchors
 from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.evidence.finding import Flaw

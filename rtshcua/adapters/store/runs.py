@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from rtshcua.adapters.store.evidence import SYSTEM, Disk, EvidenceFile
+from rtshcua.adapters.store.evidence_file import SYSTEM, Disk, EvidenceFile
 from rtshcua.adapters.store.reading import walk
 from rtshcua.adapters.store.telemetry import TelemetryFile
 from rtshcua.adapters.store.writing import PUBLIC_FOLDER, make_folder, naming, replace, sync_folder, write_new

@@ -8,7 +8,7 @@ from hashlib import file_digest
 from pathlib import Path
 from threading import Event, Thread
 
-from rtshcua.adapters.store.evidence import SYSTEM, Disk, write_all
+from rtshcua.adapters.store.evidence_file import SYSTEM, Disk, write_all
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.mavlink import tlog
 

@@ -19,7 +19,7 @@ from rtshcua.adapters.vehicle.link import (
     two_speak,
 )
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendings
-from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.messages import Announcer, Message, StatusTexts
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.preflight import Preflight
@@ -37,7 +37,6 @@ from rtshcua.adapters.vehicle.streams import (
 )
 from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Batteries, Telemetry
-from rtshcua.adapters.vehicle.texts import Announcer, StatusTexts
 from rtshcua.codec.frames import ReceivedFrame, is_addressed
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT

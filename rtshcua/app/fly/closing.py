@@ -12,7 +12,6 @@ from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, SUMMARY, TELEMETRY, RunFolder
 from rtshcua.adapters.store.telemetry import TelemetryFile
-from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.app.fly.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder

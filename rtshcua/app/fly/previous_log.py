@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Self
 
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.store.last_log import LastLog, PreviousLog
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.recovery import LogEnder, alone, look, recover
+from rtshcua.adapters.store.vehicle_records import LastLog, PreviousLog
 from rtshcua.adapters.utc import UtcWatch
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.left import Left, left_by

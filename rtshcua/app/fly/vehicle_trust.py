@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.store.keystore import KeyStore, read_root
-from rtshcua.adapters.store.roots import RootStore, in_force, opened
+from rtshcua.adapters.store.vehicle_records import RootStore, opened_root, root_in_force
 from rtshcua.app.exit_codes import code_of, exit_code_of, untrusted, words_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -51,7 +51,7 @@ class Trusted(NamedTuple):
         if refused.slug in (REVOKED, *LAPSED):
             for signed in (self.signed, *self.others):
                 with suppress(Untrusted):
-                    yield Trusted(opened(signed), signed, distrust=self.distrust or refused)
+                    yield Trusted(opened_root(signed), signed, distrust=self.distrust or refused)
 
     def superseded(self) -> Refusal | None:
         """Why nothing new flies under it: the vehicle accepted another root since, which may revoke keys."""
@@ -94,7 +94,7 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
         distrust = _refusal(error)
     chain = _given(roots, data, needed=kept is None)
     try:
-        signed = in_force(kept, chain, named=bool(roots), now_us=now_us)
+        signed = root_in_force(kept, chain, named=bool(roots), now_us=now_us)
         _open(signed, now_us)
     except Untrusted as error:
         if error.slug in LAPSED:
@@ -107,7 +107,7 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
     root = opened(signed)
     others = tuple(each for each in (*reversed(chain), kept) if each not in (None, signed))
     keeps = store is not None and signed != kept and not (kept is None and root.development)
-    news = told(opened(kept), root) if distrust is None and keeps and kept is not None else ""
+    news = told(opened_root(kept), root) if distrust is None and keeps and kept is not None else ""
     return Trusted(root, signed, others, store, kept, keeps, news, distrust)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rtshcua import library
 from rtshcua.adapters.store.lint_cache import LintCache
-from rtshcua.adapters.store.readable import Readable
+from rtshcua.adapters.store.source_access import ReadableSources
 from rtshcua.app.files import SPECIFICATION, root_programs
 from rtshcua.app.lint.cache import LintedProgram, decoded, encoded, mark
 from rtshcua.diagnostics.span import Source
@@ -21,7 +21,7 @@ class LintSession:
     """Files as they were first read, or as they are to be (`put`), and what was found in their programs."""
 
     def __init__(self, asked: Iterable[Path] = ()) -> None:
-        self._readable = Readable(str(library.root()), asked)
+        self._readable = ReadableSources(str(library.root()), asked)
         self._data: dict[str, bytes | OSError | ValueError] = {}
         self._digests: dict[str, str | None] = {}
         self._sources: dict[str, Source] = {}

@@ -26,12 +26,12 @@ from rtshcua.adapters.boundary_process import (
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
-from rtshcua.adapters.doctor.standing import standing
+from rtshcua.adapters.doctor.identity import standing
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.adapters.store.owed import OwedParameters
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.signing import LinkKeyError
+from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.adapters.utc import TimeSources, kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address
 from rtshcua.adapters.vehicle.address import AddressError

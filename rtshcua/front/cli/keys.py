@@ -21,8 +21,8 @@ from rtshcua.adapters.link_setup import LinkSetup, after_setup, carry_out
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import OPERATOR, OWNER, PROPOSERS, KeyStore
 from rtshcua.adapters.store.laying import appearing
-from rtshcua.adapters.store.roots import RootStore
 from rtshcua.adapters.store.signing import LinkKeyError, fingerprint, read_link_key, write_link_key
+from rtshcua.adapters.store.vehicle_records import RootStore
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, write_new
 from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.address import parse as parse_address

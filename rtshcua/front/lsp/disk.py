@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
-from rtshcua.adapters.store.readable import Readable
 from rtshcua.adapters.store.reading import walk
 from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.ground.language.paths import shown

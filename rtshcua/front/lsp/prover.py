@@ -52,7 +52,7 @@ def main(library: str) -> None:
     os.dup2(2, 1)  # whatever prints must not reach the messages
     os.nice(5)  # a keystroke that is answered meanwhile goes first
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
-    readable = Readable(library)
+    readable = ReadableSources(library)
     known = desk(library, readable)
     while (job := _take(incoming)) is not None:
         readable.folders = list(job[2])

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from lsprotocol import types as lsp
 
-from rtshcua.adapters.store.readable import Readable
+from rtshcua.adapters.store.source_access import ReadableSources
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.front.lsp.disk import desk, name_of, path_of
 from rtshcua.front.lsp.prover import Found, Proving
@@ -42,7 +42,7 @@ class Session(Texts):
         tell: Callable[[lsp.PublishDiagnosticsParams], None],
         say: Callable[[str], None] = log.warning,
     ) -> None:
-        self._readable = Readable(library)
+        self._readable = ReadableSources(library)
         super().__init__(desk(library, self._readable), library, dialect.load())
         self._tell = tell
         self._proving = Proving(library, say)

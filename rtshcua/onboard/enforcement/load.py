@@ -7,6 +7,7 @@ policy and mission make sense, and that the mission only tightens; last that the
 
 from collections.abc import Mapping
 from enum import StrEnum
+from hashlib import sha256
 from types import MappingProxyType
 from typing import Final
 
@@ -16,7 +17,6 @@ from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
 from rtshcua.decision.session import InForce
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement.attestation import Attestation
 from rtshcua.onboard.enforcement.boundary import SoftwareBoundary
 from rtshcua.onboard.enforcement.executor import Commands, Executor, never
 from rtshcua.onboard.enforcement.isolated import (
@@ -28,11 +28,63 @@ from rtshcua.onboard.enforcement.isolated import (
     IsolatedIssuer,
 )
 from rtshcua.onboard.enforcement.preparation import Owed, PreparationIssuer
-from rtshcua.wire.boundary_chain import BoundaryChain
+from rtshcua.onboard.ports import BoundaryKey
+from rtshcua.wire import boundary_chain
+from rtshcua.wire.boundary_chain import BoundaryChain, Tag
 from rtshcua.wire.bundle import Bundle, open_bundle
+from rtshcua.wire.clock import ClockSource
 from rtshcua.wire.document import FLIGHT_BYTES
+from rtshcua.wire.keys import SigningKey
+from rtshcua.wire.statement import Statement, sign
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
+
+
+class Attestation:
+    """Signs how far one boundary's chain got. Nothing is signed before it has begun, or without a key."""
+
+    def __init__(self, chain: BoundaryChain, flight: bytes, bundle: bytes, *, enforced: bool) -> None:
+        self._chain = chain
+        self._flight = flight
+        self._bundle = sha256(bundle).digest()
+        self._enforced = enforced
+        self._key: BoundaryKey | None = None
+        self._signs: SigningKey | None = None
+
+    @property
+    def digest(self) -> bytes:
+        """The digest to keep for the next session, 32 octets."""
+        return self._chain.digest
+
+    def begin(self, key: BoundaryKey | None) -> int | None:
+        """The flight's log begins: the number of the session, None without a key. Raises RuntimeError for a second
+        time: a chain has one beginning.
+        """
+        if self._key is not None:
+            raise RuntimeError("the boundary's session has begun already")
+        if key is None or key.key is None:
+            return None
+        self._key, self._signs = key, key.key
+        payload = boundary_chain.begin(key.session, key.before, self._flight, self._bundle, enforced=self._enforced)
+        self._chain.add(Tag.BEGIN, payload)
+        return key.session
+
+    def statement(self, now: Now, *, final: bool = False) -> bytes | None:
+        """A signed statement at a moment, None without a key or after the final one. After that nothing is dispatched,
+        and no frame leaves that moves the vehicle: else an end could be signed before the end. The boundary shares the
+        runtime's clock.
+        """
+        key, chain = self._key, self._chain
+        if key is None or self._signs is None or chain.over:
+            return None
+        chain.over = final
+        said = Statement(
+            self._flight, key.session, key.before, chain.count, chain.digest, chain.marks(), chain.frames, chain.left,
+            chain.repeated, chain.declined, chain.stopped, chain.ahead, chain.aside,
+            ClockSource.SHARED, now.monotonic_us, now.utc_us, now.utc_error_us, final,
+        )  # fmt: skip
+        return sign(said, self._signs)
+
 
 #: length of a session key in bytes
 SESSION_KEY_BYTES: Final = 32

@@ -10,6 +10,7 @@ While the link is down, or after this computer stood still, and until fresh stat
 turn at all (`link`).
 """
 
+from collections.abc import Mapping
 from typing import Final
 
 from rtshcua.decision.fallbacks import look_ahead
@@ -22,7 +23,6 @@ from rtshcua.onboard.enforcement import frames
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import WITHHELD, AirState, CommandFailed, End, Ending, Expect, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
-from rtshcua.onboard.runtime.aftermath import MAY_FLY, may_fly
 from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.journal import Detail, Journal
@@ -32,6 +32,42 @@ from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
+
+#: the effect that says it in the log
+MAY_FLY: Final = "may-fly"
+
+#: why this run does not go on watching
+_WHY: Mapping[Ending, str] = {
+    Ending.STOOD_DOWN: "somebody else flies it, so this run sends nothing more and stops watching",
+    Ending.LINK_LOST: "it is not heard or does not answer, so it can be neither watched nor told anything",
+}
+#: however the mission was given up: nothing is left that could be sent
+_TRIED: Final = (
+    "the last link of the contingency was sent as often as it may be, and no landing was seen; this run may send "
+    "nothing else, so it ends and stops watching"
+)
+OWN_FAILSAFE: Final = "its own failsafe flies it, so this run sends nothing more and stops watching"
+#: for nothing else shows who it was
+PAUSED: Final = (
+    "it stands far from its target as if somebody had paused it, who may fly it on at any time, so this run sends "
+    "nothing more and stops watching; if nobody did, nobody flies it: take it over"
+)
+RESTS: Final = "it says that it rests on the ground, and it obeyed a command and was not seen to land"
+
+
+def may_fly(
+    ending: Ending, last_seen: str, *, failsafe: bool = False, paused: bool = False, rests: bool = False
+) -> str:
+    """That the vehicle may be flying, where it was last seen, and why nothing watches it. `failsafe`: its own flies it.
+    `paused`: that it stands is all that shows who flies it. `rests`: it says that it lies on the ground, disarmed.
+    """
+    if rests:
+        return f"{RESTS}: approach it as one that may start"
+    why = _WHY.get(ending, _TRIED)
+    if ending is Ending.STOOD_DOWN and (failsafe or paused):
+        why = OWN_FAILSAFE if failsafe else PAUSED
+    return f"{last_seen}; the vehicle may be flying: {why}"
+
 
 #: what is recorded where another step is asked for, in place of one that is not admitted
 REPLAN: Final = "replan"

@@ -9,8 +9,8 @@ from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import VehicleCommand, whole
 from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, arm_disarm, shared
+from rtshcua.simulation.mission_protocol import AMSL_FRAMES, RELATIVE_FRAMES
 from rtshcua.simulation.place import Point
-from rtshcua.simulation.plans import AMSL_FRAMES, RELATIVE_FRAMES
 
 _RELATIVE_FRAMES = RELATIVE_FRAMES | {None}
 """None is COMMAND_LONG, which has no frame: its altitudes are relative."""

@@ -14,7 +14,7 @@ from rtshcua.codec.frames import Message
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
 from rtshcua.model.faults import FlightMode
-from rtshcua.simulation import plans
+from rtshcua.simulation import mission_protocol
 from rtshcua.simulation.answers import Delays, Lanes
 from rtshcua.simulation.ardupilot.commands import COMMANDS, above_home, enter_number
 from rtshcua.simulation.ardupilot.parameters import HANDLING, PARAMETERS
@@ -23,11 +23,10 @@ from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
 from rtshcua.simulation.fence import Breach, FenceArea, FenceCircle, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
+from rtshcua.simulation.mission_protocol import PlanItem, TransferRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.place import HomePosition, Point
-from rtshcua.simulation.plans import PlanItem
 from rtshcua.simulation.sensors import BootPlan
-from rtshcua.simulation.transfer import TransferRules
 from rtshcua.simulation.vehicle import Multirotor, VehicleEvent
 
 _CRITICAL, _INFO = mavlink.MAV_SEVERITY_CRITICAL, mavlink.MAV_SEVERITY_INFO
@@ -79,12 +78,12 @@ def _name(limits: FenceLimits, point: Point) -> str:
 
 
 _NAMES = {
-    plans.WAYPOINT: "WP",
-    plans.TAKEOFF: "Takeoff",
-    plans.LAND: "Land",
-    plans.RETURN: "RTL",
-    plans.LOITER: "LoitUnlim",
-    plans.LOITER_TIME: "LoitTime",
+    mission_protocol.WAYPOINT: "WP",
+    mission_protocol.TAKEOFF: "Takeoff",
+    mission_protocol.LAND: "Land",
+    mission_protocol.RETURN: "RTL",
+    mission_protocol.LOITER: "LoitUnlim",
+    mission_protocol.LOITER_TIME: "LoitTime",
 }
 
 
@@ -97,7 +96,10 @@ def _judge(
 def _may_enter(items: tuple[PlanItem, ...], vehicle: Multirotor) -> bool:
     """Armed and on the ground, only a mission whose first item that takes time is a takeoff."""
     on_ground = vehicle.armed and not vehicle.in_air
-    return not on_ground or next((item.command for item in items[1:] if item.command in _NAMES), None) == plans.TAKEOFF
+    return (
+        not on_ground
+        or next((item.command for item in items[1:] if item.command in _NAMES), None) == mission_protocol.TAKEOFF
+    )
 
 
 _PLACE, _VELOCITY = 0b111, 0b111_000
@@ -210,7 +212,7 @@ class ArduCopter(Flavour):
         out_of_order=mavlink.MAV_MISSION_INVALID_SEQUENCE,
         busy=mavlink.MAV_MISSION_DENIED,
         capacity=(724, 84, 10),
-        fence_items=plans.FENCE_ITEMS,
+        fence_items=mission_protocol.FENCE_ITEMS,
         keeps_home=True,
     )
     missions = MissionRules(
@@ -253,7 +255,11 @@ class ArduCopter(Flavour):
     def home_item(self, home: HomePosition) -> PlanItem | None:
         """Slot 0 of every mission."""
         return PlanItem(
-            plans.WAYPOINT, mavlink.MAV_FRAME_GLOBAL, x=home.latitude, y=home.longitude, z=home.amsl_mm / 1000
+            mission_protocol.WAYPOINT,
+            mavlink.MAV_FRAME_GLOBAL,
+            x=home.latitude,
+            y=home.longitude,
+            z=home.amsl_mm / 1000,
         )
 
     def on_setup_signing(self, a: Autopilot, message: Message) -> None:
@@ -298,11 +304,15 @@ class ArduCopter(Flavour):
 
     def on_plan(self, a: Autopilot, kind: int) -> None:
         """Tells that a plan was stored, and how many items it has."""
-        if kind == plans.MISSION:
+        if kind == mission_protocol.MISSION:
             a.say(_INFO, "Flight plan received")
-        elif kind == plans.FENCE:
+        elif kind == mission_protocol.FENCE:
             a.say(mavlink.MAV_SEVERITY_DEBUG, "Fence Indexed OK")
-        name = {plans.MISSION: "MIS_TOTAL", plans.FENCE: "FENCE_TOTAL", plans.RALLY: "RALLY_TOTAL"}[kind]
+        name = {
+            mission_protocol.MISSION: "MIS_TOTAL",
+            mission_protocol.FENCE: "FENCE_TOTAL",
+            mission_protocol.RALLY: "RALLY_TOTAL",
+        }[kind]
         a.send(a.parameters.assign(name, len(a.plans.items(kind))))
 
     def on_sticks(self, a: Autopilot, for_us: int) -> None:

@@ -9,7 +9,15 @@ from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import VehicleCommand, whole
-from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, arm_disarm, shared
+from rtshcua.simulation.commands import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    arm_disarm,
+    shared,
+)
 from rtshcua.simulation.place import Point
 
 _STREAM_US = 500_000

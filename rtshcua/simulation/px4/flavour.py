@@ -19,14 +19,22 @@ from rtshcua.simulation.autopilot import LOW_TO_ARM, Autopilot, Flavour
 from rtshcua.simulation.failsafe import FailsafeRules
 from rtshcua.simulation.fence import Breach, FenceArea, FenceLimits, FenceRules
 from rtshcua.simulation.mission import MissionRules
+from rtshcua.simulation.mission_protocol import (
+    AMSL_FRAMES,
+    ERROR,
+    FENCE_ITEMS,
+    NAVIGATION,
+    RELATIVE_FRAMES,
+    RETURN_POINT,
+    PlanItem,
+    TransferRules,
+)
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
 from rtshcua.simulation.place import HomePosition, Point
-from rtshcua.simulation.plans import AMSL_FRAMES, FENCE_ITEMS, NAVIGATION, RELATIVE_FRAMES, RETURN_POINT, PlanItem
 from rtshcua.simulation.px4.commands import COMMANDS, enter_number, fly_kept
 from rtshcua.simulation.px4.parameters import HANDLING, PARAMETERS
 from rtshcua.simulation.px4.telemetry import BUILDERS, CONSTANT, DEFAULT, LEAST_US, ONLY_STREAMED
 from rtshcua.simulation.sensors import BootPlan
-from rtshcua.simulation.transfer import ERROR, TransferRules
 from rtshcua.simulation.vehicle import Multirotor, VehicleEvent
 
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL

@@ -23,7 +23,7 @@ from rtshcua.onboard.ports import (
     VehicleAnswers,
     VehicleUnfit,
 )
-from rtshcua.onboard.runtime.aftermath import MAY_FLY
+from rtshcua.onboard.runtime.controller import MAY_FLY
 
 Way = Callable[[Run], object]
 

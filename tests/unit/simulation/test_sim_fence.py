@@ -13,8 +13,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.config import HOME
 from rtshcua.simulation.fence import FenceArea, FenceCircle, FenceLimits, FencePolygon
+from rtshcua.simulation.mission_protocol import draws_no_fence, from_message
 from rtshcua.simulation.place import Point
-from rtshcua.simulation.plans import draws_no_fence, from_message
 from virtual import plans as p
 from virtual.rows import rows
 

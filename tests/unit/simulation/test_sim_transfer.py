@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
 from rtshcua.simulation.config import AutopilotKind, SimulationConfig
-from rtshcua.simulation.plans import from_message
+from rtshcua.simulation.mission_protocol import from_message
 from rtshcua.simulation.world import Simulation
 from virtual import plans as p
 

@@ -70,7 +70,7 @@ def checked(
 
 def _workers(jobs: int | None, cluster: str | None) -> "LogVerifiers":
     if cluster is not None:
-        from rtshcua.adapters.archive.cluster import SchedulerWorkers
+        from rtshcua.adapters.archive.examine import SchedulerWorkers
 
         return SchedulerWorkers(cluster)
     from rtshcua.adapters.archive.examine import VerifierProcesses

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import msgspec
 
-from rtshcua.adapters.doctor.standing import unflown
+from rtshcua.adapters.doctor.identity import unflown
 from rtshcua.app.wording import utc
 from rtshcua.front.cli.showing.page import Page
 from rtshcua.onboard.ports import Ending

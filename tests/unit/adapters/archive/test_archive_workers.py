@@ -40,7 +40,7 @@ import sys
 from pathlib import Path
 from distributed import LocalCluster
 from rtshcua.adapters.archive.adding import add, verify
-from rtshcua.adapters.archive.cluster import Cluster
+from rtshcua.adapters.archive.examine import Cluster
 from rtshcua.adapters.archive.folder import Folder, Source
 from reference.archived import CHECK
 

@@ -7,10 +7,9 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.adapters.doctor.identity import IdentityQuestions, as_octets, those_that_matter
-from rtshcua.adapters.doctor.standing import WHOLE, standing
+from rtshcua.adapters.doctor.identity import WHOLE, IdentityQuestions, as_octets, standing, those_that_matter
 from rtshcua.adapters.qualification.sortie import SORTIES
-from rtshcua.adapters.store.qualifications import keep_record, path_of, read_record
+from rtshcua.adapters.store.vehicle_records import keep_qualification, kept_qualification, qualification_path
 from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification, QualificationCheck, parameters_digest
 
@@ -102,10 +101,10 @@ def test_it_asks_for_what_was_recorded_until_that_is_told() -> None:
 
 
 def test_one_record_a_vehicle_and_the_last_one_counts(tmp_path: Path) -> None:
-    assert read_record(tmp_path, "quad/07") is None
-    keep_record(tmp_path, "quad/07", b"one")
-    path = keep_record(tmp_path, "quad/07", b"two")
-    assert path == path_of(tmp_path, "quad/07")
+    assert kept_qualification(tmp_path, "quad/07") is None
+    keep_qualification(tmp_path, "quad/07", b"one")
+    path = keep_qualification(tmp_path, "quad/07", b"two")
+    assert path == qualification_path(tmp_path, "quad/07")
     assert path.parent == tmp_path / "qualifications"
-    assert read_record(tmp_path, "quad/07") == b"two"
-    assert read_record(tmp_path, "quad-07") is None
+    assert kept_qualification(tmp_path, "quad/07") == b"two"
+    assert kept_qualification(tmp_path, "quad-07") is None

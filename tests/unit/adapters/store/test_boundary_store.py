@@ -4,17 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.store.boundary import BoundaryStore, DamagedState, Kept
+from rtshcua.adapters.store.vehicle_records import BoundarySession, BoundaryStore, DamagedState
 from rtshcua.wire.boundary_chain import START
 
 
 def test_what_was_kept_last_is_there(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad/07")
-    assert store.kept() == Kept(0, START)
+    assert store.kept() == BoundarySession(0, START)
     store.keep(1, b"a" * 32)
     store.keep(2, b"b" * 32)
-    assert BoundaryStore(tmp_path, "quad/07").kept() == Kept(2, b"b" * 32)
-    assert BoundaryStore(tmp_path, "quad-08").kept() == Kept(0, START)
+    assert BoundaryStore(tmp_path, "quad/07").kept() == BoundarySession(2, b"b" * 32)
+    assert BoundaryStore(tmp_path, "quad-08").kept() == BoundarySession(0, START)
     assert store.path.stat().st_mode & 0o777 == 0o600
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference.faulty_disk import FaultyDisk
-from rtshcua.adapters.store.evidence import MOST_BUFFERED, EvidenceFile
+from rtshcua.adapters.store.evidence_file import MOST_BUFFERED, EvidenceFile
 from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
 
 

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference.faulty_disk import FaultyDisk, until
-from rtshcua.adapters.store.evidence import EvidenceFile
-from rtshcua.adapters.store.writer import TIMES_MOST, EvidenceWriter, Keeper
+from rtshcua.adapters.store.evidence_file import TIMES_MOST, EvidenceFile, EvidenceWriter, Keeper
 from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN
 
 

@@ -7,8 +7,8 @@ from random import Random
 import pytest
 
 from reference.crashed import signer, unverified, writes
-from rtshcua.adapters.store.last_log import LastLog, PreviousLog
 from rtshcua.adapters.store.recovery import InUse, Recovered, recover
+from rtshcua.adapters.store.vehicle_records import LastLog, PreviousLog
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rtshcua.adapters.store.writer import STUCK_S, Lateness
+from rtshcua.adapters.store.evidence_file import STUCK_S, Lateness
 from rtshcua.model.durability import SYNCED
 
 

@@ -11,9 +11,8 @@ import pytest
 
 from reference.crashed import LOG_KEY, signer, unverified, writes
 from reference.power import Died, PowerDisk
-from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.evidence_file import EvidenceFile, Keeper
 from rtshcua.adapters.store.recovery import examine, recover
-from rtshcua.adapters.store.writer import Keeper
 from rtshcua.evidence.recovery import LogState
 
 KINDS = ("died", "torn", "late", "failed", "short", "refused")

@@ -11,9 +11,8 @@ import pytest
 
 from reference.crashed import signer, unverified, writes
 from reference.power import Died, PowerDisk
-from rtshcua.adapters.store.evidence import EvidenceFile
+from rtshcua.adapters.store.evidence_file import EvidenceFile, Keeper
 from rtshcua.adapters.store.recovery import InUse, alone, recover
-from rtshcua.adapters.store.writer import Keeper
 from rtshcua.evidence.records import is_signed
 from rtshcua.evidence.recovery import LogState
 

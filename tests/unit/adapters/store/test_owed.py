@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.store.owed import OwedParameters
+from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.onboard.enforcement.preparation import Owed
 from virtual.rows import rows

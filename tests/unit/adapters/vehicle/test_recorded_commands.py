@@ -12,10 +12,9 @@ from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.fence import Upload, UploadState
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage
 from rtshcua.adapters.vehicle.manoeuvre import Commander
-from rtshcua.adapters.vehicle.messages import FENCE, FenceItem
+from rtshcua.adapters.vehicle.messages import FENCE, FenceItem, StatusTexts
 from rtshcua.adapters.vehicle.observed import Estimator, ObservedVehicle
 from rtshcua.adapters.vehicle.px4 import PX4
-from rtshcua.adapters.vehicle.texts import StatusTexts
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
 
 ARM, TAKEOFF, MODE, REPOSITION, RETURN, LAND = 400, 22, 176, 192, 20, 21

@@ -6,16 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rtshcua.adapters.vehicle.texts import (
-    BURST,
-    CHUNK_US,
-    EACH_US,
-    KEPT,
-    LONGEST,
-    Announcer,
-    StatusTexts,
-    quoted,
-)
+from rtshcua.adapters.vehicle.messages import BURST, CHUNK_US, EACH_US, KEPT, LONGEST, Announcer, StatusTexts, quoted
 from rtshcua.codec.frames import Codec
 from rtshcua.onboard.ports import StatusText
 

@@ -12,8 +12,8 @@ from reference.faulty_disk import FaultyDisk, until
 from reference.flat_case import MISSION
 from reference.seeds import epoch_seeds
 from rtshcua.adapters.store import runs, telemetry
+from rtshcua.adapters.store.evidence_file import EvidenceWriter
 from rtshcua.adapters.store.runs import RunFolder
-from rtshcua.adapters.store.writer import EvidenceWriter
 from rtshcua.app.fly.closing import close_log, keep_summary
 from rtshcua.app.fly.story import Summary
 from rtshcua.diagnostics.exits import ExitCode

@@ -15,9 +15,9 @@ from reference.flying import context, refusal_of, request
 from reference.world import START, VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store import replay
-from rtshcua.adapters.store.owed import OwedParameters
 from rtshcua.adapters.store.replay import FileReplayStore
 from rtshcua.adapters.store.signing import LinkStore, write_link_key
+from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.app.fly import replay_check
 from rtshcua.app.fly.clearance import hanging, timestamps_lost

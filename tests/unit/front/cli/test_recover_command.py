@@ -12,8 +12,8 @@ from reference.forgery import flight
 from reference.marked import mark, note_of
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.adapters.store.last_log import LastLog
 from rtshcua.adapters.store.recovery import alone
+from rtshcua.adapters.store.vehicle_records import LastLog
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.records import is_signed
 from rtshcua.front.cli import app

@@ -9,7 +9,7 @@ from rtshcua.adapters.agent_socket import flight_at
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore, read_root
 from rtshcua.adapters.store.reading import read_regular
-from rtshcua.adapters.store.roots import opened
+from rtshcua.adapters.store.vehicle_records import opened_root
 from rtshcua.app.documents import read_bundle
 from rtshcua.app.fly.vehicle_trust import LAPSED, REVOKED
 from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
@@ -79,7 +79,7 @@ def _of_before(data: bytes, named: TrustRoot | None, refused: Untrusted) -> Bund
 
     Raises `Untrusted`: `refused` where none of them ever trusted it.
     """
-    roots = [named] if named is not None else [opened(each) for each in reversed(KeyStore(data_folder()).chain())]
+    roots = [named] if named is not None else [opened_root(each) for each in reversed(KeyStore(data_folder()).chain())]
     for root in roots:
         with suppress(Untrusted):
             return open_bundle(data, root=root, vehicle=None, now_us=0)

@@ -41,7 +41,7 @@ class SourceReader:
 
     def __init__(self, asked: Sequence[Path], *, once: bool = False) -> None:
         self._library = str(library.root())
-        self._readable = Readable(self._library, asked)
+        self._readable = ReadableSources(self._library, asked)
         self._read = cache(self._readable.read) if once else self._readable.read
 
     def program(self, names: Sequence[str], texts: Mapping[str, bytes] = NO_TEXTS, pins: Pins = PROPOSED) -> Reading:

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rtshcua.adapters.store.last_log import known_end
 from rtshcua.adapters.store.recovery import LogEnder, Recovered, examine, recover
+from rtshcua.adapters.store.vehicle_records import known_end
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.recovery import FoundLog, LogState

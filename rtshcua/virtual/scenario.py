@@ -20,7 +20,7 @@ import msgspec
 
 from rtshcua.adapters.clock import StepWatch
 from rtshcua.adapters.packs import manoeuvres, packs_of
-from rtshcua.adapters.store.writer import Lateness
+from rtshcua.adapters.store.evidence_file import Lateness
 from rtshcua.decision.evaluate import NO_PHASE, Condition, build
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.decision.situation import environment, situation

@@ -22,6 +22,7 @@ from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.replay import FileReplayStore, looked_up
 from rtshcua.adapters.store.signing import fingerprint, read_link_key
+from rtshcua.adapters.store.vehicle_records import RootStore, opened_root
 from rtshcua.app.fly import waiting
 from rtshcua.app.fly.clearance import revoked_link_key, run_folder
 from rtshcua.app.fly.flight_request import FlightContext, FlightRequest
@@ -229,7 +230,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
     assert name in capsys.readouterr().out
     assert main(["keys", "revoke", "--link", "link.key"]) == ExitCode.OK
     assert f"{name} the key of a link" in " ".join(capsys.readouterr().out.split())
-    root = opened(fleet.root())
+    root = opened_root(fleet.root())
     signing = LinkSigning(Path("link.key"), POLICY, FrameSession(), Path("state"), SystemClock(), unsigned_radio=True)
     if resumed:
         assert revoked_link_key(signing, root, resumed=True) is None
@@ -238,7 +239,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
         found = refusal_of(revoked_link_key(signing, root, resumed=False))
         assert name in found.text
         assert (found.code, found.slug) == (ExitCode.UNTRUSTED, "link-key-revoked")
-    assert revoked_link_key(signing, opened(Path("first.trust").read_bytes()), resumed=False) is None
+    assert revoked_link_key(signing, opened_root(Path("first.trust").read_bytes()), resumed=False) is None
     signing.close()
 
 

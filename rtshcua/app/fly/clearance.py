@@ -5,10 +5,9 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import NamedTuple
 
-from rtshcua.adapters.store.boundary import BoundaryStore
-from rtshcua.adapters.store.owed import OwedParameters
 from rtshcua.adapters.store.runs import BUNDLE, RunFolder
 from rtshcua.adapters.store.signing import LinkKeyError
+from rtshcua.adapters.store.vehicle_records import BoundaryStore, OwedParameters
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, make_folder
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.app.exit_codes import words_of

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import msgspec
 
 from rtshcua.adapters.loop import append_all
+from rtshcua.adapters.store.evidence_file import EvidenceWriter
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, SUMMARY, TELEMETRY, RunFolder

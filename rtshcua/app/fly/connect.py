@@ -8,14 +8,12 @@ from typing import Any, Final, NamedTuple
 
 from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.doctor.identity import IdentityQuestions
-from rtshcua.adapters.doctor.standing import standing
+from rtshcua.adapters.doctor.identity import IdentityQuestions, standing
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.folders import data_folder
-from rtshcua.adapters.store.owed import OwedParameters
-from rtshcua.adapters.store.qualifications import read_record
 from rtshcua.adapters.store.signing import LinkKeyError
+from rtshcua.adapters.store.vehicle_records import OwedParameters, kept_qualification
 from rtshcua.adapters.utc import UtcWatch, certain_from_us
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.address import Address, LinkCarrier
@@ -253,7 +251,7 @@ def await_utc(
 def record_of(vehicle: str, root: TrustRoot, now_us: int, data: Path | None = None) -> Qualification | str | None:
     """The record of the vehicle of this identity; None where it has none, a text where it is not to be trusted."""
     try:
-        signed = read_record(data_folder() if data is None else data, vehicle)
+        signed = kept_qualification(data_folder() if data is None else data, vehicle)
         return None if signed is None else open_qualification(signed, root=root, vehicle=vehicle, now_us=now_us)
     except Untrusted as error:
         return str(error)

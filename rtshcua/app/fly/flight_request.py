@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rtshcua.adapters.boundary_process import ListeningBoundary
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
-from rtshcua.adapters.store.last_log import SIMULATED
 from rtshcua.adapters.store.telemetry import TelemetryFile
+from rtshcua.adapters.store.vehicle_records import SIMULATED_FOLDER
 from rtshcua.adapters.utc import UtcWatch, vehicle_counts
 from rtshcua.adapters.vehicle.address import Address
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
@@ -99,7 +99,7 @@ class FlightRequest:
         """Where it is kept what flew, and what the flight before left, of this vehicle or of the simulated one that is
         started: neither uses up a bundle of the other.
         """
-        return self.state / SIMULATED if self.link is None else self.state
+        return self.state / SIMULATED_FOLDER if self.link is None else self.state
 
 
 class FrameBuffer:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from rtshcua.adapters.clock import StepWatch
 from rtshcua.adapters.loop import HELD_WAIT_US, RunLoop, append_all
 from rtshcua.adapters.preparation import Preparations
-from rtshcua.adapters.store.owed import OwedParameters
+from rtshcua.adapters.store.evidence_file import EvidenceWriter
 from rtshcua.adapters.store.runs import BUNDLE, LOG, RunFolder
-from rtshcua.adapters.store.writer import EvidenceWriter
+from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.adapters.utc import CLOCK, certain_from_us
 from rtshcua.adapters.vehicle.drain import drained
 from rtshcua.app.fly.clearance import Cleared, bundle_lapsed

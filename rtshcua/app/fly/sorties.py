@@ -9,12 +9,12 @@ from typing import Any, Final, NamedTuple
 from rtshcua import __version__
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.doctor.diagnosis import settings_told
-from rtshcua.adapters.doctor.standing import unflown
+from rtshcua.adapters.doctor.identity import unflown
 from rtshcua.adapters.qualification.checks import ends_after, judge
 from rtshcua.adapters.qualification.missions import NAME, SortiePlan, source_of, trials
 from rtshcua.adapters.qualification.observed import ObservedQualification, ObservedSortie, TakeoverKind
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES, QualifyingDriver, Sortie
-from rtshcua.adapters.store.qualifications import keep_record, read_record
+from rtshcua.adapters.store.vehicle_records import keep_qualification, kept_qualification
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.adapters.vehicle.bounds import FlightReach
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
@@ -203,7 +203,7 @@ class Qualifying:
         if not broken:
             signed = sign_qualification(record, log_key)
             whole = not unflown(record) or bool(record.failed) or not self._was_whole()
-            path = keep_record(self.data, record.vehicle, signed) if whole else None
+            path = keep_qualification(self.data, record.vehicle, signed) if whole else None
         if broken or ended is Ending.CRASHED:
             code = EXIT_CODES[ended]
         else:
@@ -213,7 +213,7 @@ class Qualifying:
     def _was_whole(self) -> bool:
         """Whether the record that there is is one of a whole qualification, which no partial one replaces."""
         try:
-            signed = read_record(self.data, self.policy.vehicle.identity)
+            signed = kept_qualification(self.data, self.policy.vehicle.identity)
             return signed is not None and not unflown(
                 read_qualification(cose.unverified(signed, limit=MAX_QUALIFICATION).payload)
             )

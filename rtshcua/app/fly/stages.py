@@ -10,9 +10,9 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, NamedTuple
 
 from rtshcua.adapters.boundary_process import ListeningBoundary
-from rtshcua.adapters.store.owed import OwedParameters
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG
+from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.adapters.vehicle.transport import Transport
 from rtshcua.app.fly.clearance import check_vehicle, clear_for_flight, hanging, notes_before
 from rtshcua.app.fly.connect import Connected, connect

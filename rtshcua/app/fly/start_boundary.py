@@ -10,8 +10,8 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, ListeningBoundary
 from rtshcua.adapters.clock import UTC_ERROR_US
-from rtshcua.adapters.store.boundary import BoundaryStore, DamagedState
 from rtshcua.adapters.store.signing import LinkKeyError
+from rtshcua.adapters.store.vehicle_records import BoundaryStore, DamagedState
 from rtshcua.adapters.vehicle.transport import Transport
 from rtshcua.app.exit_codes import code_of, untrusted, words_of
 from rtshcua.app.fly.agents import Agents

@@ -98,13 +98,13 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
         _open(signed, now_us)
     except Untrusted as error:
         if error.slug in LAPSED:
-            signed = in_force(kept, chain, named=bool(roots), now_us=0)
+            signed = root_in_force(kept, chain, named=bool(roots), now_us=0)
             distrust = distrust or untrusted(error)
         elif kept is None or not chain:
             raise
         else:
             signed, distrust = chain[-1], _refusal(error)
-    root = opened(signed)
+    root = opened_root(signed)
     others = tuple(each for each in (*reversed(chain), kept) if each not in (None, signed))
     keeps = store is not None and signed != kept and not (kept is None and root.development)
     news = told(opened_root(kept), root) if distrust is None and keeps and kept is not None else ""

@@ -6,6 +6,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
 from rtshcua.adapters.store.reading import walk
+from rtshcua.adapters.store.source_access import ReadableSources
 from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.ground.language.paths import shown
 
@@ -15,7 +16,7 @@ MOST = 2_000
 _DRIVE = re.compile(r"/[A-Za-z]:(?=/|\Z)")
 
 
-def desk(library: str, readable: Readable) -> Workspace:
+def desk(library: str, readable: ReadableSources) -> Workspace:
     """An empty desk over what may be read of the disk."""
     return Workspace(readable.read, library, readable.listing, readable.pack)
 

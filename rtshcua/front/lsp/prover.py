@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rtshcua.adapters.store.project import Project, Projects
-from rtshcua.adapters.store.readable import Readable
+from rtshcua.adapters.store.source_access import ReadableSources
 from rtshcua.app.lint.examine import find
 from rtshcua.app.lint.scope import ignored_in
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors

@@ -7,9 +7,9 @@ import pytest
 from msgspec.structs import replace
 
 from reference.flying import refusal_of
-from rtshcua.adapters.store.boundary import BoundaryStore
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.adapters.store.vehicle_records import BoundaryStore
 from rtshcua.app.fly.start_boundary import BoundarySession, HeldByBoundary, boundary_key
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app

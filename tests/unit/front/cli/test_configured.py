@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
-from rtshcua.adapters.store.owed import OwedParameters
+from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.app.fly.setting_notes import would_set
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app

@@ -9,7 +9,7 @@ import pytest
 
 from rtshcua import library
 from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES
-from rtshcua.adapters.store.qualifications import keep_record
+from rtshcua.adapters.store.vehicle_records import keep_qualification
 from rtshcua.app.fly import sorties as sorties_flown
 from rtshcua.app.fly.sorties import plan_sorties
 from rtshcua.front.cli.showing.qualification import told
@@ -121,9 +121,9 @@ def test_a_partial_record_replaces_no_whole_one(tmp_path: Path) -> None:
     trial: Any = SimpleNamespace(data=tmp_path, policy=SimpleNamespace(vehicle=SimpleNamespace(identity="quad-07")))
     assert not sorties_flown.Qualifying._was_whole(trial)
     for checks, whole in (([held, sorties[0]], False), ([held, *sorties], True)):
-        keep_record(tmp_path, "quad-07", sign_qualification(record(*checks), case.KEYS[Duty.LOG]))
+        keep_qualification(tmp_path, "quad-07", sign_qualification(record(*checks), case.KEYS[Duty.LOG]))
         assert sorties_flown.Qualifying._was_whole(trial) is whole
-    keep_record(tmp_path, "quad-07", b"nonsense")
+    keep_qualification(tmp_path, "quad-07", b"nonsense")
     assert not sorties_flown.Qualifying._was_whole(trial)
 
 

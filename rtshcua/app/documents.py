@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.decision.prepare import prepare, prepare_mission
-from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, EMPTY, LOG, LOOKED_AT, Kind, recognised
+from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, EMPTY, LOG, LOOKED_AT, FileKind, recognised
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -75,7 +75,7 @@ class Mistaken(Untrusted):
         self.help = help
 
 
-def kind_of(path: Path) -> Kind | None:
+def kind_of(path: Path) -> FileKind | None:
     """What a file is; None where nothing tells, also where it cannot be read."""
     try:
         with open_regular(path) as file:

@@ -10,37 +10,41 @@ from typing import Final, NamedTuple
 LOOKED_AT: Final = 1 << 13
 
 
-class Kind(NamedTuple):
+class FileKind(NamedTuple):
     """What a file is, in words, and what is done with one; empty where nothing of ours is."""
 
     name: str
     help: str
 
 
-BUNDLE: Final = Kind("a compiled bundle", "`rtshcua show` prints it, `rtshcua run` flies it; its source ends in `.rts`")
-LOG: Final = Kind("a log of a flight", "`rtshcua verify-log` proves it, `rtshcua why` explains it")
-PROOF: Final = Kind("a proof of a record", "`rtshcua verify-proof` verifies it")
-DOCUMENT: Final = Kind("a signed document", "`rtshcua show` says which")
-KEY: Final = Kind("a key", "`rtshcua show` says which; keep it to yourself")
-SPECIFICATION: Final = Kind("a mission specification", "`rtshcua compile FILE.json --with POLICY.rts` compiles it")
-SOURCE: Final = Kind("a source", "`rtshcua compile FILE.rts -o FILE.bundle` makes a bundle of it")
-PLAN: Final = Kind(
+BUNDLE: Final = FileKind(
+    "a compiled bundle", "`rtshcua show` prints it, `rtshcua run` flies it; its source ends in `.rts`"
+)
+LOG: Final = FileKind("a log of a flight", "`rtshcua verify-log` proves it, `rtshcua why` explains it")
+PROOF: Final = FileKind("a proof of a record", "`rtshcua verify-proof` verifies it")
+DOCUMENT: Final = FileKind("a signed document", "`rtshcua show` says which")
+KEY: Final = FileKind("a key", "`rtshcua show` says which; keep it to yourself")
+SPECIFICATION: Final = FileKind("a mission specification", "`rtshcua compile FILE.json --with POLICY.rts` compiles it")
+SOURCE: Final = FileKind("a source", "`rtshcua compile FILE.rts -o FILE.bundle` makes a bundle of it")
+PLAN: Final = FileKind(
     "a plan of QGroundControl", "nothing reads plans: write the mission as a source, its fence and zones as `zone`"
 )
-WAYPOINTS: Final = Kind("a list of waypoints (QGC WPL)", "nothing reads these: write the mission as a source")
-GEOJSON: Final = Kind("GeoJSON", 'a source reads it: `zone NAME from "FILE.geojson"`')
-ED269: Final = Kind(
+WAYPOINTS: Final = FileKind("a list of waypoints (QGC WPL)", "nothing reads these: write the mission as a source")
+GEOJSON: Final = FileKind("GeoJSON", 'a source reads it: `zone NAME from "FILE.geojson"`')
+ED269: Final = FileKind(
     "a list of geographical zones (ED-269)", "nothing reads it: write each zone with its heights and times as `zone`"
 )
-KML: Final = Kind("KML", 'convert it to GeoJSON, and read it from a source: `zone NAME from "FILE.geojson"`')
-ARCHIVE: Final = Kind("a ZIP archive", "take out of it what you mean")
-PDF: Final = Kind("a PDF document", "")
-HTML: Final = Kind("a web page", "")
-MARKDOWN: Final = Kind("a page of text (Markdown)", "")
-SCRIPT: Final = Kind("a script", "")
-EMPTY: Final = Kind("an empty file", "it was not written whole: make it again, or copy it again")
-ULOG: Final = Kind("a log of PX4 (ULog)", "a run writes `log.jsonl`: name that, or the run's folder")
-DATAFLASH: Final = Kind("a log of ArduPilot (DataFlash)", "a run writes `log.jsonl`: name that, or the run's folder")
+KML: Final = FileKind("KML", 'convert it to GeoJSON, and read it from a source: `zone NAME from "FILE.geojson"`')
+ARCHIVE: Final = FileKind("a ZIP archive", "take out of it what you mean")
+PDF: Final = FileKind("a PDF document", "")
+HTML: Final = FileKind("a web page", "")
+MARKDOWN: Final = FileKind("a page of text (Markdown)", "")
+SCRIPT: Final = FileKind("a script", "")
+EMPTY: Final = FileKind("an empty file", "it was not written whole: make it again, or copy it again")
+ULOG: Final = FileKind("a log of PX4 (ULog)", "a run writes `log.jsonl`: name that, or the run's folder")
+DATAFLASH: Final = FileKind(
+    "a log of ArduPilot (DataFlash)", "a run writes `log.jsonl`: name that, or the run's folder"
+)
 
 _GEOMETRIES = "Point|MultiPoint|LineString|MultiLineString|Polygon|MultiPolygon|GeometryCollection"
 _BEGINS: Final = (
@@ -70,7 +74,7 @@ _SAYS: Final = (
 )
 
 
-def recognised(data: bytes, name: str = "") -> Kind | None:
+def recognised(data: bytes, name: str = "") -> FileKind | None:
     """What a file is, by its first octets, or else by the end of its name; None where nothing tells."""
     head = data[:LOOKED_AT].removeprefix(b"\xef\xbb\xbf")
     for pattern, kind in _BEGINS:
@@ -82,7 +86,7 @@ def recognised(data: bytes, name: str = "") -> Kind | None:
     return {"rts": SOURCE, "md": MARKDOWN, "markdown": MARKDOWN}.get(ending)
 
 
-def foreign(data: bytes, name: str = "") -> Kind | None:
+def foreign(data: bytes, name: str = "") -> FileKind | None:
     """What a file is that stands where a source or a specification is asked for; None where it may be one.
 
     One that is called a source may begin as a comment of other languages does: that is told where it stands.

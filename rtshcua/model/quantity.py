@@ -28,7 +28,7 @@ class Datum(Enum):
     SEA = "sea"
 
 
-class Unit(NamedTuple):
+class UnitOfMeasure(NamedTuple):
     """`value * numerator / denominator` is the canonical integer; a literal that is not integral there is refused."""
 
     dimension: Dimension
@@ -37,24 +37,24 @@ class Unit(NamedTuple):
 
 
 #: Units that a source may write. `m` is a length; where an altitude is asked it is one above home.
-UNITS: dict[str, Unit] = {
-    "mm": Unit(Dimension.LENGTH, 1),
-    "cm": Unit(Dimension.LENGTH, 10),
-    "m": Unit(Dimension.LENGTH, 1_000),
-    "km": Unit(Dimension.LENGTH, 1_000_000),
-    "mm/s": Unit(Dimension.SPEED, 1),
-    "cm/s": Unit(Dimension.SPEED, 10),
-    "m/s": Unit(Dimension.SPEED, 1_000),
-    "km/h": Unit(Dimension.SPEED, 2_500, 9),
-    "us": Unit(Dimension.DURATION, 1),
-    "ms": Unit(Dimension.DURATION, 1_000),
-    "s": Unit(Dimension.DURATION, 1_000_000),
-    "min": Unit(Dimension.DURATION, 60_000_000),
-    "h": Unit(Dimension.DURATION, 3_600_000_000),
-    "%": Unit(Dimension.RATIO, 100),
-    "deg": Unit(Dimension.ANGLE, 10_000_000),
-    "mV": Unit(Dimension.VOLTAGE, 1),
-    "V": Unit(Dimension.VOLTAGE, 1_000),
+UNITS: dict[str, UnitOfMeasure] = {
+    "mm": UnitOfMeasure(Dimension.LENGTH, 1),
+    "cm": UnitOfMeasure(Dimension.LENGTH, 10),
+    "m": UnitOfMeasure(Dimension.LENGTH, 1_000),
+    "km": UnitOfMeasure(Dimension.LENGTH, 1_000_000),
+    "mm/s": UnitOfMeasure(Dimension.SPEED, 1),
+    "cm/s": UnitOfMeasure(Dimension.SPEED, 10),
+    "m/s": UnitOfMeasure(Dimension.SPEED, 1_000),
+    "km/h": UnitOfMeasure(Dimension.SPEED, 2_500, 9),
+    "us": UnitOfMeasure(Dimension.DURATION, 1),
+    "ms": UnitOfMeasure(Dimension.DURATION, 1_000),
+    "s": UnitOfMeasure(Dimension.DURATION, 1_000_000),
+    "min": UnitOfMeasure(Dimension.DURATION, 60_000_000),
+    "h": UnitOfMeasure(Dimension.DURATION, 3_600_000_000),
+    "%": UnitOfMeasure(Dimension.RATIO, 100),
+    "deg": UnitOfMeasure(Dimension.ANGLE, 10_000_000),
+    "mV": UnitOfMeasure(Dimension.VOLTAGE, 1),
+    "V": UnitOfMeasure(Dimension.VOLTAGE, 1_000),
 }
 
 #: The units in which a person reads a canonical value of each dimension, largest first.

@@ -129,7 +129,7 @@ Expected = EndsWith | Decides | Flies | ReactsWithin | KeepsAway | EndsInside
 
 
 @dataclass(frozen=True, slots=True)
-class Expectation:
+class ScenarioExpectation:
     """What must come of it; `text` is as it was written, `start` and `end` where, in file `source`."""
 
     what: Expected
@@ -149,4 +149,4 @@ class Scenario:
     last_seed: int
     start: Start
     incidents: tuple[Incident, ...]
-    expectations: tuple[Expectation, ...]
+    expectations: tuple[ScenarioExpectation, ...]

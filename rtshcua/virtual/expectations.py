@@ -19,11 +19,11 @@ from rtshcua.model.scenario import (
     Decides,
     EndsInside,
     EndsWith,
-    Expectation,
     Expected,
     Flies,
     KeepsAway,
     ReactsWithin,
+    ScenarioExpectation,
 )
 from rtshcua.virtual.flight_record import ScenarioFlown
 from rtshcua.virtual.judge import Judgement
@@ -38,7 +38,7 @@ _WORD = re.compile(r"\w+")
 class Met(NamedTuple):
     """Whether an expectation was met, and what was found."""
 
-    expectation: Expectation
+    expectation: ScenarioExpectation
     met: bool
     found: str
 
@@ -55,7 +55,7 @@ def expectations(flown: ScenarioFlown, judgement: Judgement) -> tuple[Met, ...]:
 
 
 def recorded(
-    expected: Iterable[Expectation], ending: str, lines: Iterable[bytes], policy: Policy, mission: Mission
+    expected: Iterable[ScenarioExpectation], ending: str, lines: Iterable[bytes], policy: Policy, mission: Mission
 ) -> list[Met]:
     """Those that the records of a run can show by themselves, where nobody knows where the vehicle really was."""
     said = _Said(ending, _records(lines), policy, mission)

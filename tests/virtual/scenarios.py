@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from rtshcua.model.faults import Fault
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.scenario import AtTime, Expectation, Expected, Incident, Scenario, Start, When
+from rtshcua.model.scenario import AtTime, Expected, Incident, Scenario, ScenarioExpectation, Start, When
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.virtual.fitting import fitting
 from rtshcua.virtual.flight_record import ScenarioFlown
@@ -30,7 +30,7 @@ def when(time: When, fault: Fault) -> Incident:
 
 def scenario(*incidents: Incident, start: Start = CALM, expects: tuple[Expected, ...] = ()) -> Scenario:
     """A scenario of these incidents."""
-    expectations = tuple(Expectation(what, repr(what), "test.rts", 0, 0) for what in expects)
+    expectations = tuple(ScenarioExpectation(what, repr(what), "test.rts", 0, 0) for what in expects)
     return Scenario("tried", ("px4", "ardupilot"), 1, 1, start, incidents, expectations)
 
 

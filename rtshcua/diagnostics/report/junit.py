@@ -20,7 +20,7 @@ _HEAD: Final = '<?xml version="1.0" encoding="utf-8"?>\n'
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CaseOutcome:
     """How one test ended: passed, unless `failure` or `skipped` says why not.
 
     `kind` is a short name for what failed, for programs; `broken` says that the test could not be run, which JUnit
@@ -43,7 +43,7 @@ class Suite:
     """The tests of one file, `name`; `properties` are names and values for whoever reads the report."""
 
     name: str
-    cases: tuple[Outcome, ...]
+    cases: tuple[CaseOutcome, ...]
     properties: tuple[tuple[str, str], ...] = ()
 
 
@@ -72,7 +72,7 @@ def _suite(root: ElementTree.Element, suite: Suite) -> None:
         _case(made, case, suite)
 
 
-def _count(element: ElementTree.Element, name: str, cases: Iterable[Outcome], *, skipped: bool) -> None:
+def _count(element: ElementTree.Element, name: str, cases: Iterable[CaseOutcome], *, skipped: bool) -> None:
     each = tuple(cases)
     element.set("name", _line(name))
     element.set("tests", str(len(each)))
@@ -83,7 +83,7 @@ def _count(element: ElementTree.Element, name: str, cases: Iterable[Outcome], *,
     element.set("time", _seconds(sum(case.time_us or 0 for case in each)))
 
 
-def _case(made: ElementTree.Element, case: Outcome, suite: Suite) -> None:
+def _case(made: ElementTree.Element, case: CaseOutcome, suite: Suite) -> None:
     element = ElementTree.SubElement(made, "testcase", name=_line(case.name), classname=_line(case.file or suite.name))
     if case.time_us is not None:
         element.set("time", _seconds(case.time_us))
@@ -99,11 +99,11 @@ def _case(made: ElementTree.Element, case: Outcome, suite: Suite) -> None:
         ElementTree.SubElement(element, "system-out").text = _text(case.output)
 
 
-def _is_skipped(case: Outcome) -> bool:
+def _is_skipped(case: CaseOutcome) -> bool:
     return case.failure is None and case.skipped is not None
 
 
-def _place(case: Outcome) -> str:
+def _place(case: CaseOutcome) -> str:
     if not case.file:
         return ""
     return f"{_line(case.file)}{'' if case.line is None else f':{case.line}'}\n"
@@ -142,7 +142,7 @@ def suites(
     grouped = {
         file: tuple(_outcome(each, sources, failing) for each in group) for file, group in groupby(of_file, _file)
     }
-    passed = {file: (Outcome("nothing found", file),) for file in files}
+    passed = {file: (CaseOutcome("nothing found", file),) for file in files}
     return tuple(Suite(file, cases) for file, cases in sorted((passed | grouped).items()))
 
 
@@ -150,7 +150,7 @@ def _file(diagnostic: Diagnostic) -> str:
     return NO_FILE if diagnostic.span is None else diagnostic.span.file
 
 
-def _outcome(diagnostic: Diagnostic, sources: Mapping[str, Source], failing: Collection[Severity]) -> Outcome:
+def _outcome(diagnostic: Diagnostic, sources: Mapping[str, Source], failing: Collection[Severity]) -> CaseOutcome:
     code, span = diagnostic.code, diagnostic.span
     name, file, line = f"{code.id} {code.slug}", "", None
     if span is not None:
@@ -160,5 +160,5 @@ def _outcome(diagnostic: Diagnostic, sources: Mapping[str, Source], failing: Col
             name, line = f"{name} at {at.line}:{at.column}", at.line
     text = render_one(diagnostic, sources).rstrip("\n")
     if diagnostic.severity in failing:
-        return Outcome(name, file, line, failure=text, kind=code.id)
-    return Outcome(name, file, line, output=text)
+        return CaseOutcome(name, file, line, failure=text, kind=code.id)
+    return CaseOutcome(name, file, line, output=text)

@@ -79,7 +79,7 @@ SCHEMA: Final = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/sche
 _DONE = (ExitCode.OK, ExitCode.DIAGNOSTICS)
 
 
-class Page(Protocol):
+class CodePage(Protocol):
     """The page of a code, in Markdown: `text` whole, `what` the section that says what the code means."""
 
     @property
@@ -105,7 +105,7 @@ def sarif(
     version: str,
     code: ExitCode,
     ignored: Iterable[Ignored] = (),
-    pages: Mapping[str, Page] | None = None,
+    pages: Mapping[str, CodePage] | None = None,
     base: str | None = None,
 ) -> dict[str, Any]:
     """One run as a value that `json.dumps` takes.
@@ -156,7 +156,7 @@ def _has_place(diagnostic: Diagnostic) -> bool:
     return diagnostic.span is not None or diagnostic.pointer is not None
 
 
-def _rule(code: Code, page: Page | None) -> dict[str, Any]:
+def _rule(code: Code, page: CodePage | None) -> dict[str, Any]:
     """A reportingDescriptor (3.49). What it holds takes no arguments, so braces are written as they are."""
     sentence = f"{code.meaning[:1].upper()}{code.meaning[1:]}."
     rule: dict[str, Any] = {

@@ -35,7 +35,7 @@ from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import MissionDecl, Overrides, Phase, Step
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.program import Import, Unit
-from rtshcua.model.ir.skills import ArgumentValue, Clause
+from rtshcua.model.ir.skills import ArgumentValue, ClauseDecl
 
 
 def mission_of(
@@ -124,9 +124,9 @@ class _MissionBuilder:
         self.found += found
         return value
 
-    def clauses(self, words: str, texts: Sequence[str], path: Path) -> tuple[Clause, ...]:
+    def clauses(self, words: str, texts: Sequence[str], path: Path) -> tuple[ClauseDecl, ...]:
         """The clauses of conditions."""
-        clauses: list[Clause] = []
+        clauses: list[ClauseDecl] = []
         for number, text in enumerate(texts):
             some, found = parse_clauses(words, text, *self.within((*path, number)))
             clauses += some

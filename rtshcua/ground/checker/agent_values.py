@@ -11,7 +11,7 @@ from rtshcua.ground.language.parse import parse
 from rtshcua.model.ir.expression import Quantity, Value
 from rtshcua.model.ir.missions import Overrides, Step
 from rtshcua.model.ir.node import Node
-from rtshcua.model.ir.skills import Clause
+from rtshcua.model.ir.skills import ClauseDecl
 
 N = TypeVar("N", bound=Node)
 
@@ -48,14 +48,14 @@ def parse_quantity(words: str, text: str, span: Span, moved: Moved) -> tuple[Qua
     return None, (given.more("this is one quantity", "2 s"),)
 
 
-def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tuple[Clause, ...], Found]:
+def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tuple[ClauseDecl, ...], Found]:
     """The clauses of the condition after `require`, `assume` or `maintain`."""
     given = _Given(f"{_OVERRIDE}{words} ", text, _AFTER_OVERRIDE, span, moved)
     step, found = given.step()
     if found:
         return (), found
     for value in () if step is None else _only(step):
-        if isinstance(value, tuple) and value and isinstance(value[0], Clause):
+        if isinstance(value, tuple) and value and isinstance(value[0], ClauseDecl):
             return tuple(given.placed(clause) for clause in value), ()
     return (), (given.more("this is one condition", "battery > 50 %"),)
 

@@ -14,7 +14,7 @@ from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.ir.expression import Coordinates, Value
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.ir.places import ZoneDecl
-from rtshcua.model.ir.policies import Rule, TemplateDecl
+from rtshcua.model.ir.policies import RuleDecl, TemplateDecl
 from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, SkillDecl
 
 #: what has parameters
@@ -49,7 +49,7 @@ class Context:
     dialect: Dialect
     given: dict[tuple[str, Value], Bound] = field(default_factory=dict)
     instances: dict[str, tuple[Instance, ...]] = field(default_factory=dict)
-    samples: tuple[Rule, ...] = ()
+    samples: tuple[RuleDecl, ...] = ()
     data: DataFiles = field(default_factory=DataFiles)
     _bound: dict[tuple[str, tuple[ArgumentValue, ...]], tuple[Bound, ...]] = field(default_factory=dict)
     _arguments: dict[Span, dict[str, Argument]] = field(default_factory=dict)

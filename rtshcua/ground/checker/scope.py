@@ -13,7 +13,7 @@ from rtshcua.mavlink.dialect import DATUM
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ENTRY, ZoneDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import Parameter
+from rtshcua.model.ir.skills import ParameterDecl
 from rtshcua.model.quantity import Dimension
 
 LOCAL_TIME = "local time"
@@ -25,7 +25,7 @@ PHASE = "phase"
 class Argument:
     """A parameter as seen inside its skill, or by a rule about it; `low`, `high` where it has a range."""
 
-    declaration: Parameter
+    declaration: ParameterDecl
     type: Type
     low: int | None = None
     high: int | None = None
@@ -140,7 +140,7 @@ def enumeration_of(declaration: EnumDecl) -> Enumeration:
     return Enumeration(declaration.name.text, members, True, declaration.name.span)
 
 
-def choices_of(parameter: Parameter) -> Enumeration:
+def choices_of(parameter: ParameterDecl) -> Enumeration:
     """The choices of a `one of` parameter, numbered in the order in which they are written."""
     members = {choice.text: ordinal for ordinal, choice in enumerate(parameter.choices)}
     return Enumeration(parameter.name.text, members, False, parameter.name.span)
@@ -160,7 +160,7 @@ def signal_type(symbols: Symbols, signal: SignalDecl) -> Type | None:
     return None if declaration is None else Type(Kind.ENUMERATION, enumeration=enumeration_of(declaration))
 
 
-def parameter_type(parameter: Parameter) -> Type | None:
+def parameter_type(parameter: ParameterDecl) -> Type | None:
     """The type of a parameter, or None where nothing is called so."""
     if parameter.choices:
         return Type(Kind.ENUMERATION, enumeration=choices_of(parameter))

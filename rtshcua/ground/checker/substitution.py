@@ -12,7 +12,7 @@ from rtshcua.ground.checker.report import Report
 from rtshcua.model.ir.expression import Arithmetic, Quantity, Reference, Value
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import ENTRY
-from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.policies import RuleDecl
 from rtshcua.model.ir.skills import SizesDecl, SkillDecl
 
 N = TypeVar("N", bound=Node)
@@ -27,7 +27,7 @@ def substitute(node: N, values: Mapping[str, Value]) -> N:
     return _substituted(node, values) if values else node
 
 
-def substitute_roles(rule: Rule, roles: Mapping[str, str]) -> Rule:
+def substitute_roles(rule: RuleDecl, roles: Mapping[str, str]) -> RuleDecl:
     """The rule with the roles that the names of `roles` stand for."""
     changes: dict[str, Any] = {"roles": tuple(_role(name, roles) for name in rule.roles)}
     if rule.approver is not None:

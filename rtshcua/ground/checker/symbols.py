@@ -13,7 +13,7 @@ from rtshcua.ground.checker.substitution import sized
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl, Rule, TemplateDecl, Use
+from rtshcua.model.ir.policies import PolicyDecl, RuleDecl, TemplateDecl, Use
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.ir.scenarios import ScenarioDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
@@ -159,7 +159,7 @@ DELEGATED = "delegated here"
 MAX_USES = 3
 
 
-def brought_about(rule: Rule) -> Iterator[tuple[Span, str]]:
+def brought_about(rule: RuleDecl) -> Iterator[tuple[Span, str]]:
     """Labels for the `use` and the delegations through which a rule came to be."""
     for node in rule.origin:
         yield node.span, USED if isinstance(node, Use) else DELEGATED

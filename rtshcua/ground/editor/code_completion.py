@@ -32,7 +32,7 @@ from rtshcua.ground.language.paths import LIBRARY, SHELVES, pack_of
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.faults import FaultField, parameters
 from rtshcua.model.ir.policies import TemplateDecl
-from rtshcua.model.ir.skills import Parameter, SkillDecl
+from rtshcua.model.ir.skills import ParameterDecl, SkillDecl
 from rtshcua.model.quantity import UNITS, Dimension
 from rtshcua.model.scenario import FLAVOURS
 
@@ -154,7 +154,7 @@ class _VisibleParameter(NamedTuple):
     type: Type | None
 
     @staticmethod
-    def of(parameter: Parameter) -> "_VisibleParameter":
+    def of(parameter: ParameterDecl) -> "_VisibleParameter":
         """A parameter that was read."""
         return _VisibleParameter(parameter.name.text, parameter.type.text, parameter_type(parameter))
 
@@ -271,7 +271,7 @@ class _Proposals:
             here = parameters[call.position]
         yield from self._values() if here is None else self._fitting(here)
 
-    def _fitting(self, parameter: Parameter) -> Iterator[CompletionItem]:
+    def _fitting(self, parameter: ParameterDecl) -> Iterator[CompletionItem]:
         kind = parameter.type.text
         yield from (CompletionItem(choice.text, "member", parameter.name.text) for choice in parameter.choices)
         if kind == "zone":
@@ -351,7 +351,7 @@ def _called(view: ProgramView, call: OpenCall) -> SkillDecl | TemplateDecl | Non
     return view.symbols.skills.get(call.name) or view.symbols.templates.get(call.name)
 
 
-def _accepted_arguments(declared: SkillDecl | TemplateDecl, written: list[Token]) -> tuple[Parameter, ...]:
+def _accepted_arguments(declared: SkillDecl | TemplateDecl, written: list[Token]) -> tuple[ParameterDecl, ...]:
     """What a call may give: the parameters of what it calls, or among sizes those of the skill."""
     return declared.sizes if isinstance(declared, SkillDecl) and in_sizes(written) else declared.parameters
 

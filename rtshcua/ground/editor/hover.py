@@ -24,8 +24,8 @@ from rtshcua.model.faults import parameters
 from rtshcua.model.ir.expression import Coordinates, Quantity, Reference
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import Parameter, SkillDecl
-from rtshcua.model.quantity import UNITS, Dimension, Unit, display
+from rtshcua.model.ir.skills import ParameterDecl, SkillDecl
+from rtshcua.model.quantity import UNITS, Dimension, UnitOfMeasure, display
 
 _DIGITS = 6  # behind the point, where a unit gives no whole number
 
@@ -41,7 +41,7 @@ def quantity_in_units(node: Quantity) -> str:
     return f"{kind}{datum}, kept as {node.value} {CANONICAL[dimension]}\n\n" + " = ".join(others)
 
 
-def converted(value: int, unit: Unit) -> str:
+def converted(value: int, unit: UnitOfMeasure) -> str:
     """A canonical number in a unit, rounded where it has no end."""
     scaled, rest = divmod(abs(value) * unit.denominator * 10**_DIGITS, unit.numerator)
     about = "≈ " if rest else ""
@@ -176,7 +176,7 @@ def _explained(name: str, meaning: str | None) -> str:
     return name if meaning is None else f"{name}: {meaning}"
 
 
-def parameter_of(view: ProgramView, owner: str, name: str) -> Parameter | None:
+def parameter_of(view: ProgramView, owner: str, name: str) -> ParameterDecl | None:
     """A parameter by its owner's name and its own."""
     symbols = view.symbols
     declared = symbols.skills.get(owner) or symbols.templates.get(owner) or symbols.missions.get(owner)
@@ -246,7 +246,7 @@ def _skill(view: ProgramView, skill: SkillDecl) -> Iterator[str]:
         yield "fallback " + ", ".join(f"`{view.slice(link.span)}`" for link in skill.fallback)
 
 
-def _parameter(view: ProgramView, parameter: Parameter, owner: str) -> str:
+def _parameter(view: ProgramView, parameter: ParameterDecl, owner: str) -> str:
     source = " ".join(view.slice(parameter.span).split())
     parts = [f"```rts\n{source}\n```", f"parameter of `{owner}`"]
     if parameter.choices:

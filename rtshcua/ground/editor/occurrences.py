@@ -15,12 +15,31 @@ from rtshcua.model.ir.expression import Comparison, OneOf, Reference
 from rtshcua.model.ir.missions import Item, MissionDecl, Overrides, Step
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import ENTRY, VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import Delegation, PolicyDecl, RoleDecl, Rule, TemplateDecl, Use
+from rtshcua.model.ir.policies import Delegation, PolicyDecl, RoleDecl, RuleDecl, TemplateDecl, Use
 from rtshcua.model.ir.program import Import, Unit
-from rtshcua.model.ir.scenarios import AfterStep, Decides, FaultCall, Flies, Keeps, Lands, OnCondition, ScenarioDecl
+from rtshcua.model.ir.scenarios import (
+    AfterStepDecl,
+    DecidesDecl,
+    FaultCall,
+    FliesDecl,
+    Keeps,
+    Lands,
+    OnConditionDecl,
+    ScenarioDecl,
+)
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter, SizesDecl, SkillDecl
-from rtshcua.model.ir.tests import Asker, Assignment, Expectation, InPhase, Named, NominalDecl, Request, Table, TestDecl
+from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, ParameterDecl, SizesDecl, SkillDecl
+from rtshcua.model.ir.tests import (
+    Asker,
+    Assignment,
+    CaseTable,
+    Expectation,
+    InPhase,
+    Named,
+    NominalDecl,
+    RequestDecl,
+    TestDecl,
+)
 
 
 class NameKind(Enum):
@@ -140,7 +159,7 @@ class _OccurrenceFinder:
                     yield Occurrence(each.name.span, NameTarget(NameKind.PARAMETER, each.name.text, owner.name.text))
             yield from self.argument(each.value, parameter, "" if owner is None else owner.name.text, scope)
 
-    def argument(self, value: Node, parameter: Parameter | None, owner: str, scope: Scope) -> Iterator[Occurrence]:
+    def argument(self, value: Node, parameter: ParameterDecl | None, owner: str, scope: Scope) -> Iterator[Occurrence]:
         """A value for a parameter, which may be a choice or a role."""
         if isinstance(value, Reference) and parameter is not None and value.name not in scope:
             if any(choice.text == value.name for choice in parameter.choices):
@@ -171,18 +190,18 @@ class _OccurrenceFinder:
         faults = [each for each in node.start if isinstance(each, FaultCall)]
         for incident in node.incidents:
             match incident.moment:
-                case AfterStep(skill=skill):
+                case AfterStepDecl(skill=skill):
                     yield from self.names((skill,), NameKind.DECLARED)
-                case OnCondition(condition=condition):
+                case OnConditionDecl(condition=condition):
                     yield from self.within(condition, {})
             faults.append(incident.fault)
         for fault in faults:
             yield from self._fault(fault)
         for demand in node.demands:
             match demand:
-                case Decides():
+                case DecidesDecl():
                     yield from self._case(demand.decision, {})
-                case Flies(skill=name) | Lands(zone=name):
+                case FliesDecl(skill=name) | Lands(zone=name):
                     yield from self.names((name,), NameKind.DECLARED)
                 case Keeps(place=name) if name.text != OBSTACLE:
                     yield from self.names((name,), NameKind.DECLARED)
@@ -205,9 +224,9 @@ class _OccurrenceFinder:
                 if node.cell.value is not None:
                     subject = Reference(span=name.span, name=name.text)
                     yield from self._compared(node.cell.value, subject, {})
-            case Table():
+            case CaseTable():
                 yield from self._table(node, scope)
-            case Request():
+            case RequestDecl():
                 yield from self.names((node.skill,), NameKind.DECLARED)
                 yield from self.arguments(node.arguments, self.symbols.skills.get(node.skill.text), {})
                 yield from self._case(node.asker, scope)
@@ -230,7 +249,7 @@ class _OccurrenceFinder:
                 for each in node:
                     yield from self._case(each, scope)
 
-    def _table(self, table: Table, scope: Scope) -> Iterator[Occurrence]:
+    def _table(self, table: CaseTable, scope: Scope) -> Iterator[Occurrence]:
         columns: list[Reference | None] = []
         for column in table.columns:
             if isinstance(column, Named):
@@ -371,7 +390,7 @@ class _OccurrenceFinder:
         for link in policy.contingency:
             yield from self._link(link, {})
 
-    def _rule(self, rule: Rule, own: Scope | None) -> Iterator[Occurrence]:
+    def _rule(self, rule: RuleDecl, own: Scope | None) -> Iterator[Occurrence]:
         """A rule; `own` are the parameters of the template that it stands in."""
         yield from self.names(rule.skills, NameKind.DECLARED)
         for role in (*rule.roles, *(each for each in (rule.approver, rule.another) if each is not None)):
@@ -428,7 +447,7 @@ class _OccurrenceFinder:
                 yield from self._item(each, scope)
 
     def _declared(
-        self, parameters: Sequence[Parameter], owner: str, sizes: Scope | None = None
+        self, parameters: Sequence[ParameterDecl], owner: str, sizes: Scope | None = None
     ) -> Iterator[Occurrence]:
         """Parameters; the `sizes` of their skill may be the ends of their ranges, and their defaults."""
         for parameter in parameters:
@@ -456,7 +475,7 @@ class _OccurrenceFinder:
         return found
 
     @staticmethod
-    def _parameters(parameters: Sequence[Parameter], owner: str) -> dict[str, tuple[NameTarget, ...]]:
+    def _parameters(parameters: Sequence[ParameterDecl], owner: str) -> dict[str, tuple[NameTarget, ...]]:
         return {each.name.text: (NameTarget(NameKind.PARAMETER, each.name.text, owner),) for each in parameters}
 
 

@@ -28,7 +28,7 @@ from rtshcua.ground.testing.case_result import run_case
 from rtshcua.ground.testing.clause_quotes import REST
 from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.policy import Rule
-from rtshcua.model.ir.scenarios import Decides
+from rtshcua.model.ir.scenarios import DecidesDecl
 from rtshcua.model.ir.signals import SignalDecl
 from rtshcua.model.ir.tests import Expectation, Quoted, TestDecl
 
@@ -159,7 +159,7 @@ def scenario_quotation(view: ProgramView, name: str) -> Span | None:
     """A quotation with `name` in it in a scenario, of which no case tells what it quotes; None if none."""
     for scenario in view.symbols.scenarios:
         for demand in scenario.demands:
-            clause = demand.decision.clause if isinstance(demand, Decides) else None
+            clause = demand.decision.clause if isinstance(demand, DecidesDecl) else None
             if clause is not None and _word(name).search(clause.text):
                 return clause.span
     return None

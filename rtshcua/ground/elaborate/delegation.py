@@ -16,7 +16,7 @@ from rtshcua.ground.checker.report import Report
 from rtshcua.model.flat.limits import MAX_ROLES, MAX_RULES
 from rtshcua.model.ir.expression import Condition, Junction
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule
+from rtshcua.model.ir.policies import Delegation, PolicyDecl, RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 
 #: who speaks for a role where a permit does not say
@@ -25,7 +25,7 @@ OWN_SOURCE = "operator"
 MOST_DELEGATIONS = 4_096
 
 
-def delegated(context: Context, policy: PolicyDecl, rules: Sequence[Rule], *, whole: bool) -> tuple[Rule, ...]:
+def delegated(context: Context, policy: PolicyDecl, rules: Sequence[RuleDecl], *, whole: bool) -> tuple[RuleDecl, ...]:
     """The rules of a policy with those that its delegations make of them; `whole` where no rule is missing."""
     found = list(rules)
     if _too_many(context.report, policy.delegations):
@@ -105,7 +105,7 @@ def _report_circle(report: Report, circle: Sequence[Delegation]) -> None:
     )
 
 
-def _made(context: Context, delegation: Delegation, rules: Sequence[Rule], *, whole: bool) -> list[Rule]:
+def _made(context: Context, delegation: Delegation, rules: Sequence[RuleDecl], *, whole: bool) -> list[RuleDecl]:
     """The rules that one delegation makes of those before it."""
     known = [find_skill(context, name) for name in delegation.skills]
     sources = [one_of(context, codes.UNKNOWN_SOURCE, name, SOURCES, "source") for name in delegation.through]
@@ -126,14 +126,14 @@ def _readable(context: Context, delegation: Delegation, skills: Sequence[SkillDe
     """Whether the condition reads what all the delegated skills have."""
     if delegation.when is None:
         return True
-    as_rule = Rule(
+    as_rule = RuleDecl(
         span=delegation.span, kind="permit", skills=delegation.skills, roles=(delegation.grantee,), through=(),
         when=delegation.when, approver=None, another=None, within=None, target=None,
     )  # fmt: skip
     return shared_arguments(context, as_rule, skills) is not None
 
 
-def _permit(delegation: Delegation, permit: Rule) -> Rule | None:
+def _permit(delegation: Delegation, permit: RuleDecl) -> RuleDecl | None:
     """What a permit of the grantor is to the grantee; None where that is nothing."""
     skills = _shared(delegation, permit)
     through = _through(delegation, permit)
@@ -143,18 +143,18 @@ def _permit(delegation: Delegation, permit: Rule) -> Rule | None:
     return _for_grantee(delegation, permit).copied(**changes)
 
 
-def _forbid(delegation: Delegation, forbid: Rule) -> Rule | None:
+def _forbid(delegation: Delegation, forbid: RuleDecl) -> RuleDecl | None:
     skills = _shared(delegation, forbid)
     if skills is None or _names(forbid.roles, delegation.grantee.text):
         return None
     return _for_grantee(delegation, forbid).copied(skills=skills)
 
 
-def _for_grantee(delegation: Delegation, rule: Rule) -> Rule:
+def _for_grantee(delegation: Delegation, rule: RuleDecl) -> RuleDecl:
     return rule.copied(roles=(delegation.grantee,), origin=(delegation, *rule.origin))
 
 
-def _shared(delegation: Delegation, rule: Rule) -> tuple[Name, ...] | None:
+def _shared(delegation: Delegation, rule: RuleDecl) -> tuple[Name, ...] | None:
     """The skills of a rule that are delegated, empty for any; None where there are none."""
     if not delegation.skills:
         return rule.skills
@@ -163,7 +163,7 @@ def _shared(delegation: Delegation, rule: Rule) -> tuple[Name, ...] | None:
     return tuple(name for name in rule.skills if _names(delegation.skills, name.text)) or None
 
 
-def _through(delegation: Delegation, permit: Rule) -> tuple[Name, ...] | None:
+def _through(delegation: Delegation, permit: RuleDecl) -> tuple[Name, ...] | None:
     """The sources through which both speak; None where there are none."""
     if not delegation.through:
         return permit.through
@@ -181,7 +181,7 @@ def _names(names: Iterable[Name], text: str) -> bool:
     return any(name.text == text for name in names)
 
 
-def _nothing(context: Context, delegation: Delegation, permits: Sequence[Rule], made: Sequence[Rule]) -> None:
+def _nothing(context: Context, delegation: Delegation, permits: Sequence[RuleDecl], made: Sequence[RuleDecl]) -> None:
     """Report every delegated skill that the grantor is not permitted. What anybody may needs no delegation."""
     if not delegation.skills and not made:
         _report_nothing(context, delegation, delegation.grantor, "anything of its own", permits)
@@ -193,7 +193,7 @@ def _nothing(context: Context, delegation: Delegation, permits: Sequence[Rule], 
             _report_nothing(context, delegation, name, f"`{name.text}`", about)
 
 
-def _report_nothing(context: Context, delegation: Delegation, at: Name, what: str, about: Sequence[Rule]) -> None:
+def _report_nothing(context: Context, delegation: Delegation, at: Name, what: str, about: Sequence[RuleDecl]) -> None:
     named = [rule for rule in about if rule.roles]
     through = " or ".join(f"`{name.text}`" for name in delegation.through)
     context.report.add(

@@ -13,7 +13,7 @@ from rtshcua.ground.elaborate.parameters import ParameterSettings, ambiguous, as
 from rtshcua.ground.elaborate.templates import sample, used
 from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_RULES
 from rtshcua.model.ir.missions import Item, MissionDecl, Repeat, Step
-from rtshcua.model.ir.policies import PolicyDecl, Rule
+from rtshcua.model.ir.policies import PolicyDecl, RuleDecl
 from rtshcua.model.ir.program import Unit
 
 
@@ -83,7 +83,7 @@ class ElaboratedProgram(NamedTuple):
 
     units: tuple[Unit, ...]
     instances: dict[str, tuple[Instance, ...]]
-    samples: tuple[Rule, ...]
+    samples: tuple[RuleDecl, ...]
 
 
 def elaborate(
@@ -124,7 +124,7 @@ def _policy(context: Context, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
         return policy.copied(rules=_fitting(context, policy, policy.rules), uses=(), delegations=())
     if not policy.uses and not policy.delegations:
         return policy
-    parts: list[tuple[int, tuple[Rule, ...]]] = [(rule.span.start, (rule,)) for rule in policy.rules]
+    parts: list[tuple[int, tuple[RuleDecl, ...]]] = [(rule.span.start, (rule,)) for rule in policy.rules]
     whole, many = True, len(policy.rules)
     for use in policy.uses:
         rules = used(context, use)
@@ -142,7 +142,7 @@ def _policy(context: Context, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
     return policy.copied(rules=delegated(context, policy, plain, whole=whole))
 
 
-def _fitting(context: Context, policy: PolicyDecl, rules: tuple[Rule, ...]) -> tuple[Rule, ...]:
+def _fitting(context: Context, policy: PolicyDecl, rules: tuple[RuleDecl, ...]) -> tuple[RuleDecl, ...]:
     """As many rules as are looked at; that there are more is reported."""
     context.report.add(
         codes.TOO_MANY,

@@ -14,8 +14,8 @@ from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.elaborate.parameters import bound_value, value_of
 from rtshcua.model.ir.expression import Reference, Value
 from rtshcua.model.ir.node import Node
-from rtshcua.model.ir.policies import Rule, TemplateDecl, Use
-from rtshcua.model.ir.skills import Parameter
+from rtshcua.model.ir.policies import RuleDecl, TemplateDecl, Use
+from rtshcua.model.ir.skills import ParameterDecl
 
 #: the role that stands for any, where a template is checked that nothing uses
 ANY_ROLE = "operator"
@@ -28,14 +28,14 @@ class TemplateBinding(NamedTuple):
     roles: dict[str, str]
 
 
-def used(context: Context, use: Use) -> tuple[Rule, ...] | None:
+def used(context: Context, use: Use) -> tuple[RuleDecl, ...] | None:
     """The rules that a `use` stands for; None after a finding."""
     template = find_template(context, use.template)
     given = None if template is None else _bound(context, template, use)
     return None if template is None or given is None else tuple(_rules(template, given, (use,)))
 
 
-def sample(context: Context, template: TemplateDecl) -> tuple[Rule, ...]:
+def sample(context: Context, template: TemplateDecl) -> tuple[RuleDecl, ...]:
     """The rules of a template that nothing uses, with values that its parameters may have: its names and types are
     checked with them. Without those that read a parameter which may have none.
     """
@@ -93,7 +93,7 @@ def _bound(context: Context, template: TemplateDecl, use: Use) -> TemplateBindin
     return given if good else None
 
 
-def _role(context: Context, parameter: Parameter, written: Value) -> str | None:
+def _role(context: Context, parameter: ParameterDecl, written: Value) -> str | None:
     kind = "no name"
     if isinstance(written, Reference) and "." not in written.name:
         declared = context.symbols.kind_of(written.name)
@@ -110,7 +110,7 @@ def _role(context: Context, parameter: Parameter, written: Value) -> str | None:
     return None
 
 
-def _rules(template: TemplateDecl, given: TemplateBinding, origin: tuple[Node, ...]) -> Iterator[Rule]:
+def _rules(template: TemplateDecl, given: TemplateBinding, origin: tuple[Node, ...]) -> Iterator[RuleDecl]:
     for rule in template.rules:
         put = substitute_roles(substitute(rule, given.values), given.roles)
         yield put.copied(origin=origin)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.build.actions import ACTIONS
 from rtshcua.ground.language.build.reader import Action, Reader
-from rtshcua.ground.language.table import END, Rule, Table, table
+from rtshcua.ground.language.table import END, ParserTable, Production, table
 
 #: from the stack of values, where the rule's own begin in it, and the offsets at which its text starts and ends
 Make = Callable[[list[Any], int, int, int], object]
@@ -30,7 +30,7 @@ class Reduction(NamedTuple):
     make: Make
 
 
-def reduction(rule: Rule, reader: Reader) -> Reduction:
+def reduction(rule: Production, reader: Reader) -> Reduction:
     """The reduction of `rule`, by its action or, if it has none, by what it keeps."""
     if rule.action:
         make = _call(rule.kept, reader, ACTIONS[rule.action])
@@ -45,7 +45,7 @@ def reduction(rule: Rule, reader: Reader) -> Reduction:
 class Reductions(dict[int, Reduction]):
     """The reductions by the rule's number, each made when it is first needed: a short text has need of few."""
 
-    def __init__(self, rules: Sequence[Rule], reader: Reader) -> None:
+    def __init__(self, rules: Sequence[Production], reader: Reader) -> None:
         super().__init__()
         self._rules, self._reader = rules, reader
 
@@ -109,7 +109,7 @@ class Automaton:
     """
 
     reader: Reader
-    table: Table = field(default_factory=table)
+    table: ParserTable = field(default_factory=table)
     states: list[int] = field(default_factory=lambda: [0])
     values: list[Any] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)

@@ -10,11 +10,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
-from rtshcua.model.quantity import UNITS, Dimension, Unit
+from rtshcua.model.quantity import UNITS, Dimension, UnitOfMeasure
 
 LIMIT = 2**63 - 1
 
-PLAIN = Unit(Dimension.COUNT, 1)
+PLAIN = UnitOfMeasure(Dimension.COUNT, 1)
 DEGREE = UNITS["deg"]
 
 #: What canonical units are called in the plural; a count has none.

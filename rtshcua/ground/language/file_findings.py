@@ -5,7 +5,7 @@ from errno import ENXIO
 
 from rtshcua.diagnostics.codes import IMPORT_PATH, NO_SUCH_FILE, NOT_A_SOURCE, NOT_TEXT, TOO_LARGE
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
-from rtshcua.diagnostics.kinds import Kind, foreign
+from rtshcua.diagnostics.kinds import FileKind, foreign
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.paths import LIBRARY, is_direct, pack_of
 from rtshcua.ground.language.size_limits import MAX_FILES as MAX_FILES
@@ -107,7 +107,7 @@ def too_many_files(by: Import) -> Diagnostic:
     return Diagnostic(TOO_LARGE, message, by.span, "import only what is used")
 
 
-def not_a_source(file: str, kind: Kind) -> Diagnostic:
+def not_a_source(file: str, kind: FileKind) -> Diagnostic:
     """A file of another kind."""
     return Diagnostic(NOT_A_SOURCE, f"this is {kind.name}, and no source", Span(file, 0, 0), kind.help or _SOURCES)
 

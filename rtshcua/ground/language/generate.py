@@ -31,7 +31,7 @@ def lark(grammar: str) -> Lark:
 
 
 def generate(grammar: str) -> str:
-    """The table as JSON text, ending in a newline; `rtshcua.ground.language.table.Table` says what is in it."""
+    """The table as JSON text, ending in a newline; `rtshcua.ground.language.table.ParserTable` says what is in it."""
     made = lark(grammar)
     fixed = {t.name: t.pattern.value for t in made.terminals if isinstance(t.pattern, PatternStr)}
     ignored = [t for t in made.terminals if t.name in made.ignore_tokens]

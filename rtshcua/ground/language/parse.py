@@ -8,7 +8,7 @@ from typing import TypeVar
 from rtshcua.diagnostics.codes import HIDDEN_CHARACTER, NOT_TEXT, TOO_MANY_FINDINGS
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import hiding, visible
-from rtshcua.diagnostics.kinds import LOOKED_AT, Kind, foreign
+from rtshcua.diagnostics.kinds import LOOKED_AT, FileKind, foreign
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.language.automaton import Automaton
 from rtshcua.ground.language.build.reader import MAX_FINDINGS, Enough, Reader
@@ -97,7 +97,7 @@ def refused(source: Source) -> Diagnostic | None:
     return None
 
 
-def _foreign(source: Source) -> Kind | None:
+def _foreign(source: Source) -> FileKind | None:
     """The kind of a text that is no source; one that begins with a letter, as sources do, is seldom looked at."""
     text = source.text
     if text[:1].isalpha() and not text.startswith(_FOREIGN):

@@ -18,7 +18,7 @@ MAX_SKIPPED = 1000  # comments and runs of blanks that one match takes
 Row = dict[str, int]
 
 
-class Rule(NamedTuple):
+class Production(NamedTuple):
     """A production: pop `length` values and hand those at `kept` to `action`; the result is an `origin`.
 
     `kept` lists positions; None is an optional part that is absent, and the complement `~n` is a list that is handed on
@@ -77,7 +77,7 @@ class Lexers(dict[int, Lexer]):
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ParserTable:
     """One row a state: from a symbol to the next state (0 or more) or to the rule `~n` to reduce by (negative).
 
     A symbol is a word or mark as it is written (`deadline`, `{`), a kind of token (`<NAME>`), or a rule (`<skill>`).
@@ -86,7 +86,7 @@ class Table:
     """
 
     rows: tuple[Row, ...]
-    rules: tuple[Rule, ...]
+    rules: tuple[Production, ...]
     lexers: Lexers
     end: int
     words: dict[str, bool]
@@ -100,12 +100,12 @@ class Table:
 
 
 @cache
-def table() -> Table:
+def table() -> ParserTable:
     """The committed table. Read once in a process, in a few milliseconds."""
     raw = json.loads(PATH.read_text(encoding="utf-8"))
-    return Table(
+    return ParserTable(
         rows=tuple(raw["states"]),
-        rules=tuple(Rule(origin, action, length, tuple(kept)) for origin, action, length, kept in raw["rules"]),
+        rules=tuple(Production(origin, action, length, tuple(kept)) for origin, action, length, kept in raw["rules"]),
         lexers=Lexers(raw),
         end=raw["end"],
         words=raw["words"],

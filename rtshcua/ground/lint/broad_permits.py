@@ -18,8 +18,8 @@ from rtshcua.ground.lint.lint_input import LintInput, rules_of
 from rtshcua.ground.lint.restrictions import VacuousRules, is_unbounded
 from rtshcua.ground.lint.unused import mentions
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule
-from rtshcua.model.ir.skills import Motion, Parameter, SkillDecl
+from rtshcua.model.ir.policies import Delegation, PolicyDecl, RuleDecl
+from rtshcua.model.ir.skills import MotionDecl, ParameterDecl, SkillDecl
 
 _MOVING_MOTIONS = ("climb", "fly", "cover")
 #: who may ask for a tactical skill besides a person
@@ -45,11 +45,13 @@ def _chain_links(subject: LintInput) -> Iterator[str]:
     chains += [policy.contingency for policy in subject.symbols.policies.values()]
     yield from (link.skill.text for chain in chains for link in chain)
     yield from (
-        rule.target.skill.text for rule in subject.rules() if isinstance(rule, Rule) and rule.target is not None
+        rule.target.skill.text for rule in subject.rules() if isinstance(rule, RuleDecl) and rule.target is not None
     )
 
 
-def _of_permit(subject: LintInput, rule: Rule, links: frozenset[str], vacuous: VacuousRules) -> Iterator[Diagnostic]:
+def _of_permit(
+    subject: LintInput, rule: RuleDecl, links: frozenset[str], vacuous: VacuousRules
+) -> Iterator[Diagnostic]:
     if not rule.skills:
         yield Diagnostic(
             codes.BROAD_AUTHORITY,
@@ -67,7 +69,7 @@ def _of_permit(subject: LintInput, rule: Rule, links: frozenset[str], vacuous: V
                 yield _broad_permit(rule, name, motion)
 
 
-def _broad_permit(rule: Rule, name: Name, motion: Motion) -> Diagnostic:
+def _broad_permit(rule: RuleDecl, name: Name, motion: MotionDecl) -> Diagnostic:
     to, help = "everyone", "name the roles, as in `by role operator`, or add a condition with `when`"
     labels = [Label(motion.span, "it moves the vehicle")]
     if rule.roles:
@@ -123,7 +125,7 @@ def _in_policy(subject: LintInput, policy: PolicyDecl, vacuous: VacuousRules) ->
                 yield _unbounded_place(policy, permit, name, place)
 
 
-def _bounds_place(rule: Rule, permit: Rule, skill: SkillDecl) -> bool:
+def _bounds_place(rule: RuleDecl, permit: RuleDecl, skill: SkillDecl) -> bool:
     """Whether a rule narrows the places to which a permit lets a skill fly; another permit does not."""
     names = [name.text for name in rule.skills]
     if rule is not permit and (rule.kind == "permit" or (names and skill.name.text not in names)):
@@ -132,14 +134,14 @@ def _bounds_place(rule: Rule, permit: Rule, skill: SkillDecl) -> bool:
     return bool(mentions(rule.when) - heights)
 
 
-def _place_parameter(skill: SkillDecl) -> Parameter | None:
+def _place_parameter(skill: SkillDecl) -> ParameterDecl | None:
     """The argument by which a skill is told where to fly."""
     if skill.motion is None or skill.motion.kind not in _FLYING_KINDS:
         return None
     return next((each for each in skill.parameters if each.type.text in ("zone", "position")), None)
 
 
-def _unbounded_place(policy: PolicyDecl, rule: Rule, name: Name, place: Parameter) -> Diagnostic:
+def _unbounded_place(policy: PolicyDecl, rule: RuleDecl, name: Name, place: ParameterDecl) -> Diagnostic:
     labels = [Label(place.name.span, f"`{place.name.text}` says where")]
     if rule.when is not None:
         labels.append(Label(rule.when.span, "this bounds how high it flies, not where"))

@@ -8,7 +8,7 @@ from rtshcua.ground.checker.symbols import Symbols, collect
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.closure import Imports
 from rtshcua.ground.prove.proof_context import ProofContext
-from rtshcua.model.ir.policies import Delegation, PolicyDecl, Rule, TemplateDecl
+from rtshcua.model.ir.policies import Delegation, PolicyDecl, RuleDecl, TemplateDecl
 from rtshcua.model.ir.program import Unit
 
 
@@ -37,19 +37,19 @@ class LintInput:
         asked = {unit.file for unit in self.asked}
         return (ground for ground in self.grounds if ground.lowered.declaration.span.file in asked)
 
-    def rules(self) -> tuple[Rule | Delegation, ...]:
+    def rules(self) -> tuple[RuleDecl | Delegation, ...]:
         """Every rule and delegation of the program, those of templates once, as they are written."""
         policies = tuple(self.symbols.policies.values())
         owners: list[PolicyDecl | TemplateDecl] = [*policies, *self.symbols.templates.values()]
-        found: list[Rule | Delegation] = [rule for owner in owners for rule in owner.rules]
+        found: list[RuleDecl | Delegation] = [rule for owner in owners for rule in owner.rules]
         return (*found, *(each for policy in policies for each in policy.delegations))
 
     def permits_any(self) -> bool:
         """Whether a rule permits every skill that there is."""
-        return any(isinstance(rule, Rule) and rule.kind == "permit" and not rule.skills for rule in self.rules())
+        return any(isinstance(rule, RuleDecl) and rule.kind == "permit" and not rule.skills for rule in self.rules())
 
 
-def rules_of(unit: Unit) -> list[Rule]:
+def rules_of(unit: Unit) -> list[RuleDecl]:
     """The rules of a file's policies and templates."""
     owners: list[PolicyDecl | TemplateDecl] = [*unit.policies, *unit.templates]
     return [rule for owner in owners for rule in owner.rules]

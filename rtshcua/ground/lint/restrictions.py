@@ -29,7 +29,7 @@ from rtshcua.model.flat.limits import DAY, MAX_VALUE
 from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle
 from rtshcua.model.flat.signal import NUMBER
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
-from rtshcua.model.ir.policies import Delegation, Rule
+from rtshcua.model.ir.policies import Delegation, RuleDecl
 
 _SECOND = 1_000_000
 #: the local plane is true to 1 part in 1,000 within 5 km; a per cent is more than it errs by within what flies
@@ -123,7 +123,7 @@ class ConditionEffects:
             return not isinstance(self.rules.ask([(number, TRUE)], skill), No)
         return not self._never([(number, TRUE | UNKNOWN)], skill)
 
-    def is_vacuous(self, rule: Rule, skill: str) -> bool | None:
+    def is_vacuous(self, rule: RuleDecl, skill: str) -> bool | None:
         """Whether the condition of a rule as it is written makes no difference to a skill; None where the policy has no
         such rule. A permit's never fails, that of any other rule is never met.
         """
@@ -205,7 +205,7 @@ class VacuousRules:
     def __init__(self, grounds: Sequence[ProofContext]) -> None:
         self._every = [ConditionEffects(ground) for ground in grounds]
 
-    def __call__(self, rule: Rule, skill: str) -> bool:
+    def __call__(self, rule: RuleDecl, skill: str) -> bool:
         """Whether the condition of a rule makes no difference to a skill; False where it cannot be told."""
         answers = (each.is_vacuous(rule, skill) for each in self._every)
         told = [answer for answer in answers if answer is not None]

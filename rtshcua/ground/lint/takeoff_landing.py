@@ -29,7 +29,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind
 from rtshcua.model.flat.signal import Signal
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.policies import RuleDecl
 
 #: messages that both autopilots fill only in the air
 _AIRBORNE_MESSAGES = frozenset({"WIND_COV", "WIND"})
@@ -144,7 +144,7 @@ def _lands(subject: LintInput, name: str) -> bool:
     return skill is not None and skill.motion is not None and skill.motion.kind == _LAND
 
 
-def _skills_kept_up(subject: LintInput, rule: Rule, target: str) -> Iterator[Diagnostic]:
+def _skills_kept_up(subject: LintInput, rule: RuleDecl, target: str) -> Iterator[Diagnostic]:
     landing = [name for name in subject.symbols.skills if _lands(subject, name)]
     if not rule.skills and landing:
         help = "name the skills that you mean, and leave out those that land"
@@ -157,7 +157,7 @@ def _skills_kept_up(subject: LintInput, rule: Rule, target: str) -> Iterator[Dia
 
 
 def _kept_from_landing(
-    subject: LintInput, rule: Rule, target: str, landing: str, help: str, name: Name | None = None
+    subject: LintInput, rule: RuleDecl, target: str, landing: str, help: str, name: Name | None = None
 ) -> Diagnostic:
     motion = subject.symbols.skills[landing].motion
     assert motion is not None

@@ -29,7 +29,7 @@ from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.ir.program import Import, Unit
-from rtshcua.model.ir.skills import Parameter, SkillDecl
+from rtshcua.model.ir.skills import ParameterDecl, SkillDecl
 from rtshcua.model.ir.tests import Named
 
 
@@ -75,7 +75,7 @@ def _mentioned(node: Any, found: set[str]) -> None:
 @cache
 def _fields(kind: type[Node]) -> tuple[str, ...]:
     """The fields of a node that may mention something."""
-    given = ("span", "name", "type") if issubclass(kind, Parameter) else ("span", "name")
+    given = ("span", "name", "type") if issubclass(kind, ParameterDecl) else ("span", "name")
     return tuple(field for field in kind.__struct_fields__ if field not in given)
 
 
@@ -138,7 +138,7 @@ def _unread_parameters(owner: Parametric, read: frozenset[str]) -> Iterator[Diag
             yield _unread_parameter(owner, parameter)
 
 
-def _unread_parameter(owner: Parametric, parameter: Parameter) -> Diagnostic:
+def _unread_parameter(owner: Parametric, parameter: ParameterDecl) -> Diagnostic:
     by = "neither the skill nor a rule reads" if isinstance(owner, SkillDecl) else "nothing in it reads"
     return Diagnostic(
         codes.UNUSED,

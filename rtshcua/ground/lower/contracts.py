@@ -26,7 +26,7 @@ from rtshcua.model.flat.policy import LeftOut, Vehicle
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ZoneDecl
-from rtshcua.model.ir.skills import Clause as ClauseDecl
+from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
 #: how long a clause may be unknown where a skill does not say

@@ -30,7 +30,7 @@ from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.ir.missions import MissionDecl, Overrides, Phase, Step
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import ZoneDecl
-from rtshcua.model.ir.skills import Clause as ClauseDecl
+from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
 from rtshcua.model.ir.skills import SkillDecl
 
 

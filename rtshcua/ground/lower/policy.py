@@ -40,7 +40,7 @@ from rtshcua.model.ir.expression import Condition, Junction
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import GeoJson, VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import Delegation, PolicyDecl
-from rtshcua.model.ir.policies import Rule as RuleDecl
+from rtshcua.model.ir.policies import RuleDecl as RuleDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
 #: whoever flies the vehicle; a rule `by any` is about this role too, where no rule names it

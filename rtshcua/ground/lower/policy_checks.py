@@ -27,8 +27,8 @@ from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.expression import Comparison, Condition, Reference, TimeOfDay, Within
 from rtshcua.model.ir.places import ENTRY, VehicleDecl, ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl, Rule
-from rtshcua.model.ir.skills import Clause, LinkDecl, SkillDecl
+from rtshcua.model.ir.policies import PolicyDecl, RuleDecl
+from rtshcua.model.ir.skills import ClauseDecl, LinkDecl, SkillDecl
 
 
 def is_self_contained(
@@ -125,12 +125,12 @@ def unfitted_signals(condition: Condition, without: frozenset[str]) -> dict[str,
     return found
 
 
-def applies(clause: Clause, without: frozenset[str]) -> bool:
+def applies(clause: ClauseDecl, without: frozenset[str]) -> bool:
     """Whether a clause counts for a vehicle that is without these signals."""
     return not (clause.where_fitted and unfitted_signals(clause.condition, without))
 
 
-def rule_applies(rule: Rule, without: frozenset[str]) -> bool:
+def rule_applies(rule: RuleDecl, without: frozenset[str]) -> bool:
     """Whether a rule counts for a vehicle that is without these signals."""
     return not (rule.where_fitted and rule.when is not None and unfitted_signals(rule.when, without))
 
@@ -159,7 +159,7 @@ def check_fitted(
             _clock(context, vehicle, [zone.daily.span], f"`{zone.name.text}` is active at times of the local day")
 
 
-def check_step_fitted(context: Context, vehicle: VehicleDecl, own: Sequence[Clause]) -> bool:
+def check_step_fitted(context: Context, vehicle: VehicleDecl, own: Sequence[ClauseDecl]) -> bool:
     """Whether a step's own clauses read only sensors that the vehicle has; reports what else they read."""
     for clause in own:
         _clock(context, vehicle, _timed(clause.condition))

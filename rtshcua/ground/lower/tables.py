@@ -17,7 +17,7 @@ from rtshcua.model.flat.limits import MAX_TEXT
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.signal import CELL, ENUMERATION, NUMBER, POSITION, Signal, SignalSource
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.signals import SignalSource as SourceDecl
+from rtshcua.model.ir.signals import SourceDecl as SourceDecl
 from rtshcua.model.quantity import Dimension
 
 

@@ -28,7 +28,7 @@ from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.policy import Rule, RuleKind
 from rtshcua.model.flat.zone import Zone
-from rtshcua.model.ir.policies import Rule as RuleDecl
+from rtshcua.model.ir.policies import RuleDecl as RuleDecl
 
 #: the code of a condition; empty where a rule has none
 Code: TypeAlias = tuple[int, ...]

@@ -65,7 +65,7 @@ from rtshcua.model.flat.policy import AfterSilence, Policy
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, project, unproject
 from rtshcua.model.ir.expression import Grow, Quantity
 from rtshcua.model.ir.places import Combination, GeoJson, Shape, ZoneDecl
-from rtshcua.model.ir.skills import Clause, SkillDecl
+from rtshcua.model.ir.skills import ClauseDecl, SkillDecl
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
@@ -290,7 +290,7 @@ def _skill(subject: ReportedPolicy, skill: SkillDecl, changed: bool) -> SkillVie
     without = frozenset(subject.policy.vehicle.without)
     parts = (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
 
-    def clauses(some: tuple[Clause, ...]) -> tuple[str, ...]:
+    def clauses(some: tuple[ClauseDecl, ...]) -> tuple[str, ...]:
         return tuple(describe_clause(each, names) for each in some if applies(each, without))
 
     return SkillView(

@@ -20,7 +20,7 @@ from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Contract, Paramet
 from rtshcua.model.flat.policy import Rule as FlatRule
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.expression import Condition, Reference
-from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.policies import RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension, display
 
@@ -59,7 +59,7 @@ def _right(subject: ReportedPolicy, role: str, skill: str) -> Right:
     return Right(skill, answer, tuple(ways), tuple(confirmations), tuple(prohibitions))
 
 
-def _answer(skill: str, about: list[Rule]) -> str:
+def _answer(skill: str, about: list[RuleDecl]) -> str:
     """In short, for those sources that some permit names and that are not always forbidden; what is forbidden to others
     is no condition. `yes`: through one of them at least nothing is asked besides.
     """
@@ -76,22 +76,22 @@ def _answer(skill: str, about: list[Rule]) -> str:
     return YES if plainly and not confirms else CONDITIONS
 
 
-def _unconditional(rules: Iterable[Rule]) -> list[Rule]:
+def _unconditional(rules: Iterable[RuleDecl]) -> list[RuleDecl]:
     return [rule for rule in rules if rule.when is None]
 
 
-def _sources(rules: Iterable[Rule]) -> frozenset[str]:
+def _sources(rules: Iterable[RuleDecl]) -> frozenset[str]:
     return frozenset(source for rule in rules for source in sources_of(rule))
 
 
-def _about(rule: Rule, role: str, skill: str) -> bool:
+def _about(rule: RuleDecl, role: str, skill: str) -> bool:
     """Whether a rule says something of a skill asked for by a role; a `confirm` is about all roles."""
     if rule.skills and skill not in {name.text for name in rule.skills}:
         return False
     return not rule.roles or role in {name.text for name in rule.roles}
 
 
-def rule_names(subject: ReportedPolicy, rule: Rule) -> Vocabulary:
+def rule_names(subject: ReportedPolicy, rule: RuleDecl) -> Vocabulary:
     """What the names in a rule stand for: it may read those arguments that all of its skills have."""
     own = [name.text for name in rule.skills] or [contract.name for contract in subject.policy.contracts]
     return asked_of(subject, [subject.symbols.skills[name] for name in own])

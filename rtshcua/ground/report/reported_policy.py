@@ -14,7 +14,7 @@ from rtshcua.ground.pipeline.closure import beside
 from rtshcua.ground.report.prose.phrases import Vocabulary
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.node import Node
-from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.policies import RuleDecl
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class ReportedPolicy:
         return Vocabulary(frozenset(self.symbols.signals), frozenset(self.symbols.zones))
 
     @cached_property
-    def rules(self) -> tuple[Rule, ...]:
+    def rules(self) -> tuple[RuleDecl, ...]:
         """The rules by the numbers that they are signed by. One that is written over skills which keep its arguments in
         different places is signed as several, each about its own skills alone.
         """

@@ -35,7 +35,7 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import VehicleDecl, ZoneDecl
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.skills import ArgumentValue, SkillDecl
-from rtshcua.model.ir.tests import Answer, Expectation, Named, Request, Row, Subject, TestDecl
+from rtshcua.model.ir.tests import Answer, Expectation, Named, RequestDecl, Subject, TableRow, TestDecl
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
@@ -54,7 +54,12 @@ class Requests:
         self._made: dict[tuple[object, ...], PreparedInvocation] = {}
 
     def of(
-        self, test: TestDecl, request: Request, start: TestStart, columns: Sequence[ArgumentValue], issued_at_us: int
+        self,
+        test: TestDecl,
+        request: RequestDecl,
+        start: TestStart,
+        columns: Sequence[ArgumentValue],
+        issued_at_us: int,
     ) -> PreparedInvocation | None:
         """A request with the arguments that it says and those of a row; None after a finding."""
         skill = self._context.symbols.skills[request.skill.text]
@@ -90,7 +95,7 @@ class Requests:
             self._made[key] = made
         return self._made[key]
 
-    def _bound(self, skill: SkillDecl, arguments: Sequence[ArgumentValue], request: Request) -> list[Bound] | None:
+    def _bound(self, skill: SkillDecl, arguments: Sequence[ArgumentValue], request: RequestDecl) -> list[Bound] | None:
         """The value of every parameter, which was found to be of its type; it may be out of its range."""
         context = self._context
         pairs = pair(context, skill, arguments, request.span)
@@ -105,7 +110,7 @@ class Requests:
             bound.append(found)
         return bound
 
-    def _phase(self, request: Request, start: TestStart) -> str | None:
+    def _phase(self, request: RequestDecl, start: TestStart) -> str | None:
         """The phase that the step stands in: the mission's own, or else the first in which the skill is valid."""
         assert start.phase is not None
         valid = [name.text for name in self._context.symbols.skills[request.skill.text].phases]
@@ -221,7 +226,7 @@ def cases_of(context: Context, lower: Lower, names: Mapping[str, str]) -> Iterat
 class _Cases:
     """The cases of one test."""
 
-    def __init__(self, context: Context, under: _Under, test: TestDecl, request: Request, start: TestStart) -> None:
+    def __init__(self, context: Context, under: _Under, test: TestDecl, request: RequestDecl, start: TestStart) -> None:
         self._context = context
         self._under = under
         self._test = test
@@ -260,7 +265,7 @@ class _Cases:
         span: Span,
         expected: Expectation,
         columns: tuple[Subject, ...],
-        row: Row | None,
+        row: TableRow | None,
     ) -> PolicyCase | None:
         under, start = self._under, self._start
         assert start.instant is not None

@@ -23,7 +23,7 @@ from rtshcua.model.flat.signal import POSITION, Signal
 from rtshcua.model.flat.situation import ConfirmAnswer, Now, State
 from rtshcua.model.ir.expression import Condition, Coordinates, Edge, ForLast, Near, Reference, WithinLast
 from rtshcua.model.ir.node import Node
-from rtshcua.model.ir.tests import Answer, Cell, Named, OverTime, Subject
+from rtshcua.model.ir.tests import Answer, Named, OverTime, Subject, TableCell
 
 
 class _Timed(NamedTuple):
@@ -106,7 +106,7 @@ class SubjectValue(NamedTuple):
     """A subject, its cell, and where both are said."""
 
     subject: Subject
-    cell: Cell
+    cell: TableCell
     span: Span
 
 
@@ -174,7 +174,7 @@ class Situations:
         slots = set(reads)
         return [name for name, signal in self._signals.items() if signal.slot in slots and name not in given]
 
-    def _cells(self, signal: Signal, cell: Cell) -> tuple[int | None, ...]:
+    def _cells(self, signal: Signal, cell: TableCell) -> tuple[int | None, ...]:
         value = None if cell.value is None else self._context.given.get((signal.name, cell.value))
         if value is None:
             return (None, None) if signal.kind == POSITION else (None,)
@@ -224,5 +224,5 @@ class Situations:
         )
 
 
-def _truth_of(cell: Cell) -> int:
+def _truth_of(cell: TableCell) -> int:
     return TRUTHS.get(cell.value.name, UNKNOWN) if isinstance(cell.value, Reference) else UNKNOWN

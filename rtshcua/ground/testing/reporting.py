@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import render_one
-from rtshcua.diagnostics.report.junit import Outcome, Suite
+from rtshcua.diagnostics.report.junit import CaseOutcome, Suite
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.testing.case_result import CaseResult
 from rtshcua.ground.testing.clause_coverage import PolicyCoverage, ReachedGoals, per_mille
@@ -93,13 +93,13 @@ def _case_json(ran: CaseResult, sources: Mapping[str, Source]) -> dict[str, Any]
     }
 
 
-def _outcome(ran: CaseResult, sources: Mapping[str, Source]) -> Outcome:
+def _outcome(ran: CaseResult, sources: Mapping[str, Source]) -> CaseOutcome:
     span, finding = ran.case.span, ran.finding
     line = sources[span.file].position(span.start).line
     if finding is None:
-        return Outcome(ran.case.name, span.file, line, time_us=ran.took_us)
+        return CaseOutcome(ran.case.name, span.file, line, time_us=ran.took_us)
     text = render_one(finding, sources).rstrip("\n")
-    return Outcome(ran.case.name, span.file, line, failure=text, kind=finding.code.id, time_us=ran.took_us)
+    return CaseOutcome(ran.case.name, span.file, line, failure=text, kind=finding.code.id, time_us=ran.took_us)
 
 
 def _properties(covered: Sequence[PolicyCoverage]) -> Iterable[tuple[str, str]]:
@@ -245,13 +245,13 @@ def scenario_suites(flown: Sequence[ScenarioResult], sources: Mapping[str, Sourc
     return tuple(Suite(file, tuple(_scenario_outcome(each, sources) for each in group), ()) for file, group in files)
 
 
-def _scenario_outcome(flown: ScenarioResult, sources: Mapping[str, Source]) -> Outcome:
+def _scenario_outcome(flown: ScenarioResult, sources: Mapping[str, Source]) -> CaseOutcome:
     span = flown.scenario.declaration.name.span
     line = sources[span.file].position(span.start).line
     took_us = sum(flight.took_us for flight in flown.flights)
     if not flown.findings:
-        return Outcome(flown.scenario.scenario.name, span.file, line, time_us=took_us)
+        return CaseOutcome(flown.scenario.scenario.name, span.file, line, time_us=took_us)
     text = "\n".join(render_one(each, sources).rstrip("\n") for each in flown.findings)
-    return Outcome(
+    return CaseOutcome(
         flown.scenario.scenario.name, span.file, line, failure=text, kind=flown.findings[0].code.id, time_us=took_us
     )

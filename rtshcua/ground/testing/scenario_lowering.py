@@ -27,21 +27,21 @@ from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.scenarios import (
-    AfterStep,
-    AtTime,
+    AfterStepDecl,
+    AtTimeDecl,
     Beginning,
     Begins,
     Charge,
-    Decides,
+    DecidesDecl,
     Delay,
     Demand,
     Ends,
     FaultCall,
-    Flies,
+    FliesDecl,
     Keeps,
     Lands,
     Moment,
-    OnCondition,
+    OnConditionDecl,
     Reacts,
     ScenarioDecl,
 )
@@ -50,12 +50,12 @@ from rtshcua.model.scenario import (
     FLAVOURS,
     EndsInside,
     EndsWith,
-    Expectation,
     Expected,
     Incident,
     KeepsAway,
     ReactsWithin,
     Scenario,
+    ScenarioExpectation,
     Start,
     When,
 )
@@ -167,21 +167,21 @@ class _Lowering:
 
     def _when(self, moment: Moment) -> When | None:
         match moment:
-            case AtTime():
+            case AtTimeDecl():
                 return LoweredAtTime(*_delay(moment.delay))
-            case AfterStep():
+            case AfterStepDecl():
                 return LoweredAfterStep(self._step(moment), *_delay(moment.delay))
-            case OnCondition():
+            case OnConditionDecl():
                 condition = self._condition(moment)
                 return None if condition is None else LoweredOnCondition(condition, *_delay(moment.delay))
 
-    def _step(self, moment: AfterStep) -> int:
+    def _step(self, moment: AfterStepDecl) -> int:
         """The number of the step in the mission, of all steps of that skill the one that is meant."""
         steps = [step.skill.text for phase in self._under.declaration.phases for step in phase.steps]
         numbers = [number for number, name in enumerate(steps) if name == moment.skill.text]
         return numbers[0 if moment.number is None else moment.number.value - 1]
 
-    def _condition(self, moment: OnCondition) -> Clause | None:
+    def _condition(self, moment: OnConditionDecl) -> Clause | None:
         """The condition with the slots and zones of the policy: with either safe side of a grown zone that it has."""
         lacking: list[MissingFromPolicy] = []
         for strict in (True, False):
@@ -216,18 +216,18 @@ class _Lowering:
         )
         return None
 
-    def _expectation(self, demand: Demand) -> Expectation | None:
+    def _expectation(self, demand: Demand) -> ScenarioExpectation | None:
         what = self._expected(demand)
         file, start, end = demand.span
-        return None if what is None else Expectation(what, self._text(demand.span), file, start, end)
+        return None if what is None else ScenarioExpectation(what, self._text(demand.span), file, start, end)
 
     def _expected(self, demand: Demand) -> Expected | None:
         match demand:
-            case Decides():
+            case DecidesDecl():
                 return self._decides(demand)
             case Ends():
                 return EndsWith(tuple(name.text.replace("_", "-") for name in demand.endings))
-            case Flies():
+            case FliesDecl():
                 known = demand.never or self._flies(demand.skill)
                 return LoweredFlies(demand.skill.text, demand.never) if known else None
             case Reacts():
@@ -241,7 +241,7 @@ class _Lowering:
                 zone = self._zone(demand.zone)
                 return None if zone is None else EndsInside(zone)
 
-    def _decides(self, demand: Decides) -> LoweredDecides | None:
+    def _decides(self, demand: DecidesDecl) -> LoweredDecides | None:
         expected = demand.decision
         if expected.target is not None and not self._flies(expected.target):
             return None

@@ -4,7 +4,7 @@ from typing import Literal
 
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.ir.skills import ArgumentValue, Clause, Parameter
+from rtshcua.model.ir.skills import ArgumentValue, ClauseDecl, ParameterDecl
 
 
 class Overrides(Node):
@@ -18,13 +18,13 @@ class Overrides(Node):
     grace: Quantity | None = None
     energy: Quantity | None = None
     phases: tuple[Name, ...] = ()
-    require: tuple[Clause, ...] = ()
-    assume: tuple[Clause, ...] = ()
-    maintain: tuple[Clause, ...] = ()
+    require: tuple[ClauseDecl, ...] = ()
+    assume: tuple[ClauseDecl, ...] = ()
+    maintain: tuple[ClauseDecl, ...] = ()
     record: tuple[Name, ...] = ()
 
     @property
-    def clauses(self) -> tuple[Clause, ...]:
+    def clauses(self) -> tuple[ClauseDecl, ...]:
         """The step's own clauses."""
         return (*self.require, *self.assume, *self.maintain)
 
@@ -74,7 +74,9 @@ class MissionDecl(Node):
     proposer: Name | None  # who: openclaw
     role: Name | None  # on whose behalf
     phases: tuple[Phase, ...]
-    parameters: tuple[Parameter, ...] = ()  # `mission m(area: zone, height: altitude in 5 m .. 30 m = 20 m) under ...`
+    parameters: tuple[
+        ParameterDecl, ...
+    ] = ()  # `mission m(area: zone, height: altitude in 5 m .. 30 m = 20 m) under ...`
     most_time: Quantity | None = None  # `lasts at most 20 min`
     most_energy: Quantity | None = None  # `energy at most 60 %`
     most_steps: int | None = None  # `steps at most 40`

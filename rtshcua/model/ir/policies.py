@@ -4,7 +4,7 @@ from typing import Literal
 
 from rtshcua.model.ir.expression import Condition, Quantity
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, Parameter
+from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, ParameterDecl
 
 
 class RoleDecl(Node):
@@ -13,7 +13,7 @@ class RoleDecl(Node):
     names: tuple[Name, ...]
 
 
-class Rule(Node):
+class RuleDecl(Node):
     """`permit`, `forbid`, `confirm` or `degrade`.
 
     Empty `skills` is `any`. `roles` empty is `by any`. `through` are the sources that may speak for the role
@@ -60,11 +60,11 @@ class TemplateDecl(Node):
     """`template low_flight(area: zone, top: altitude) { permit ... }`: rules with parameters, for policies to use."""
 
     name: Name
-    parameters: tuple[Parameter, ...]
-    rules: tuple[Rule, ...]
+    parameters: tuple[ParameterDecl, ...]
+    rules: tuple[RuleDecl, ...]
 
 
-class Airspace(Node):
+class AirspaceDecl(Node):
     """`airspace inside city outside school, hospital`: where the vehicle may be at all."""
 
     inside: tuple[Name, ...]
@@ -86,8 +86,8 @@ class PolicyDecl(Node):
 
     name: Name
     version: int
-    rules: tuple[Rule, ...]
-    airspace: Airspace | None
+    rules: tuple[RuleDecl, ...]
+    airspace: AirspaceDecl | None
     contingency: tuple[LinkDecl, ...]
     uses: tuple[Use, ...] = ()
     delegations: tuple[Delegation, ...] = ()

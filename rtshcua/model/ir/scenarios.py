@@ -48,14 +48,14 @@ class Delay(Node):
     high: Quantity
 
 
-class AtTime(Node, kw_only=True):
+class AtTimeDecl(Node, kw_only=True):
     """`at 20 s`, after the start of the run."""
 
     kind: Literal["at-time"] = "at-time"
     delay: Delay
 
 
-class AfterStep(Node, kw_only=True):
+class AfterStepDecl(Node, kw_only=True):
     """`2 s after goto 2`: after the second step of that skill was sent."""
 
     kind: Literal["after-step"] = "after-step"
@@ -64,7 +64,7 @@ class AfterStep(Node, kw_only=True):
     number: Quantity | None
 
 
-class OnCondition(Node, kw_only=True):
+class OnConditionDecl(Node, kw_only=True):
     """`2 s after when height > 10 m`: after the condition was true for the first time."""
 
     kind: Literal["on-condition"] = "on-condition"
@@ -72,17 +72,17 @@ class OnCondition(Node, kw_only=True):
     condition: Condition
 
 
-Moment = AtTime | AfterStep | OnCondition
+Moment = AtTimeDecl | AfterStepDecl | OnConditionDecl
 
 
-class Incident(Node):
+class IncidentDecl(Node):
     """`at 20 s link_silence(for = 5 s)`."""
 
     moment: Moment
     fault: FaultCall
 
 
-class Decides(Node, kw_only=True):
+class DecidesDecl(Node, kw_only=True):
     """`expect fallback return_home because state/violated at "battery > 35 %"`: of some decision of the run."""
 
     kind: Literal["decides"] = "decides"
@@ -96,7 +96,7 @@ class Ends(Node, kw_only=True):
     endings: tuple[Name, ...]
 
 
-class Flies(Node, kw_only=True):
+class FliesDecl(Node, kw_only=True):
     """`expect flies return_home`, `expect never emergency_land`."""
 
     kind: Literal["flies"] = "flies"
@@ -126,7 +126,7 @@ class Lands(Node, kw_only=True):
     zone: Name
 
 
-Demand = Decides | Ends | Flies | Reacts | Keeps | Lands
+Demand = DecidesDecl | Ends | FliesDecl | Reacts | Keeps | Lands
 
 
 class ScenarioDecl(Node):
@@ -137,5 +137,5 @@ class ScenarioDecl(Node):
     flavours: tuple[Name, ...]  # none written: all that there are
     seeds: Seeds | None
     start: tuple[Beginning, ...]
-    incidents: tuple[Incident, ...]
+    incidents: tuple[IncidentDecl, ...]
     demands: tuple[Demand, ...]

@@ -28,7 +28,7 @@ class Selected(Node):
     value: Name
 
 
-class SignalSource(Node):
+class SourceDecl(Node):
     """One MAVLink message and the field or fields that hold the signal.
 
     Two fields are a pair: latitude and longitude for a `position`, two components for a `speed` (taken as the
@@ -49,6 +49,6 @@ class SignalDecl(Node):
 
     name: Name
     type: Name
-    sources: tuple[SignalSource, ...]
+    sources: tuple[SourceDecl, ...]
     unknown_at: tuple[Name, ...]
     stale_after: Quantity

@@ -6,7 +6,7 @@ from rtshcua.model.ir.expression import Condition, Quantity, Range, Reference, V
 from rtshcua.model.ir.node import Name, Node
 
 
-class Parameter(Node):
+class ParameterDecl(Node):
     """`altitude: altitude in 5 m .. 60 m = 20 m`, `area: zone`, `target: position`, `pattern: one of grid, orbit =
     grid`.
     """
@@ -18,7 +18,7 @@ class Parameter(Node):
     default: Value | None
 
 
-class Motion(Node):
+class MotionDecl(Node):
     """Where the skill takes the vehicle, so that its planned volume is known before it flies.
 
     `climb to altitude` straight up; `fly to target at altitude`; `cover area at altitude` by a survey path;
@@ -48,7 +48,7 @@ class LinkDecl(Node):
     limit: Quantity | None
 
 
-class Clause(Node):
+class ClauseDecl(Node):
     """One condition of `require`, `assume` or `maintain`; a top-level `and` is already split into clauses.
 
     `where_fitted` (`assume obstacle.distance > 3 m where fitted`): for a vehicle without a signal that it reads, it is
@@ -74,21 +74,21 @@ class SkillDecl(Node, kw_only=True):
     """
 
     name: Name
-    parameters: tuple[Parameter, ...]
-    motion: Motion | None
+    parameters: tuple[ParameterDecl, ...]
+    motion: MotionDecl | None
     timing_class: Name | None  # semantic, tactical, reflex
     deadline: Quantity | None
     validity: Quantity | None
     phases: tuple[Name, ...]  # `during a, b`; empty: any phase
     duration: Quantity | None  # `lasts at most 5 min`
     grace: Quantity | None  # how long a clause may be UNKNOWN while the skill runs
-    require: tuple[Clause, ...]
-    assume: tuple[Clause, ...]
-    maintain: tuple[Clause, ...]
+    require: tuple[ClauseDecl, ...]
+    assume: tuple[ClauseDecl, ...]
+    maintain: tuple[ClauseDecl, ...]
     fallback: tuple[LinkDecl, ...]
     energy: Quantity | None
     record: tuple[Name, ...]
-    sizes: tuple[Parameter, ...] = ()
+    sizes: tuple[ParameterDecl, ...] = ()
     sized: tuple[Sized, ...] = ()
 
 

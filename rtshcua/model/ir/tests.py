@@ -30,7 +30,7 @@ class Named(Node, kw_only=True):
 Subject = Named | OverTime
 
 
-class Cell(Node):
+class TableCell(Node):
     """`20 %`, `unknown` (`value` is None), `fix_3d measured 3 s ago`; `true` or `false` of a condition over time."""
 
     value: Value | None
@@ -41,7 +41,7 @@ class Assignment(Node):
     """`battery = 20 %`."""
 
     subject: Subject
-    cell: Cell
+    cell: TableCell
 
 
 class Instant(Node):
@@ -75,7 +75,7 @@ class Issue(Node):
     ahead: bool
 
 
-class InForce(Node):
+class VersionInForce(Node):
     """`version 8 in force`: of the policy aboard, where it is not the one that the request was made under."""
 
     version: int
@@ -102,7 +102,7 @@ class Premises(Node):
     answers: tuple[Answer, ...] = ()
     released: Quantity | None = None
     issued: Issue | None = None
-    in_force: InForce | None = None
+    in_force: VersionInForce | None = None
     identity: Identity | None = None
     replayed: Deed | None = None
     tampered: Deed | None = None
@@ -127,7 +127,7 @@ class NominalDecl(Node):
     premises: Premises
 
 
-class Request(Node):
+class RequestDecl(Node):
     """`when inspect_area(area = bridge_a, altitude = 20 m) by operator through agent`."""
 
     skill: Name
@@ -146,18 +146,18 @@ class Expectation(Node):
     clause: Quoted | None
 
 
-class Row(Node):
+class TableRow(Node):
     """`20 %, 3 m/s expect fallback return_home`."""
 
-    cells: tuple[Cell, ...]
+    cells: tuple[TableCell, ...]
     expectation: Expectation
 
 
-class Table(Node):
+class CaseTable(Node):
     """`table battery, wind.speed { ... }`: a case a row."""
 
     columns: tuple[Subject, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
 
 
 class TestDecl(Node):
@@ -168,6 +168,6 @@ class TestDecl(Node):
     name: Quoted
     nominal: Name | None
     premises: Premises
-    request: Request | None
+    request: RequestDecl | None
     expectation: Expectation | None
-    table: Table | None
+    table: CaseTable | None

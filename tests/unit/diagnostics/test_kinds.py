@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from rtshcua.diagnostics import kinds
-from rtshcua.diagnostics.kinds import Kind, foreign, recognised
+from rtshcua.diagnostics.kinds import FileKind, foreign, recognised
 from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 
-BEGINNINGS: tuple[tuple[bytes, str, Kind | None], ...] = (
+BEGINNINGS: tuple[tuple[bytes, str, FileKind | None], ...] = (
     (b'{"fileType":"Plan","geoFence":{},"groundStation":"QGroundControl"}', "a.plan", kinds.PLAN),
     (b'{\n    "fileType": "Plan",\n', "a.json", kinds.PLAN),
     (b'{"type":"FeatureCollection","features":[]}', "a.geojson", kinds.GEOJSON),
@@ -40,7 +40,7 @@ BEGINNINGS: tuple[tuple[bytes, str, Kind | None], ...] = (
 
 
 @rows("data, name, kind", BEGINNINGS)
-def test_recognised(data: bytes, name: str, kind: Kind | None) -> None:
+def test_recognised(data: bytes, name: str, kind: FileKind | None) -> None:
     assert recognised(data, name) is kind
     sources = (None, kinds.SOURCE, kinds.SPECIFICATION)
     assert (foreign(data, name) is None) is (kind in sources)

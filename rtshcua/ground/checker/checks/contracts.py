@@ -29,7 +29,7 @@ from rtshcua.model.flat.contract import TimingClass
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.skills import Motion, SkillDecl
+from rtshcua.model.ir.skills import MotionDecl, SkillDecl
 from rtshcua.model.quantity import Dimension
 
 CLASSES = tuple(each.name.lower() for each in TimingClass)
@@ -96,7 +96,7 @@ def _complete(context: Context, skill: SkillDecl) -> None:
         )
 
 
-def _motion(context: Context, skill: SkillDecl, motion: Motion) -> None:
+def _motion(context: Context, skill: SkillDecl, motion: MotionDecl) -> None:
     _parameter(context, skill, motion.altitude, HEIGHT)
     _parameter(context, skill, motion.speed, SPEED)
     _parameter(context, skill, motion.time, DURATION)

@@ -14,7 +14,7 @@ from rtshcua.ground.checker.types import EXAMPLES, NAMED, Kind
 from rtshcua.ground.checker.values import whole_range
 from rtshcua.model.ir.expression import Quantity, Range, Reference
 from rtshcua.model.ir.policies import TemplateDecl
-from rtshcua.model.ir.skills import GivenSize, Parameter, SizesDecl, SkillDecl
+from rtshcua.model.ir.skills import GivenSize, ParameterDecl, SizesDecl, SkillDecl
 
 #: the type of a template's parameter that stands for a role
 ROLE = "role"
@@ -82,7 +82,7 @@ def _types(owner: type[Parametric]) -> str:
     return ", ".join(f"`{name}`" for name in NAMED) + " and `one of ...`"
 
 
-def _of_template(context: Context, parameter: Parameter) -> bool:
+def _of_template(context: Context, parameter: ParameterDecl) -> bool:
     """Whether no more is to say of a template's parameter: it is a role, or of a type that no rule can use."""
     if parameter.type.text == ROLE and not parameter.choices:
         if parameter.range is not None:
@@ -99,7 +99,7 @@ def _of_template(context: Context, parameter: Parameter) -> bool:
     return False
 
 
-def no_range(context: Context, parameter: Parameter) -> None:
+def no_range(context: Context, parameter: ParameterDecl) -> None:
     """Report a parameter that has no range and is a number, or has one and is none."""
     name = parameter.name.text
     type = NAMED.get(parameter.type.text)
@@ -138,7 +138,7 @@ def check_sizes(context: Context) -> None:
         )
 
 
-def _declared(context: Context, size: Parameter) -> None:
+def _declared(context: Context, size: ParameterDecl) -> None:
     name, default = size.name.text, size.default
     argument = _argument(context, size)
     if argument is None:
@@ -165,7 +165,7 @@ def _declared(context: Context, size: Parameter) -> None:
         bind_value(context.scope(), argument, default)
 
 
-def _argument(context: Context, size: Parameter) -> Argument | None:
+def _argument(context: Context, size: ParameterDecl) -> Argument | None:
     """A size as an argument is seen; None where it is no number."""
     type = None if size.choices else NAMED.get(size.type.text)
     if type is None or type.kind is not Kind.NUMBER:

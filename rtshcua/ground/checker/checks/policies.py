@@ -12,7 +12,7 @@ from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.symbols import brought_about
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.limits import MAX_SILENCE, MAX_VALUE
-from rtshcua.model.ir.policies import PolicyDecl, Rule
+from rtshcua.model.ir.policies import PolicyDecl, RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension
 
@@ -56,7 +56,7 @@ def _contingency(context: Context, policy: PolicyDecl) -> None:
     )
 
 
-def _rule(context: Context, rule: Rule) -> None:
+def _rule(context: Context, rule: RuleDecl) -> None:
     skills = [skill for skill in (find_skill(context, name) for name in rule.skills) if skill is not None]
     for source in rule.through:
         one_of(context, codes.UNKNOWN_SOURCE, source, SOURCES, "source")
@@ -72,7 +72,7 @@ def _rule(context: Context, rule: Rule) -> None:
             check_condition(Scope(context.symbols, context.report, shared), rule.when)
 
 
-def _confirm(context: Context, rule: Rule) -> None:
+def _confirm(context: Context, rule: RuleDecl) -> None:
     if rule.within is not None:
         quantity(context, rule.within, Dimension.DURATION)
         return
@@ -84,7 +84,7 @@ def _confirm(context: Context, rule: Rule) -> None:
     )
 
 
-def shared_arguments(context: Context, rule: Rule, skills: Sequence[SkillDecl]) -> dict[str, Argument] | None:
+def shared_arguments(context: Context, rule: RuleDecl, skills: Sequence[SkillDecl]) -> dict[str, Argument] | None:
     """The arguments that a rule's condition may read: those that all its skills have; None after a finding."""
     assert rule.when is not None
     signatures = [context.arguments(skill) for skill in skills]

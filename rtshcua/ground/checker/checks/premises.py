@@ -19,10 +19,9 @@ from rtshcua.model.flat.limits import MAX_PHASES
 from rtshcua.model.ir.expression import Coordinates, Edge, ForLast, Reference, Value, WithinLast
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.signals import SignalDecl
-from rtshcua.model.ir.skills import Parameter
+from rtshcua.model.ir.skills import ParameterDecl
 from rtshcua.model.ir.tests import (
     Asker,
-    Cell,
     InPhase,
     Instant,
     Named,
@@ -30,6 +29,7 @@ from rtshcua.model.ir.tests import (
     OverTime,
     Premises,
     Subject,
+    TableCell,
     TestDecl,
 )
 from rtshcua.model.quantity import Dimension
@@ -81,7 +81,7 @@ def check_subject(context: Context, subject: Subject) -> None:
         )
 
 
-def check_cell(context: Context, subject: Subject, cell: Cell) -> None:
+def check_cell(context: Context, subject: Subject, cell: TableCell) -> None:
     """Report a value that the subject cannot have, and keep the one that it has, in `Context.given`."""
     quantity(context, cell.measured, Dimension.DURATION, positive=False)
     if isinstance(subject, OverTime):
@@ -93,7 +93,9 @@ def check_cell(context: Context, subject: Subject, cell: Cell) -> None:
     type = signal_type(context.symbols, signal)
     if type is None:  # reported where the signal is declared
         return
-    seen = Parameter(span=signal.name.span, name=signal.name, type=signal.type, range=None, choices=(), default=None)
+    seen = ParameterDecl(
+        span=signal.name.span, name=signal.name, type=signal.type, range=None, choices=(), default=None
+    )
     bound = bind_value(context.scope(), Argument(seen, type), cell.value)
     if bound is not None and check_size(context, cell.value, bound, type.dimension):
         extent = context.symbols.ranges.get(signal.name.text)
@@ -131,7 +133,7 @@ def once(context: Context, subjects: Iterable[tuple[Subject, Span]], first_words
             )
 
 
-def _truth(context: Context, cell: Cell) -> None:
+def _truth(context: Context, cell: TableCell) -> None:
     if cell.value is not None and not (isinstance(cell.value, Reference) and cell.value.name in TRUTHS):
         near = suggestion(cell.value.name, TRUTHS) if isinstance(cell.value, Reference) else None
         context.report.add(

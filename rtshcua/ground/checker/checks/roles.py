@@ -11,7 +11,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Rule, Use
+from rtshcua.model.ir.policies import RuleDecl, Use
 
 #: the role that every vehicle has
 OPERATOR = "operator"
@@ -38,7 +38,7 @@ def check_roles(context: Context) -> None:
             _rule(context, rule, own)
 
 
-def _rule(context: Context, rule: Rule, own: frozenset[str]) -> None:
+def _rule(context: Context, rule: RuleDecl, own: frozenset[str]) -> None:
     """The roles of a rule, but for the `own` parameters of the template that it stands in."""
     for name in (*rule.roles, rule.approver, rule.another):
         if name is not None and name.text not in own:

@@ -17,20 +17,20 @@ from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.ir.expression import Condition, Edge, ForLast, Near, Quantity, WithinLast
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.scenarios import (
-    AfterStep,
-    AtTime,
+    AfterStepDecl,
+    AtTimeDecl,
     Beginning,
     Begins,
     Charge,
-    Decides,
+    DecidesDecl,
     Delay,
     Demand,
     Ends,
     FaultCall,
-    Flies,
+    FliesDecl,
     Keeps,
     Lands,
-    OnCondition,
+    OnConditionDecl,
     Reacts,
     ScenarioDecl,
     Seeds,
@@ -76,11 +76,11 @@ def _check(context: Context, scenario: ScenarioDecl) -> None:
         moment = incident.moment
         _delay(context, moment.delay)
         match moment:
-            case AtTime():
+            case AtTimeDecl():
                 pass
-            case AfterStep():
+            case AfterStepDecl():
                 _step(context, moment, mission)
-            case OnCondition():
+            case OnConditionDecl():
                 _condition(context, moment.condition)
         fault_of(context, incident.fault)
     for demand in scenario.demands:
@@ -195,7 +195,7 @@ def _delay(context: Context, delay: Delay | None) -> None:
             _ascending(context, delay.low, delay.high)
 
 
-def _step(context: Context, moment: AfterStep, mission: MissionDecl | None) -> None:
+def _step(context: Context, moment: AfterStepDecl, mission: MissionDecl | None) -> None:
     skill = find_skill(context, moment.skill)
     if skill is None or mission is None:
         return
@@ -247,7 +247,7 @@ def _condition(context: Context, condition: Condition) -> None:
 
 def _demand(context: Context, demand: Demand) -> None:
     match demand:
-        case Decides():
+        case DecidesDecl():
             expected = demand.decision
             check_expectation(context, expected, None, None)
             if expected.target is not None:
@@ -255,7 +255,7 @@ def _demand(context: Context, demand: Demand) -> None:
         case Ends():
             for name in demand.endings:
                 one_of(context, codes.UNKNOWN_ENDING, name, ENDS, "ending")
-        case Flies():
+        case FliesDecl():
             find_skill(context, demand.skill)
         case Reacts():
             quantity(context, demand.most, Dimension.DURATION)

@@ -14,7 +14,7 @@ from rtshcua.mavlink.dialect import DATUM, Dialect, Field, Message
 from rtshcua.mavlink.quantise import UNITS
 from rtshcua.model.flat.limits import MAX_STALE
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.signals import EnumDecl, Selected, SignalDecl, SignalSource
+from rtshcua.model.ir.signals import EnumDecl, Selected, SignalDecl, SourceDecl
 from rtshcua.model.quantity import Dimension
 
 PLACE_UNIT = "degE7"
@@ -89,7 +89,7 @@ def _signal(context: Context, signal: SignalDecl) -> None:
         context.symbols.ranges[signal.name.text] = reported(context.dialect, signal, type.dimension)
 
 
-def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Type | None) -> None:
+def _source(context: Context, signal: SignalDecl, source: SourceDecl, type: Type | None) -> None:
     report, dialect = context.report, context.dialect
     message = dialect.messages.get(source.message.text)
     if message is None:
@@ -128,7 +128,7 @@ def _source(context: Context, signal: SignalDecl, source: SignalSource, type: Ty
     _selector(context, source, message)
 
 
-def _selector(context: Context, source: SignalSource, message: Message) -> None:
+def _selector(context: Context, source: SourceDecl, message: Message) -> None:
     """Each selected field is one whole number that has such a value, and a direction is always selected."""
     report, seen = context.report, set[str]()
     for each in source.where:
@@ -184,7 +184,7 @@ def _fields(message: Message) -> str:
     return f"its fields are {listed(message.fields)}"
 
 
-def _count(context: Context, signal: SignalDecl, source: SignalSource, type: Type | None) -> bool:
+def _count(context: Context, signal: SignalDecl, source: SourceDecl, type: Type | None) -> bool:
     """A position is read from two fields, a speed from one or two, everything else from one."""
     given = len(source.fields)
     allowed = (2,) if type == POSITION else (1, 2) if type == SPEED else (1,)
@@ -201,7 +201,7 @@ def _count(context: Context, signal: SignalDecl, source: SignalSource, type: Typ
 
 
 def _field(
-    context: Context, signal: SignalDecl, source: SignalSource, name: Name, field: Field, type: Type | None
+    context: Context, signal: SignalDecl, source: SourceDecl, name: Name, field: Field, type: Type | None
 ) -> None:
     """The field measures what the signal does."""
     if signal.type.text == Dimension.ALTITUDE.value:
@@ -231,7 +231,7 @@ def _field(
 
 
 def _altitude(
-    context: Context, signal: SignalDecl, source: SignalSource, name: Name, field: Field, type: Type | None
+    context: Context, signal: SignalDecl, source: SourceDecl, name: Name, field: Field, type: Type | None
 ) -> None:
     if field.unit not in UNITS[Dimension.LENGTH]:
         _unit(context, signal, name, field, tuple(UNITS[Dimension.LENGTH]))

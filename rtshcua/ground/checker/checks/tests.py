@@ -26,7 +26,7 @@ from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import ArgumentValue, SkillDecl
-from rtshcua.model.ir.tests import Cell, Named, Request, Row, Subject, Table, TestDecl
+from rtshcua.model.ir.tests import CaseTable, Named, RequestDecl, Subject, TableCell, TableRow, TestDecl
 
 #: of one file; beyond that a generator went wild, and nobody reads what they find
 MAX_CASES = 4096
@@ -133,7 +133,7 @@ def _complete(context: Context, test: TestDecl, start: TestStart) -> None:
         )
 
 
-def check_request(context: Context, test: TestDecl, request: Request, skill: SkillDecl) -> None:
+def check_request(context: Context, test: TestDecl, request: RequestDecl, skill: SkillDecl) -> None:
     """Report arguments that do not fit their parameters. One out of its range does: the decision denies it."""
     columns = () if test.table is None else columns_of(test.table, skill)
     stand_ins = tuple(
@@ -151,7 +151,7 @@ def check_request(context: Context, test: TestDecl, request: Request, skill: Ski
 MAX_COLUMNS = 64
 
 
-def columns_of(table: Table, skill: SkillDecl) -> tuple[Name, ...]:
+def columns_of(table: CaseTable, skill: SkillDecl) -> tuple[Name, ...]:
     """The columns that are parameters of the skill that is asked for."""
     names = {parameter.name.text for parameter in skill.parameters}
     named = (column.name for column in table.columns if isinstance(column, Named))
@@ -163,7 +163,7 @@ def unranged(argument: Argument) -> Argument:
     return Argument(argument.declaration, argument.type)
 
 
-def check_table(context: Context, test: TestDecl, table: Table, skill: SkillDecl | None) -> None:
+def check_table(context: Context, test: TestDecl, table: CaseTable, skill: SkillDecl | None) -> None:
     """Report columns that nothing is called, and cells that do not fit their columns."""
     if len(table.columns) > MAX_COLUMNS:
         context.report.add(
@@ -213,7 +213,7 @@ def _column(context: Context, column: Subject, arguments: dict[str, Argument], s
         )
 
 
-def _whole(context: Context, table: Table, row: Row) -> bool:
+def _whole(context: Context, table: CaseTable, row: TableRow) -> bool:
     if len(row.cells) == len(table.columns):
         return True
     more = len(row.cells) - len(table.columns)
@@ -228,7 +228,7 @@ def _whole(context: Context, table: Table, row: Row) -> bool:
     return False
 
 
-def _cell(context: Context, column: Subject, cell: Cell, arguments: dict[str, Argument]) -> None:
+def _cell(context: Context, column: Subject, cell: TableCell, arguments: dict[str, Argument]) -> None:
     argument = arguments.get(column.name.text) if isinstance(column, Named) else None
     if argument is None:
         check_cell(context, column, cell)

@@ -20,7 +20,7 @@ from rtshcua.ground.checker.context import Context
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Overrides, Step
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.policies import RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension, display
 
@@ -118,7 +118,7 @@ def _class(context: Context, skill: SkillDecl) -> None:
         )
 
 
-def _approval(context: Context, rule: Rule) -> None:
+def _approval(context: Context, rule: RuleDecl) -> None:
     within = _time(rule.within)
     for name in rule.skills:
         skill = context.symbols.skills.get(name.text)

@@ -8,19 +8,37 @@ from rtshcua.ground.language.build.reader import Action, Part, Reader, node, par
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Item, MissionDecl, Overrides, Phase, Repeat, Step
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.ir.policies import Airspace, Delegation, PolicyDecl, RoleDecl, Rule, Silence, TemplateDecl, Use
+from rtshcua.model.ir.policies import (
+    AirspaceDecl,
+    Delegation,
+    PolicyDecl,
+    RoleDecl,
+    RuleDecl,
+    Silence,
+    TemplateDecl,
+    Use,
+)
 from rtshcua.model.ir.program import Import
-from rtshcua.model.ir.skills import ArgumentValue, Parameter
+from rtshcua.model.ir.skills import ArgumentValue, ParameterDecl
 
 Names = tuple[Name, ...]
 
 FORMS: dict[str, Action] = {
-    "permit": node(Rule, "skills", "roles", "through", "when", kind="permit", through=()),
-    "forbid": node(Rule, "skills", "roles", "through", "when", "where_fitted", kind="forbid", through=()),
+    "permit": node(RuleDecl, "skills", "roles", "through", "when", kind="permit", through=()),
+    "forbid": node(RuleDecl, "skills", "roles", "through", "when", "where_fitted", kind="forbid", through=()),
     "confirm": node(
-        Rule, "skills", "when", "approver", "another", "within", "where_fitted", kind="confirm", roles=(), through=()
+        RuleDecl,
+        "skills",
+        "when",
+        "approver",
+        "another",
+        "within",
+        "where_fitted",
+        kind="confirm",
+        roles=(),
+        through=(),
     ),
-    "degrade": node(Rule, "skills", "when", "target", "where_fitted", kind="degrade", roles=(), through=()),
+    "degrade": node(RuleDecl, "skills", "when", "target", "where_fitted", kind="degrade", roles=(), through=()),
     "contingency": part("contingency"),
     "without_evidence": part("without evidence"),
     "without_link": part("without link", node(Silence, "limit", "then")),
@@ -52,7 +70,7 @@ def airspace(reader: Reader, span: Span, inside: Names | None, outside: Names | 
     if inside is None and outside is None:
         help = "write `inside`, `outside` or both, as in `airspace inside city outside school`"
         reader.report(NOT_WRITTEN, "the airspace has no zone", span, help)
-    return Part("airspace", span, Airspace(span=span, inside=inside or (), outside=outside or ()))
+    return Part("airspace", span, AirspaceDecl(span=span, inside=inside or (), outside=outside or ()))
 
 
 def role(reader: Reader, span: Span, names: Names) -> None:
@@ -60,13 +78,15 @@ def role(reader: Reader, span: Span, names: Names) -> None:
     reader.declare(RoleDecl(span=span, names=names))
 
 
-def template(reader: Reader, span: Span, name: Name, parameters: tuple[Parameter, ...] | None, *rules: Rule) -> None:
+def template(
+    reader: Reader, span: Span, name: Name, parameters: tuple[ParameterDecl, ...] | None, *rules: RuleDecl
+) -> None:
     """`template low_flight(area: zone, top: altitude) { permit ... }`."""
     reader.undotted(name, "template")
     reader.declare(TemplateDecl(span=span, name=name, parameters=parameters or (), rules=rules), name)
 
 
-def policy(reader: Reader, span: Span, name: Name, version: int, *given: Rule | Use | Delegation | Part) -> None:
+def policy(reader: Reader, span: Span, name: Name, version: int, *given: RuleDecl | Use | Delegation | Part) -> None:
     """`policy bridge_inspection version 7 { ... }`."""
     reader.undotted(name, "policy")
     found = reader.parts("policy", name, [part for part in given if isinstance(part, Part)])
@@ -75,7 +95,7 @@ def policy(reader: Reader, span: Span, name: Name, version: int, *given: Rule | 
             span=span,
             name=name,
             version=version,
-            rules=tuple(rule for rule in given if isinstance(rule, Rule)),
+            rules=tuple(rule for rule in given if isinstance(rule, RuleDecl)),
             airspace=found.get("airspace"),
             contingency=found.get("contingency", ()),
             uses=tuple(use for use in given if isinstance(use, Use)),
@@ -158,7 +178,7 @@ def mission(
     reader: Reader,
     span: Span,
     name: Name,
-    parameters: tuple[Parameter, ...] | None,
+    parameters: tuple[ParameterDecl, ...] | None,
     policy: Name,
     version: int,
     vehicle: Name,

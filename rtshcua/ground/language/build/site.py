@@ -24,7 +24,7 @@ from rtshcua.model.ir.places import (
     VehicleDecl,
     ZoneDecl,
 )
-from rtshcua.model.ir.signals import EnumDecl, Enumerator, Selected, SignalDecl, SignalSource
+from rtshcua.model.ir.signals import EnumDecl, Enumerator, Selected, SignalDecl, SourceDecl
 from rtshcua.model.quantity import UNITS, Dimension
 
 #: the keys of two parts that are both written `active`
@@ -90,7 +90,7 @@ def selected(reader: Reader, span: Span, field: Name, value: Name) -> Selected:
     return Selected(span=span, field=field, value=value)
 
 
-def source(reader: Reader, span: Span, *parts: Any) -> SignalSource:
+def source(reader: Reader, span: Span, *parts: Any) -> SourceDecl:
     """`GPS_RAW_INT.fix_type`, or two fields of one message; which of the messages count stands last."""
     paths: tuple[Name, ...] = tuple(part for part in parts if isinstance(part, Name))
     where = parts[-1] if isinstance(parts[-1], tuple) else ()
@@ -105,10 +105,10 @@ def source(reader: Reader, span: Span, *parts: Any) -> SignalSource:
             )
     if len(fields) > 2:
         reader.report(SYNTAX, f"a source has one field or two, not {len(fields)}", span, "write one field, or a pair")
-    return SignalSource(span=span, message=messages[0], fields=fields[:2], where=where)
+    return SourceDecl(span=span, message=messages[0], fields=fields[:2], where=where)
 
 
-def signal(reader: Reader, span: Span, name: Name, type: Name, *rest: SignalSource | Part) -> None:
+def signal(reader: Reader, span: Span, name: Name, type: Name, *rest: SourceDecl | Part) -> None:
     """`signal battery : ratio = BATTERY_STATUS.battery_remaining unknown at -1 stale after 5 s`."""
     found = reader.parts("signal", name, [item for item in rest if isinstance(item, Part)], ("stale after",))
     if not reader.sound:
@@ -119,7 +119,7 @@ def signal(reader: Reader, span: Span, name: Name, type: Name, *rest: SignalSour
             span=span,
             name=name,
             type=type,
-            sources=tuple(item for item in rest if isinstance(item, SignalSource)),
+            sources=tuple(item for item in rest if isinstance(item, SourceDecl)),
             unknown_at=found.get("unknown at", ()),
             stale_after=found["stale after"],
         ),

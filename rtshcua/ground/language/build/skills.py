@@ -10,11 +10,11 @@ from rtshcua.ground.language.build.reader import Action, Part, Reader, node, par
 from rtshcua.model.ir.expression import Condition, Junction, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import (
-    Clause,
+    ClauseDecl,
     GivenSize,
     LinkDecl,
-    Motion,
-    Parameter,
+    MotionDecl,
+    ParameterDecl,
     Sized,
     SizesDecl,
     SkillDecl,
@@ -35,24 +35,24 @@ _SIZED: Final = {"deadline": "deadline", "valid": "validity", "lasts": "duration
 _CLAUSES = ("require", "assume", "maintain")
 
 
-def _clauses(condition: Condition, where_fitted: bool) -> tuple[Clause, ...]:
+def _clauses(condition: Condition, where_fitted: bool) -> tuple[ClauseDecl, ...]:
     """Splits a top-level `and`, so that a refusal can name the one operand that decided."""
     if isinstance(condition, Junction) and condition.operator == "and":
         return tuple(clause for operand in condition.operands for clause in _clauses(operand, where_fitted))
-    return (Clause(span=condition.span, condition=condition, where_fitted=where_fitted),)
+    return (ClauseDecl(span=condition.span, condition=condition, where_fitted=where_fitted),)
 
 
-def _clauses_of(reader: Reader, span: Span, condition: Condition, fitted: bool | None) -> tuple[Clause, ...]:
+def _clauses_of(reader: Reader, span: Span, condition: Condition, fitted: bool | None) -> tuple[ClauseDecl, ...]:
     """`battery > 35 % and height < 60 m where fitted`."""
     return _clauses(condition, fitted is True)
 
 
 FORMS: dict[str, Action] = {
-    "climb_to": part("motion", node(Motion, "altitude", kind="climb")),
-    "fly_to": part("motion", node(Motion, "target", "altitude", "speed", kind="fly")),
-    "cover_area": part("motion", node(Motion, "target", "altitude", "pattern", "speed", kind="cover")),
-    "hold_for": part("motion", node(Motion, "kind", "time")),
-    "stay": part("motion", node(Motion, "kind")),
+    "climb_to": part("motion", node(MotionDecl, "altitude", kind="climb")),
+    "fly_to": part("motion", node(MotionDecl, "target", "altitude", "speed", kind="fly")),
+    "cover_area": part("motion", node(MotionDecl, "target", "altitude", "pattern", "speed", kind="cover")),
+    "hold_for": part("motion", node(MotionDecl, "kind", "time")),
+    "stay": part("motion", node(MotionDecl, "kind")),
     "timing_class": part("class"),
     "deadline": part("deadline"),
     "duration": part("lasts"),
@@ -71,10 +71,10 @@ FORMS: dict[str, Action] = {
 
 def parameter(
     reader: Reader, span: Span, name: Name, type: Name, range: Range | None, default: Value | None
-) -> Parameter:
+) -> ParameterDecl:
     """`altitude: altitude in 5 m .. 60 m = 20 m`."""
     reader.undotted(name, "parameter")
-    return Parameter(span=span, name=name, type=type, range=range, choices=(), default=default)
+    return ParameterDecl(span=span, name=name, type=type, range=range, choices=(), default=default)
 
 
 def choice_type(reader: Reader, span: Span) -> Name:
@@ -82,7 +82,7 @@ def choice_type(reader: Reader, span: Span) -> Name:
     return Name(span=span, text="choice")
 
 
-def one_of(reader: Reader, span: Span, name: Name, type: Name, first: Name, default: Name | None) -> Parameter:
+def one_of(reader: Reader, span: Span, name: Name, type: Name, first: Name, default: Name | None) -> ParameterDecl:
     """`pattern: one of grid`, whose further names follow as items of their own."""
     reader.undotted(name, "parameter")
     return _choices(span, name, type, (first,), default)
@@ -93,12 +93,12 @@ def choice(reader: Reader, span: Span, name: Name, default: Name | None) -> Furt
     return FurtherName(span, name, default)
 
 
-def parameters(reader: Reader, span: Span, *items: Parameter | FurtherName) -> tuple[Parameter, ...]:
+def parameters(reader: Reader, span: Span, *items: ParameterDecl | FurtherName) -> tuple[ParameterDecl, ...]:
     """The parameters, each `one of` with all its names."""
-    made: list[Parameter] = []
+    made: list[ParameterDecl] = []
     for item in items:
         last = made[-1] if made else None
-        if isinstance(item, Parameter):
+        if isinstance(item, ParameterDecl):
             made.append(item)
         elif last is not None and last.choices and last.default is None:
             names = (*last.choices, item.name)
@@ -110,9 +110,9 @@ def parameters(reader: Reader, span: Span, *items: Parameter | FurtherName) -> t
     return tuple(made)
 
 
-def _choices(span: Span, name: Name, type: Name, names: tuple[Name, ...], default: Name | None) -> Parameter:
+def _choices(span: Span, name: Name, type: Name, names: tuple[Name, ...], default: Name | None) -> ParameterDecl:
     value = Reference(span=default.span, name=default.text) if default else None
-    return Parameter(span=span, name=name, type=type, range=None, choices=names, default=value)
+    return ParameterDecl(span=span, name=name, type=type, range=None, choices=names, default=value)
 
 
 def validity(reader: Reader, span: Span, time: Quantity, phases: tuple[Name, ...] | None) -> Part:
@@ -131,7 +131,7 @@ def sized(reader: Reader, span: Span, word: str, size: Reference, phases: tuple[
     return Part(str(word), span, (made, phases or ()) if word == "valid" else made)
 
 
-def own_sizes(reader: Reader, span: Span, parameters: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+def own_sizes(reader: Reader, span: Span, parameters: tuple[ParameterDecl, ...]) -> tuple[ParameterDecl, ...]:
     """`sizes (highest: altitude in 10 m .. 500 m = 60 m)`, of a skill."""
     return parameters
 
@@ -145,8 +145,8 @@ def skill(
     reader: Reader,
     span: Span,
     name: Name,
-    parameters: tuple[Parameter, ...] | None,
-    sizes: tuple[Parameter, ...] | None,
+    parameters: tuple[ParameterDecl, ...] | None,
+    sizes: tuple[ParameterDecl, ...] | None,
     *given: Part,
 ) -> None:
     """`skill hover() { ... }`."""

@@ -13,19 +13,19 @@ from rtshcua.ground.language.build.reader import Action, Part, Reader, node, par
 from rtshcua.model.ir.expression import Quantity, Value
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.scenarios import (
-    AfterStep,
-    AtTime,
+    AfterStepDecl,
+    AtTimeDecl,
     Begins,
     Charge,
-    Decides,
+    DecidesDecl,
     Delay,
     Ends,
     FaultCall,
-    Flies,
-    Incident,
+    FliesDecl,
+    IncidentDecl,
     Keeps,
     Lands,
-    OnCondition,
+    OnConditionDecl,
     Reacts,
     ScenarioDecl,
     Seeds,
@@ -35,11 +35,10 @@ from rtshcua.model.ir.tests import (
     Answer,
     Asker,
     Assignment,
-    Cell,
+    CaseTable,
     Deed,
     Expectation,
     Identity,
-    InForce,
     InPhase,
     Instant,
     Issue,
@@ -48,11 +47,12 @@ from rtshcua.model.ir.tests import (
     OverTime,
     Premises,
     Quoted,
-    Request,
-    Row,
+    RequestDecl,
     Subject,
-    Table,
+    TableCell,
+    TableRow,
     TestDecl,
+    VersionInForce,
 )
 
 #: of how many people a rule may ask for an approval
@@ -72,7 +72,7 @@ FORMS: dict[str, Action] = {
     "released": part("released"),
     "issued": part("issued", node(Issue, "distance", ahead=False)),
     "issued_ahead": part("issued", node(Issue, "distance", ahead=True)),
-    "in_force": part("version", node(InForce, "version")),
+    "in_force": part("version", node(VersionInForce, "version")),
     "identified": part("identity", node(Identity, "text")),
     "reason": node(Name, "text"),
     "outcome": several,
@@ -81,13 +81,13 @@ FORMS: dict[str, Action] = {
     "start": part("start", several),
     "begins": node(Begins, "utc_us"),
     "charge": node(Charge, "name", "value"),
-    "at_time": node(AtTime, "delay"),
-    "after_step": node(AfterStep, "delay", "skill", "number"),
-    "on_condition": node(OnCondition, "delay", "condition"),
-    "incident": part("incident", node(Incident, "moment", "fault")),
+    "at_time": node(AtTimeDecl, "delay"),
+    "after_step": node(AfterStepDecl, "delay", "skill", "number"),
+    "on_condition": node(OnConditionDecl, "delay", "condition"),
+    "incident": part("incident", node(IncidentDecl, "moment", "fault")),
     "ends": part("demand", node(Ends, "endings")),
-    "flies": part("demand", node(Flies, "skill", never=False)),
-    "never": part("demand", node(Flies, "skill", never=True)),
+    "flies": part("demand", node(FliesDecl, "skill", never=False)),
+    "never": part("demand", node(FliesDecl, "skill", never=True)),
     "bound": node(Name, "text"),
     "lands": part("demand", node(Lands, "zone")),
 }
@@ -98,12 +98,12 @@ def title(reader: Reader, span: Span, raw: str) -> Quoted:
     return Quoted(span=span, text=text(reader, span, raw))
 
 
-def cell(reader: Reader, span: Span, value: Value | str, measured: Quantity | None) -> Cell:
+def cell(reader: Reader, span: Span, value: Value | str, measured: Quantity | None) -> TableCell:
     """`20 %`, `unknown`, `fix_3d measured 3 s ago`."""
-    return Cell(span=span, value=None if isinstance(value, str) else value, measured=measured)
+    return TableCell(span=span, value=None if isinstance(value, str) else value, measured=measured)
 
 
-def assignment(reader: Reader, span: Span, subject: Name | OverTime, cell: Cell) -> Assignment:
+def assignment(reader: Reader, span: Span, subject: Name | OverTime, cell: TableCell) -> Assignment:
     """`battery = 20 %`."""
     return Assignment(span=span, subject=_subject(subject), cell=cell)
 
@@ -129,7 +129,7 @@ def asked(
     """`when inspect_area(area = bridge_a, altitude = 20 m) by operator through agent`."""
     said = [name.span for name in (role, source) if name is not None]
     asker = Asker(span=said[0].to(said[-1]), role=role, source=source) if said else None
-    return Part("when", span, Request(span=span, skill=skill, arguments=arguments or (), asker=asker))
+    return Part("when", span, RequestDecl(span=span, skill=skill, arguments=arguments or (), asker=asker))
 
 
 def expectation(
@@ -145,15 +145,15 @@ def columns(reader: Reader, span: Span, *subjects: Name | OverTime) -> tuple[Sub
     return tuple(map(_subject, subjects))
 
 
-def row(reader: Reader, span: Span, *parts: Any) -> Row:
+def row(reader: Reader, span: Span, *parts: Any) -> TableRow:
     """`20 %, 3 m/s expect allow`."""
     *cells, expectation = parts
-    return Row(span=span, cells=tuple(cells), expectation=expectation.value)
+    return TableRow(span=span, cells=tuple(cells), expectation=expectation.value)
 
 
-def rows(reader: Reader, span: Span, columns: tuple[Subject, ...], *rows: Row) -> Part:
+def rows(reader: Reader, span: Span, columns: tuple[Subject, ...], *rows: TableRow) -> Part:
     """`table battery, wind.speed { ... }`."""
-    return Part("table", span, Table(span=span, columns=columns, rows=rows))
+    return Part("table", span, CaseTable(span=span, columns=columns, rows=rows))
 
 
 def nominal(reader: Reader, span: Span, name: Name, *given: Part) -> None:
@@ -250,7 +250,7 @@ def delay(reader: Reader, span: Span, low: Quantity, high: Quantity | None) -> D
 
 def demand(reader: Reader, span: Span, decision: Part) -> Part:
     """`expect fallback return_home because state/violated`."""
-    return Part("demand", span, Decides(span=span, decision=decision.value))
+    return Part("demand", span, DecidesDecl(span=span, decision=decision.value))
 
 
 def reaction(reader: Reader, span: Span, operator: Name, most: Quantity) -> Part:

@@ -10,35 +10,35 @@ from rtshcua.ground.report.prose.zones_and_vehicle import utc
 from rtshcua.model.decision import Decision
 from rtshcua.model.ir.expression import Quantity, Reference
 from rtshcua.model.ir.scenarios import (
-    AfterStep,
-    AtTime,
+    AfterStepDecl,
+    AtTimeDecl,
     Begins,
     Charge,
-    Decides,
+    DecidesDecl,
     Delay,
     Demand,
     Ends,
     FaultCall,
-    Flies,
-    Incident,
+    FliesDecl,
+    IncidentDecl,
     Keeps,
     Lands,
-    OnCondition,
+    OnConditionDecl,
     Reacts,
     ScenarioDecl,
 )
 from rtshcua.model.ir.tests import (
     Answer,
     Asker,
-    Cell,
     Expectation,
     InPhase,
     Instant,
     Named,
     NominalDecl,
     Premises,
-    Request,
+    RequestDecl,
     Subject,
+    TableCell,
 )
 from rtshcua.model.outcome import Outcome
 
@@ -84,7 +84,7 @@ def describe_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
     yield from describe_premises(nominal.premises, names)
 
 
-def describe_given(subject: Subject, cell: Cell, names: Vocabulary) -> str:
+def describe_given(subject: Subject, cell: TableCell, names: Vocabulary) -> str:
     """What is given of a signal, a parameter, or a condition over time: `battery` is 20 %."""
     words = _cell(cell, names)
     if isinstance(subject, Named):
@@ -93,7 +93,7 @@ def describe_given(subject: Subject, cell: Cell, names: Vocabulary) -> str:
     return f"it is {words} that {describe_condition(subject.condition, names)}"
 
 
-def _cell(cell: Cell, names: Vocabulary) -> str:
+def _cell(cell: TableCell, names: Vocabulary) -> str:
     if cell.value is None:
         words = "not known"
     elif isinstance(cell.value, Quantity) and cell.value.datum is None:
@@ -131,7 +131,7 @@ def describe_asker(asker: Asker) -> str:
     return f"asked {' '.join(part for part in (f'by {role}' if role else '', source) if part)}"
 
 
-def describe_request(request: Request | None, names: Vocabulary) -> str:
+def describe_request(request: RequestDecl | None, names: Vocabulary) -> str:
     """What is asked for, and by whom."""
     if request is None:
         return ""
@@ -193,15 +193,15 @@ def _fault(fault: FaultCall, names: Vocabulary) -> str:
     return name(fault.name.text) + (f" with {listed(given)}" if given else "")
 
 
-def _incident(incident: Incident, names: Vocabulary) -> str:
+def _incident(incident: IncidentDecl, names: Vocabulary) -> str:
     moment = incident.moment
     match moment:
-        case AtTime():
+        case AtTimeDecl():
             when = f"{_delay(moment.delay)} after the start"
-        case AfterStep():
+        case AfterStepDecl():
             which = "" if moment.number is None else f" number {quantity(moment.number)}"
             when = f"{_later(moment.delay)}the step {name(moment.skill.text)}{which} was sent"
-        case OnCondition():
+        case OnConditionDecl():
             when = f"{_later(moment.delay)}for the first time {describe_condition(moment.condition, names)}"
         case _:
             assert_never(moment)
@@ -219,11 +219,11 @@ def _delay(delay: Delay) -> str:
 
 def _demand(demand: Demand) -> str:
     match demand:
-        case Decides():
+        case DecidesDecl():
             return f"of some decision: {describe_expectation(demand.decision)}"
         case Ends():
             return f"it ends {' or '.join(name(each.text) for each in demand.endings)}"
-        case Flies():
+        case FliesDecl():
             return f"{name(demand.skill.text)} {'never flies' if demand.never else 'flies'}"
         case Reacts():
             return f"a breach is answered within {quantity(demand.most)}"

@@ -8,9 +8,9 @@ from rtshcua.ground.report.prose.condition_phrases import describe_condition
 from rtshcua.ground.report.prose.phrases import Vocabulary, between, describe_value, listed, name, named, sentence
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.ir.node import Name, Node
-from rtshcua.model.ir.policies import Airspace, Delegation, Rule, Use
-from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SignalSource
-from rtshcua.model.ir.skills import ArgumentValue, Clause, LinkDecl, Motion, Parameter, SkillDecl
+from rtshcua.model.ir.policies import AirspaceDecl, Delegation, RuleDecl, Use
+from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SourceDecl
+from rtshcua.model.ir.skills import ArgumentValue, ClauseDecl, LinkDecl, MotionDecl, ParameterDecl, SkillDecl
 from rtshcua.model.quantity import Dimension, display
 
 _TYPES: Final = {
@@ -61,7 +61,7 @@ _DURABLE: Final = {
 }
 
 
-def describe_motion(motion: Motion | None) -> str:
+def describe_motion(motion: MotionDecl | None) -> str:
     """Where a skill takes the vehicle."""
     if motion is None:
         return "It does not say where it takes the vehicle."
@@ -104,7 +104,7 @@ def _given(parameter: object) -> str:
     return f"the {name(text)} asked for" if text else "a place"
 
 
-def describe_parameter(parameter: Parameter, names: Vocabulary) -> tuple[str, str, str]:
+def describe_parameter(parameter: ParameterDecl, names: Vocabulary) -> tuple[str, str, str]:
     """What may be asked of a parameter, its limits, and what holds where nothing is said."""
     kind = parameter.type.text
     what = "a choice" if parameter.choices else _TYPES.get(kind, f"a value of {name(kind)}")
@@ -142,13 +142,13 @@ def describe_record(skill: SkillDecl) -> str:
     return "; ".join([words, *durable]) + "."
 
 
-def describe_clause(clause: Clause, names: Vocabulary) -> str:
+def describe_clause(clause: ClauseDecl, names: Vocabulary) -> str:
     """One condition of a contract."""
     words = describe_condition(clause.condition, names)
     return f"{words} (where the vehicle has the sensors for it)" if clause.where_fitted else words
 
 
-def describe_left_out(part: str, clause: Clause, names: Vocabulary) -> str:
+def describe_left_out(part: str, clause: ClauseDecl, names: Vocabulary) -> str:
     """A condition that does not count for the vehicle, and when it would count for another."""
     return f"{describe_condition(clause.condition, names)} ({_PARTS[part]})"
 
@@ -192,7 +192,7 @@ def describe_sources(signal: SignalDecl) -> str:
     return words if len(signal.sources) == 1 else f"{words}, whichever is newer"
 
 
-def _source(source: SignalSource) -> str:
+def _source(source: SourceDecl) -> str:
     where = listed([f"{name(each.field.text)} is {name(each.value.text)}" for each in source.where])
     words = f"{name(source.message.text)} field {listed([name(field.text) for field in source.fields])}"
     return f"{words}, where {where}" if where else words
@@ -222,7 +222,7 @@ SOURCES: Final = {
 }
 
 
-def sources_of(rule: Rule) -> tuple[str, ...]:
+def sources_of(rule: RuleDecl) -> tuple[str, ...]:
     """The sources that a rule is about: those written, or what leaving them out means."""
     if rule.through:
         return tuple(source.text for source in rule.through)
@@ -237,7 +237,7 @@ def through(sources: Sequence[str]) -> str:
     return listed([SOURCES.get(source, name(source)) for source in sources], "or")
 
 
-def describe_rule(rule: Rule, names: Vocabulary) -> str:
+def describe_rule(rule: RuleDecl, names: Vocabulary) -> str:
     """A rule as a sentence of its own; one that a template or a delegation brought about says so."""
     words = _rule(rule, names)
     if rule.where_fitted:
@@ -247,7 +247,7 @@ def describe_rule(rule: Rule, names: Vocabulary) -> str:
     return sentence(words)
 
 
-def _rule(rule: Rule, names: Vocabulary) -> str:
+def _rule(rule: RuleDecl, names: Vocabulary) -> str:
     skills = skills_of(rule.skills)
     when = "" if rule.when is None else f", if {describe_condition(rule.when, names)}"
     match rule.kind:
@@ -265,7 +265,7 @@ def _rule(rule: Rule, names: Vocabulary) -> str:
             return f"{instead} is flown instead of {_replaced(rule)}{when}"
 
 
-def approver(rule: Rule) -> str:
+def approver(rule: RuleDecl) -> str:
     """Who confirms, and how long is waited."""
     who = "somebody" if rule.approver is None else f"a person of the role {name(rule.approver.text)}"
     if rule.another is not None:
@@ -280,7 +280,7 @@ def skills_of(skills: Sequence[Name]) -> str:
     return named(_texts(skills), "or") if skills else "any skill"
 
 
-def _replaced(rule: Rule) -> str:
+def _replaced(rule: RuleDecl) -> str:
     """The skills that a `degrade` is about: never what it flies itself (`decision/prepare.py`)."""
     target = "" if rule.target is None else rule.target.skill.text
     left = [skill for skill in rule.skills if skill.text != target]
@@ -289,7 +289,7 @@ def _replaced(rule: Rule) -> str:
     return skills_of(left) if left else "nothing else"
 
 
-def describe_airspace(airspace: Airspace | None) -> str:
+def describe_airspace(airspace: AirspaceDecl | None) -> str:
     """Where the vehicle may be at all."""
     if airspace is None:
         return describe_limits((), ())

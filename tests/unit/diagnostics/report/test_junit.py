@@ -12,7 +12,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.diagnostics.report.junit import Outcome, Suite, junit, suites
+from rtshcua.diagnostics.report.junit import CaseOutcome, Suite, junit, suites
 from rtshcua.diagnostics.span import Source, Span
 
 
@@ -30,10 +30,10 @@ def read(*given: Suite) -> ElementTree.Element:
 
 
 CASES = (
-    Outcome("passes", "a.rts", 3, time_us=1_249_001),
-    Outcome("fails", "a.rts", 9, failure="asked for allow\nwas deny", kind="state/violated", output="trace"),
-    Outcome("cannot run", "a.rts", failure="no nominal", broken=True),
-    Outcome("is left out", "a.rts", skipped="not asked for"),
+    CaseOutcome("passes", "a.rts", 3, time_us=1_249_001),
+    CaseOutcome("fails", "a.rts", 9, failure="asked for allow\nwas deny", kind="state/violated", output="trace"),
+    CaseOutcome("cannot run", "a.rts", failure="no nominal", broken=True),
+    CaseOutcome("is left out", "a.rts", skipped="not asked for"),
 )
 
 
@@ -90,7 +90,7 @@ anything = st.text(max_size=20) | st.text("<>&'\"]\r\n\t\0\x1b\ufffe\ud800\U0010
 
 @given(anything, anything, anything, anything, anything)
 def test_hostile_text_is_read_back_as_it_is_shown(name: str, file: str, why: str, kind: str, output: str) -> None:
-    cases = (Outcome(name, file, 1, failure=why, kind=kind, output=output), Outcome(name, file, skipped=why))
+    cases = (CaseOutcome(name, file, 1, failure=why, kind=kind, output=output), CaseOutcome(name, file, skipped=why))
     failed, skipped = read(Suite(name, cases, ((kind, why),)))[0].iter("testcase")
     assert failed.get("name") == visible(name)
     expected = "\n".join(map(visible, why.split("\n")))

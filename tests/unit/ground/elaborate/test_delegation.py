@@ -20,7 +20,7 @@ from rtshcua.mavlink import dialect
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.expression import Comparison, Condition, Junction, Quantity
 from rtshcua.model.ir.node import Name
-from rtshcua.model.ir.policies import Rule
+from rtshcua.model.ir.policies import RuleDecl
 
 Compile = Callable[..., Compiled]
 Check = Callable[[str], Checked]
@@ -118,7 +118,7 @@ def holds(when: Condition | None, height: int) -> bool:
 class Said:
     """What an elaborated rule says."""
 
-    def __init__(self, rule: Rule) -> None:
+    def __init__(self, rule: RuleDecl) -> None:
         self.kind, self.roles, self.skills = rule.kind, names_of(rule.roles), names_of(rule.skills) or {*SKILLS}
         self.sources = names_of(rule.through) or ({"operator"} if rule.kind == "permit" else {*SOURCES})
         self.heights = {height for height in HEIGHTS if holds(rule.when, height)}

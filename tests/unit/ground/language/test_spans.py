@@ -20,7 +20,7 @@ from rtshcua.model.ir.expression import (
 from rtshcua.model.ir.missions import Overrides, Repeat, Step
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import Circle, Combination, Corridor, Daily, Dates, GeoJson, Polygon
-from rtshcua.model.ir.policies import Delegation, Rule, Use
+from rtshcua.model.ir.policies import Delegation, RuleDecl, Use
 from virtual.rows import rows
 
 SHIPPED = sorted(path for folder in ("skills", "policies", "missions") for path in
@@ -133,7 +133,7 @@ def test_spans(text: str) -> None:
                 Source("again", f"mission m under p@1 on v {{ phase a {{ x() {written} }} }}")
             ).unit.missions[0]
             assert same(mission.phases[0].items[0].overrides, node)
-        elif isinstance(node, Rule | Use | Delegation):
+        elif isinstance(node, RuleDecl | Use | Delegation):
             policy = parse(Source("again", f"policy p version 1 {{ {written} }}")).unit.policies[0]
             assert same((*policy.rules, *policy.uses, *policy.delegations)[0], node)
     assert count > 5

@@ -43,7 +43,7 @@ from rtshcua.ground.report.reported_policy import within
 from rtshcua.model.ir.expression import Condition
 from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.places import ZoneDecl
-from rtshcua.model.ir.policies import PolicyDecl, Rule
+from rtshcua.model.ir.policies import PolicyDecl, RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 from virtual.rows import rows
 
@@ -211,7 +211,7 @@ def changed(node: Any) -> Iterator[tuple[str, Any]]:
         if (
             name not in type(node).__struct_fields__
             or name == "span"
-            or (name == "kind" and not isinstance(node, Rule))
+            or (name == "kind" and not isinstance(node, RuleDecl))
         ):
             continue
         for where, other in others(getattr(node, name), annotation):
@@ -249,12 +249,12 @@ def test_whatever_is_changed_in_a_declaration_changes_what_is_told_of_it(everyth
             before = tell(node)
             for where, other in changed(node):
                 unsigned = where.startswith("SkillDecl.sizes[") and (
-                    "Parameter.range" in where or "Parameter.type" in where
+                    "ParameterDecl.range" in where or "ParameterDecl.type" in where
                 )
                 if (
                     unsigned
                     or where.startswith("EnumDecl.dialect")
-                    or where.endswith("[2] > Parameter.type > Name.text")
+                    or where.endswith("[2] > ParameterDecl.type > Name.text")
                 ):
                     continue
                 tried += 1

@@ -28,7 +28,7 @@ from rtshcua.ground.report.report_model import PolicyReport
 from rtshcua.ground.report.reported_policy import ReportedPolicy
 from rtshcua.model.ir.expression import Condition, ForLast, Junction, Not
 from rtshcua.model.ir.places import Combination, Shape
-from rtshcua.model.ir.policies import PolicyDecl, Rule
+from rtshcua.model.ir.policies import PolicyDecl, RuleDecl
 from rtshcua.model.ir.program import Unit
 
 NAMES = Vocabulary(
@@ -251,7 +251,7 @@ def test_every_place_of_the_page_tells_conditions_apart(
     wanted = list(conditions(40))
     kinds = ["permit goto by role operator when {}", "forbid goto by role operator when {}"]
     kinds += ["confirm goto when {} by role chief within 30 s", "degrade goto when {} to hover"]
-    rules: tuple[Rule, ...] = policy(*(kind.format(text) for kind in kinds for text in wanted)).rules
+    rules: tuple[RuleDecl, ...] = policy(*(kind.format(text) for kind in kinds for text in wanted)).rules
     base = structs.replace(lowered.policy.rules[0], skills=(lowered.skills["goto"],))
     signed = structs.replace(lowered.policy, rules=(base,) * len(rules))
     subject = ReportedPolicy(program, replace(lowered, policy=signed, rules=rules))

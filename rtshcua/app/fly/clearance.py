@@ -76,7 +76,7 @@ def clear_for_flight(
         _not_obeyed(context, begun, vehicle, connected.events) if resumed else bundle_lapsed(context, begun)
     ) or (timestamps_lost(signing, resumed=resumed) or revoked_link_key(signing, begun.trusted.root, resumed=resumed))
     if problem is None and not resumed:
-        problem = _missing(begun)
+        problem = begun.boundary_refusal() or (begun.own_key if isinstance(begun.own_key, Refusal) else None)
     if problem is not None:
         return problem
     own_key = None if isinstance(begun.own_key, Refusal) else begun.own_key
@@ -186,10 +186,3 @@ def _not_obeyed(context: FlightContext, begun: Begun, vehicle: ConnectedVehicle,
     text = f"`{loaded.vehicle}` is in the air and answers nothing that is not signed; the boundary at `{listens}` has "
     help = "begin this run again once the boundary serves, as systemd does; until then the pilot brings it down, or its"
     return Refusal("not-obeyed", f"{text}the key: {why}", f"{help} own failsafe for a lost link", ExitCode.REFUSED)
-
-
-def _missing(begun: Begun) -> Refusal | None:
-    """What is in the air comes down without. Raises OSError."""
-    if isinstance(begun.absent, OSError):
-        raise begun.absent
-    return begun.absent or (begun.own_key if isinstance(begun.own_key, Refusal) else None)

@@ -316,6 +316,12 @@ class Begun(NamedTuple):
     transport: Transport | None = None
     agents: Agents | None = None
 
+    def boundary_refusal(self) -> Refusal | None:
+        """Why the boundary is absent, with which nothing new flies. Raises OSError where that is why."""
+        if isinstance(self.absent, OSError):
+            raise self.absent
+        return self.absent
+
     @property
     def why_absent(self) -> str:
         """Why the boundary is absent, in words; empty where it is not."""

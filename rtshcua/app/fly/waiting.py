@@ -273,12 +273,9 @@ def _wait(
         return aloft
     if aloft is not None:
         return _bring_down(context, begun, aloft, agents)
-    if trusted.distrust is not None:  # what it is not enough for is to fly anything new
-        return trusted.distrust
-    if isinstance(begun.absent, OSError):
-        raise begun.absent
-    if begun.absent is not None:
-        return begun.absent
+    refusal = trusted.distrust or begun.boundary_refusal()  # what that is not enough for is to fly anything new
+    if refusal is not None:
+        return refusal
     notes = list(signing.notes)
     if request.link is not None:
         record = record_of(base.vehicle, trusted.root, context.clock.now().utc_us, request.data)

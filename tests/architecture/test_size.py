@@ -13,8 +13,8 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 HELD = {
     "modules": 718,
     "code lines": 84_327,
-    "shared class names": 35,
-    "of them across packages": 21,
+    "shared class names": 14,
+    "of them across packages": 12,
     "shared file names": 69,
     "import cycles": 0,
     "modules below 80 lines with one importer": 15,

@@ -34,7 +34,7 @@ class CompileRequest(NamedTuple):
     values: Sequence[str] = ()
 
 
-class Compilation(NamedTuple):
+class CompileResult(NamedTuple):
     """What came of compiling, its findings as whoever wrote the sources should read them, the sources, and where the
     bundle goes.
     """
@@ -64,7 +64,7 @@ def claimed_pins(proposer: str | None, role: str | None, policy: str | None) -> 
     return Pins(proposer, role, frozenset({name}) if name else None, int(version) if numbered else None)
 
 
-def compile_mission(request: CompileRequest) -> Compilation | Refusal:
+def compile_mission(request: CompileRequest) -> CompileResult | Refusal:
     """Compile a mission; what cannot be begun with, or claims what nothing declares, is refused."""
     given = [request.source, *request.further]
     refused = no_source(request.source)
@@ -78,7 +78,7 @@ def compile_mission(request: CompileRequest) -> Compilation | Refusal:
         given, mission=request.mission, issued_at_us=request.issued_at_us, values=request.values, pins=request.pins
     )
     unknown = undeclared(request.pins, compiled.declared, compiled.diagnostics)
-    return unknown or Compilation(compiled, meant(compiled.diagnostics, sources, given), sources, target)
+    return unknown or CompileResult(compiled, meant(compiled.diagnostics, sources, given), sources, target)
 
 
 def sign_bundle(

@@ -7,7 +7,7 @@ from rtshcua.decision.values import ABSENT, FALSE, PRESENT, TRUE, UNKNOWN, Truth
 from rtshcua.decision.volume import Volume
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, Parameter
 from rtshcua.model.flat.limits import FULL
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 from rtshcua.model.flat.zone import MAX_COORDINATE
 
 
@@ -33,7 +33,7 @@ def first_cell(contract: Contract, kind: int) -> int:
     return next(parameter.cell for parameter in contract.parameters if parameter.kind == kind)
 
 
-def longest(contract: Contract, vehicle: Vehicle, limit_us: int = 0) -> int:
+def longest(contract: Contract, vehicle: VehicleLimits, limit_us: int = 0) -> int:
     """A link's own limit, else what its skill's contract allows, else as long as anything can fly, in us."""
     return limit_us or contract.duration_us or vehicle.endurance_us
 
@@ -64,7 +64,7 @@ class Energy:
 
     __slots__ = ("_asked", "_fixed", "_vehicle", "stays")
 
-    def __init__(self, contract: Contract, vehicle: Vehicle, asked: int = 0) -> None:
+    def __init__(self, contract: Contract, vehicle: VehicleLimits, asked: int = 0) -> None:
         self.stays = contract.motion.kind not in (MotionKind.HOME, MotionKind.LAND)
         self._fixed = contract.energy + (vehicle.reserve if self.stays else 0)
         self._vehicle, self._asked = vehicle, asked

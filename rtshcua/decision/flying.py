@@ -12,7 +12,7 @@ The constants are what recorded flights took beyond that (PX4 1.16, ArduCopter 4
 from math import isqrt
 
 from rtshcua.model.flat.limits import FULL
-from rtshcua.model.flat.policy import Speeds, Vehicle
+from rtshcua.model.flat.policy import Speeds, VehicleLimits
 
 SECOND = 1_000_000  # us
 MINUTE = 60 * SECOND
@@ -63,7 +63,7 @@ def landing_us(speeds: Speeds, height: int) -> int:
     return sinking_us(speeds, height - slow) + _over(slow * SECOND, speeds.landing) + LANDED
 
 
-def home_us(vehicle: Vehicle, speeds: Speeds, distance: int, heights: tuple[int, int], asked: int = 0) -> int:
+def home_us(vehicle: VehicleLimits, speeds: Speeds, distance: int, heights: tuple[int, int], asked: int = 0) -> int:
     """Home from anywhere within a distance of where it is declared and between two heights, and down there.
 
     An autopilot may go on with a speed that this step or one before it asked for (PX4: DO_CHANGE_SPEED outlives the

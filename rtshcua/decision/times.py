@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from rtshcua.decision.values import AND, FALSE, TRUE, UNKNOWN, Span, Truth
 from rtshcua.model.flat.limits import DAY, WEEK
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 from rtshcua.model.flat.zone import Zone
 
 #: 1970 began on a Thursday; weeks begin with Monday
@@ -24,7 +24,8 @@ _MONDAY = 3 * DAY
 class LocalTime:
     """What a clock on the wall shows: UTC and an offset, which is the same at all times, or changes at some moments.
 
-    With `offsets` (`Vehicle` says what they are) nothing is known before the first of their moments, nor from the last
+    With `offsets` (`VehicleLimits` says what they are) nothing is known before the first of their moments,
+    nor from the last
     of them on.
     """
 
@@ -81,7 +82,7 @@ def time_of_week(local: int) -> int:
     return (local + _MONDAY) % WEEK
 
 
-def local_time(vehicle: Vehicle) -> LocalTime:
+def local_time(vehicle: VehicleLimits) -> LocalTime:
     """The local time of a vehicle."""
     return LocalTime(vehicle.utc_offset_us, vehicle.offsets)
 

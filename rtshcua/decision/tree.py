@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 from rtshcua.model.flat.code import MAX_INSTRUCTIONS, MAX_STACK, Clause, Op
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract
 from rtshcua.model.flat.limits import DAY, MAX_MAGNITUDE, MAX_VALUE, WEEK
-from rtshcua.model.flat.policy import Monitor, Policy, Vehicle
+from rtshcua.model.flat.policy import Monitor, Policy, VehicleLimits
 from rtshcua.model.flat.signal import ENUMERATION, POSITION
 
 
@@ -375,7 +375,9 @@ def _unused(*operands: int) -> str | None:
     return "an unused operand is not 0" if any(operands) else None
 
 
-def slots_read(clauses: Iterable[Clause], vehicle: Vehicle, monitors: tuple[Monitor, ...] = ()) -> tuple[int, ...]:
+def slots_read(
+    clauses: Iterable[Clause], vehicle: VehicleLimits, monitors: tuple[Monitor, ...] = ()
+) -> tuple[int, ...]:
     """The slots that well-formed clauses read, themselves or through the policy's temporal monitors, ascending; asking
     where the vehicle is reads its position and height.
     """
@@ -414,7 +416,7 @@ def monitored(clauses: Iterable[Clause]) -> bool:
     return any(Op.MONITOR in clause.code[::3] for clause in clauses)
 
 
-def where(vehicle: Vehicle) -> tuple[int, ...]:
+def where(vehicle: VehicleLimits) -> tuple[int, ...]:
     """The slots that tell where the vehicle is, as far as it has them."""
     position = () if vehicle.position == -1 else (vehicle.position, vehicle.position + 1)
     return position if vehicle.height == -1 else (*position, vehicle.height)

@@ -18,7 +18,7 @@ from rtshcua.decision.outline import Box
 from rtshcua.decision.values import MISSING, Span, Value
 from rtshcua.decision.zones import NOWHERE, Part, PlaceSet, Sweep, WellKnown
 from rtshcua.model.flat.contract import Motion, MotionKind
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 
 HOME = (0, 0)  # the origin of local coordinates
 #: so much below the height that it returns at, mm, a vehicle sets off for home: ArduCopter takes a corner within
@@ -121,7 +121,7 @@ def across(low: int, returns: int, *, near: bool) -> int:
     return low if near or not returns else max(low, returns - SHORT)
 
 
-def near_home(vehicle: Vehicle) -> int:
+def near_home(vehicle: VehicleLimits) -> int:
     """From how far, mm, a return may be flown lower than the vehicle's return altitude: wherever home really is, and
     as far as the position may be wrong.
     """
@@ -133,7 +133,7 @@ def cone(returns: int) -> int:
     return max(NEAR, -(-returns // STEEP))
 
 
-def flown_at(motion: Motion, altitude: int, vehicle: Vehicle) -> int | None:
+def flown_at(motion: Motion, altitude: int, vehicle: VehicleLimits) -> int | None:
     """The `altitude` of a planner: what the step says, what a return climbs to, or None."""
     if motion.kind == MotionKind.HOME:
         return vehicle.return_altitude

@@ -23,7 +23,7 @@ from rtshcua.decision.values import UNKNOWN
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
-from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle
+from rtshcua.model.flat.policy import Policy, RuleKind, VehicleLimits
 from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
@@ -86,7 +86,7 @@ def _flies(decision: Decision, comes: Container[Reason]) -> bool:
     return decision.outcome is Outcome.ALLOW or (decision.outcome is Outcome.DEFER and decision.reason in comes)
 
 
-def flown(state: State, plan: Plan, vehicle: Vehicle) -> State:
+def flown(state: State, plan: Plan, vehicle: VehicleLimits) -> State:
     """The state with position and height where a plan ends, fresh; what was never reported stays unknown."""
     there: dict[int, int] = {}
     match plan.kind:
@@ -104,7 +104,7 @@ def flown(state: State, plan: Plan, vehicle: Vehicle) -> State:
     return State(values, ages, state.monitors)
 
 
-def _at(vehicle: Vehicle, x: int, y: int, height: int) -> dict[int, int]:
+def _at(vehicle: VehicleLimits, x: int, y: int, height: int) -> dict[int, int]:
     east = vehicle.position
     return {east: x, east + 1: y, vehicle.height: height} if east >= 0 else {vehicle.height: height}
 

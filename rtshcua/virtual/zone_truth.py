@@ -7,7 +7,7 @@ from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 from rtshcua.model.flat.limits import DAY, WEEK
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.policy import Policy, VehicleLimits
 from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
 
 #: True, False, or None where the local time is not known: those that are the answer at some moment
@@ -111,7 +111,7 @@ def is_timed(zone: Zone) -> bool:
     return bool(zone.daily or zone.weekly or zone.dates)
 
 
-def exists(zone: Zone, vehicle: Vehicle, first_us: int, last_us: int) -> Answers:
+def exists(zone: Zone, vehicle: VehicleLimits, first_us: int, last_us: int) -> Answers:
     """Whether a zone exists at the moments between two of UTC, both included."""
     found: Answers = frozenset({True})
     if zone.dates:
@@ -137,7 +137,7 @@ def daily(start: int, end: int) -> tuple[int, ...]:
     return (start, after) if start < after else (0, after, start, DAY) if after < start else (0, DAY)
 
 
-def shown(windows: Sequence[int], period: int, vehicle: Vehicle, first_us: int, last_us: int) -> Answers:
+def shown(windows: Sequence[int], period: int, vehicle: VehicleLimits, first_us: int, last_us: int) -> Answers:
     """Whether a clock on the wall shows a time in one of some windows of the day or the week, at the moments between
     two of UTC; None: nobody knows what it shows.
     """
@@ -153,7 +153,7 @@ def shown(windows: Sequence[int], period: int, vehicle: Vehicle, first_us: int, 
 _MONDAY = 3 * DAY  # 1970 began on a Thursday
 
 
-def _shows(windows: Sequence[int], period: int, vehicle: Vehicle, utc_us: int) -> bool | None:
+def _shows(windows: Sequence[int], period: int, vehicle: VehicleLimits, utc_us: int) -> bool | None:
     offset = _offset(vehicle, utc_us)
     if offset is None:
         return None
@@ -161,7 +161,7 @@ def _shows(windows: Sequence[int], period: int, vehicle: Vehicle, utc_us: int) -
     return any(start <= time < end for start, end in zip(windows[::2], windows[1::2], strict=True))
 
 
-def _offset(vehicle: Vehicle, utc_us: int) -> int | None:
+def _offset(vehicle: VehicleLimits, utc_us: int) -> int | None:
     """How far the local time is from UTC; None: that is not known."""
     if not vehicle.offsets:
         return vehicle.utc_offset_us

@@ -12,14 +12,14 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
     "modules": 718,
-    "code lines": 84_327,
-    "shared class names": 14,
-    "of them across packages": 12,
+    "code lines": 84_413,
+    "shared class names": 0,
+    "of them across packages": 0,
     "shared file names": 69,
     "import cycles": 0,
     "modules below 80 lines with one importer": 15,
     "functions of more than 60 lines": 18,
-    "functions of a complexity over 15": 132,
+    "functions of a complexity over 15": 131,
     "functions of a complexity over 25": 5,
 }
 

@@ -17,7 +17,7 @@ from rtshcua.adapters.store.source_access import checkout_of, expect_inside
 from rtshcua.adapters.store.witness import logs_in
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.lsp.session import Session
+from rtshcua.front.lsp.session import EditorSession
 
 SECRET = "TOKEN=hunter2 {"
 
@@ -190,7 +190,7 @@ def test_settings_bring_no_source_from_outside(here: Path, name: str, capsys: py
 @pytest.mark.parametrize("workspace", [True, False])
 def test_the_language_server_stays_in_the_workspace(here: Path, workspace: bool) -> None:
     told: list[lsp.PublishDiagnosticsParams] = []
-    session = Session(str(library.root()), told.append)
+    session = EditorSession(str(library.root()), told.append)
     if workspace:
         session.look_in([str(here)])
     (here / "good.rts").write_text("\n")

@@ -16,7 +16,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.showing.log import show_log
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.calls import is_own
@@ -45,7 +45,7 @@ def test_a_clause_that_borrows_the_policys_words_is_not_loaded(text: str) -> Non
 def test_what_refused_a_step_in_the_missions_own_words_is_told_so() -> None:
     run = Run(loaded(POLICY, held_to("wind.speed < 9 m/s"))).until_over()
     assert_audited(run)
-    page = Page(bold=False)
+    page = TextPage(bold=False)
     show_log(page, run.lines)
     (why,) = {line.split("because ")[1] for line in str(page).splitlines() if "because" in line}
     assert why.startswith("`wind.speed < 9 m/s`, in the mission's own words")

@@ -11,7 +11,7 @@ from reference.low_source import low_source
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.vehicle_records import opened_root
-from rtshcua.app.fly.story import Plan
+from rtshcua.app.fly.story import FlightPlanView
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.excerpt import visible
@@ -189,8 +189,8 @@ def test_a_program_is_told_a_name_as_it_is(low: Path, capsys: pytest.CaptureFixt
 
 
 def test_the_header_of_a_run_is_one_harmless_line() -> None:
-    fields = dict.fromkeys(Plan.__struct_fields__, ESCAPES)
-    (line,) = plain(Plan(**fields))  # type: ignore[arg-type]
+    fields = dict.fromkeys(FlightPlanView.__struct_fields__, ESCAPES)
+    (line,) = plain(FlightPlanView(**fields))  # type: ignore[arg-type]
     assert harmless(line)
     assert "\n" not in line
 

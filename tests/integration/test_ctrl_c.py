@@ -131,4 +131,4 @@ def test_the_door_imports_nothing_of_ours_before_it_is_open() -> None:
         "print([name for name in sys.modules if name.startswith('rtshcua.')])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "['rtshcua.front.cli', 'rtshcua.front.cli.entry_point']"
+    assert done.stdout.strip() == "['rtshcua.front', 'rtshcua.front.cli', 'rtshcua.front.cli.entry_point']"

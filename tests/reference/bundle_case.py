@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from rtshcua.model.flat.contract import Contract, Motion, MotionKind, SourceKind, TimingClass
 from rtshcua.model.flat.mission import Invocation, Mission, Plan
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.policy import Policy, VehicleLimits
 from rtshcua.model.flat.zone import Projection
 from rtshcua.wire import bundle
 from rtshcua.wire.binding import bind
@@ -22,7 +22,7 @@ HOVER = Contract(
     "hover", (), Motion(MotionKind.HOLD, -1, -1), TimingClass.TACTICAL, 2_000_000, HOUR, (), 60_000_000, 500_000,
     (), (), (), (), 100, ("decision",), (),
 )  # fmt: skip
-AIRCRAFT = Vehicle("quad", "quad-07", 50_000, 12_000, 3_000, 3_000, 18 * 60_000_000, 1_500, 0, -1, -1, -1)
+AIRCRAFT = VehicleLimits("quad", "quad-07", 50_000, 12_000, 3_000, 3_000, 18 * 60_000_000, 1_500, 0, -1, -1, -1)
 THE_POLICY = Policy(
     "field", 7, AIRCRAFT, Projection(473_977_400, 85_455_900, 7_000_000, 11_000_000), ("operator",), (), 0, (), 0, (),
     (), (HOVER,), (), None, (), ("field.rts",), (b"\0" * 32,),

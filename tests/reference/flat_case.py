@@ -20,7 +20,7 @@ from rtshcua.model.flat.contract import (
     TimingClass,
 )
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
-from rtshcua.model.flat.policy import Airspace, Policy, Rule, RuleKind, Vehicle
+from rtshcua.model.flat.policy import Airspace, Policy, Rule, RuleKind, VehicleLimits
 from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, Signal, SignalSource
 from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, POLYGON, Projection, Zone
@@ -249,7 +249,7 @@ RULES = (
 POLICY = Policy(
     name="bridge_inspection",
     version=7,
-    vehicle=Vehicle(
+    vehicle=VehicleLimits(
         name="quad",
         identity="quad-07",
         home_within=50 * M,

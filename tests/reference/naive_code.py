@@ -9,7 +9,7 @@ from itertools import product
 
 from reference.naive_geometry import circle_far, circle_near, in_shape, touches, widened
 from rtshcua.model.flat.code import Op
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.policy import Policy, VehicleLimits
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 DAY = 24 * 3600 * 1_000_000
@@ -225,7 +225,7 @@ def daytime(utc: int, error: int, offset: int, start: int, end: int) -> Truths:
     return U if len(looked) == 2 else T if True in looked else F
 
 
-def on_the_wall(utc: int, error: int, vehicle: Vehicle, windows: tuple[int, ...], period: int) -> Truths:
+def on_the_wall(utc: int, error: int, vehicle: VehicleLimits, windows: tuple[int, ...], period: int) -> Truths:
     """What a clock on the wall shows at both ends of what our clock allows, and wherever something changes between."""
     edges = {each % period for each in windows}
 

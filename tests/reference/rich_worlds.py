@@ -12,7 +12,7 @@ from reference.flat_case import H, M, S
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.limits import DAY, MAX_SPEED, MAX_VALUE, WEEK
 from rtshcua.model.flat.mission import Invocation, Mission
-from rtshcua.model.flat.policy import Airspace, Policy, RuleKind, Speeds, Vehicle
+from rtshcua.model.flat.policy import Airspace, Policy, RuleKind, Speeds, VehicleLimits
 from rtshcua.model.flat.signal import DRAIN
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Context, Now, State
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE, POLYGON, Zone
@@ -68,7 +68,7 @@ def offsets(of: Random, near: int) -> tuple[int, ...]:
     )
 
 
-def vehicle(of: Random, plain: Vehicle) -> Vehicle:
+def vehicle(of: Random, plain: VehicleLimits) -> VehicleLimits:
     """With speeds, a return altitude and a local time at random."""
     made = replace(
         plain,

@@ -2,7 +2,7 @@
 
 from math import cos, radians
 
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.policy import Policy, VehicleLimits
 from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, Signal, SignalSource
 from rtshcua.model.flat.zone import SHIFT, Projection, unproject
 from rtshcua.simulation.config import HOME
@@ -36,7 +36,7 @@ SIGNALS = (
     )),
 )  # fmt: skip
 
-VEHICLE = Vehicle(
+VEHICLE = VehicleLimits(
     "quad", "quad-07", 50_000, 12_000, 3_000, 3_000, 18 * 60_000_000, 2_000, 0, POSITION_X, HEIGHT, BATTERY
 )
 

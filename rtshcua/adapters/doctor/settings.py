@@ -12,7 +12,7 @@ from rtshcua.adapters.vehicle import returns
 from rtshcua.adapters.vehicle.bounds import FlightReach
 from rtshcua.adapters.vehicle.returns import Need
 from rtshcua.model.flat.limits import MAX_SPEED
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.policy import Policy, VehicleLimits
 
 
 class VehicleSetting(NamedTuple):
@@ -118,7 +118,7 @@ def _lasts(policy: Policy, _: FlightReach) -> Need | None:
     return Need(-(-(vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us) // 1_000))
 
 
-def _of(needs: Callable[[Vehicle], Need | None]) -> Callable[[Policy, FlightReach], Need | None]:
+def _of(needs: Callable[[VehicleLimits], Need | None]) -> Callable[[Policy, FlightReach], Need | None]:
     return lambda policy, _: needs(policy.vehicle)
 
 

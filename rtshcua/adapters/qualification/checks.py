@@ -26,7 +26,7 @@ from rtshcua.adapters.vehicle.streams import AT_TIMES, SLOW
 from rtshcua.adapters.vehicle.supervision import Brakes
 from rtshcua.decision.volume import SHORT, cone
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.policy import Policy, VehicleLimits
 from rtshcua.onboard.ports import Ending
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.wire.qualification import CheckOutcome, QualificationCheck
@@ -174,7 +174,7 @@ _RISES: Final = 300  # mm/s
 _KEPT_US: Final = 2_000_000
 
 
-def _speeds(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[QualificationCheck]:
+def _speeds(observed: ObservedQualification, vehicle: VehicleLimits) -> Iterator[QualificationCheck]:
     climbs = [pair for pair in _flown(observed, MotionKind.CLIMB) if len(pair[1]) > 1]
     most, least = vehicle.climb * _MORE // 100 + _NOISE, vehicle.climb * _CLIMBS // 100
     expected = f"{_speed(least)} to {_speed(most)} (the policy: at most {_speed(vehicle.climb)})"
@@ -240,7 +240,7 @@ _OFF: Final = 500
 _STRAYS: Final = 2_000
 
 
-def _stops(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[QualificationCheck]:
+def _stops(observed: ObservedQualification, vehicle: VehicleLimits) -> Iterator[QualificationCheck]:
     brakes = Brakes.of(vehicle)
     for name, motion in (("climb", MotionKind.CLIMB), ("leg", MotionKind.FLY)):
         slug = f"stop/{motion.name.lower()}"
@@ -319,7 +319,7 @@ def _across(one: MotionSample, other: MotionSample) -> int:
 _ENDS: Final = 2_000
 
 
-def _ends(observed: ObservedQualification, vehicle: Vehicle) -> Iterator[QualificationCheck]:
+def _ends(observed: ObservedQualification, vehicle: VehicleLimits) -> Iterator[QualificationCheck]:
     limit = vehicle.position_error + _ENDS
     yield _ended(
         observed,
@@ -355,7 +355,7 @@ def _ended(
     return _check(slug, down and off <= limit, expected, measured, limit, off, _MM, advice)
 
 
-def _highest(observed: ObservedQualification, vehicle: Vehicle) -> QualificationCheck:
+def _highest(observed: ObservedQualification, vehicle: VehicleLimits) -> QualificationCheck:
     slug, flown = "return/height", observed.sortie("leg")
     command = None if flown is None else next((each for each in flown.commands if each.kind == MotionKind.HOME), None)
     samples = [] if flown is None or command is None else _while(flown, command)
@@ -368,7 +368,7 @@ def _highest(observed: ObservedQualification, vehicle: Vehicle) -> Qualification
     return _check(slug, highest <= limit, expected, _metres(highest), limit, highest, _MM)
 
 
-def _lowest_across(observed: ObservedQualification, vehicle: Vehicle) -> QualificationCheck:
+def _lowest_across(observed: ObservedQualification, vehicle: VehicleLimits) -> QualificationCheck:
     """Of a return that begins outside of the cone over home: how low it is between its climb and its descent."""
     slug, flown = "return/across", observed.sortie("leg")
     expected, clear = "flies home at the declared height", vehicle.position_error + _ENDS

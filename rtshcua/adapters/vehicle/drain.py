@@ -16,7 +16,7 @@ from typing import Final
 
 from rtshcua.decision.flying import MINUTE, MOST_DRAIN, SECOND, over_ground, slower
 from rtshcua.model.flat.limits import FULL
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 
 #: What is looked back on, us, and how many changes tell something: the two stretches between three.
 WINDOW_US: Final = 60 * SECOND
@@ -151,7 +151,7 @@ class PaceMeter:
 class Consumption:
     """What flying takes of the charge of a policy's vehicle, beside what it declares. All integers."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: VehicleLimits) -> None:
         self._vehicle, self._asked = vehicle, 0
         self._drain, self._pace = DrainMeter(), PaceMeter()
         self._told = 0
@@ -209,13 +209,13 @@ class Consumption:
         )
 
 
-def drained(vehicle: Vehicle) -> int:
+def drained(vehicle: VehicleLimits) -> int:
     """What the vehicle of a policy takes of a full charge in a minute, as declared at the worst, 1/10000, rounded."""
     flight_us = vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us
     return (MINUTE * FULL + flight_us // 2) // flight_us
 
 
-def for_a_km(vehicle: Vehicle, pace: int) -> int:
+def for_a_km(vehicle: VehicleLimits, pace: int) -> int:
     """What it takes for a km over ground at a speed, mm/s, as declared at the worst, 1/10000, rounded up."""
     flight_us = vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us
     return -(-FULL * KM * SECOND // (flight_us * pace))
@@ -226,7 +226,7 @@ def percent(part: int) -> str:
     return f"{part / 100:.1f} %"
 
 
-def _pace(vehicle: Vehicle, asked: int) -> int:
+def _pace(vehicle: VehicleLimits, asked: int) -> int:
     """The speed over ground that is declared for what is flown, and no more than that of the way home, mm/s."""
     speeds = vehicle.speeds
     return vehicle.speed if speeds is None else over_ground(speeds, min(asked or speeds.cruise, speeds.homeward))

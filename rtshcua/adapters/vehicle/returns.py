@@ -10,7 +10,7 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.parameters import RETRIES, RETRY_US, VehicleParameters
 from rtshcua.decision.volume import SHORT, STEEP, cone
 from rtshcua.mavlink.quantise import quantise
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 
 _METRE: Final = 1_000  # mm
 
@@ -22,27 +22,27 @@ class Need(NamedTuple):
     most: int | None = None
 
 
-def near(vehicle: Vehicle) -> Need | None:
+def near(vehicle: VehicleLimits) -> Need | None:
     """How far from home a return may be low at most, where the height of a return is declared."""
     return Need(most=cone(vehicle.return_altitude)) if vehicle.return_altitude else None
 
 
-def slope(vehicle: Vehicle) -> Need | None:
+def slope(vehicle: VehicleLimits) -> Need | None:
     """How steep the cone is at least in which a return is low; 0 is none."""
     return Need(least=STEEP * _METRE) if vehicle.return_altitude else None
 
 
-def climb(vehicle: Vehicle) -> Need | None:
+def climb(vehicle: VehicleLimits) -> Need | None:
     """How much a return climbs at most above both its height and the vehicle's."""
     return Need(most=0) if vehicle.return_altitude else None
 
 
-def corner(vehicle: Vehicle) -> Need | None:
+def corner(vehicle: VehicleLimits) -> Need | None:
     """How far at most from where it is told to turn it turns, and so below its height sets off for home."""
     return Need(most=SHORT) if vehicle.return_altitude else None
 
 
-def plain(vehicle: Vehicle) -> Need | None:
+def plain(vehicle: VehicleLimits) -> Need | None:
     """A choice of which only 0 is proved: heights above home, a way to home, no rally points."""
     return ONLY_ZERO if vehicle.return_altitude else None
 
@@ -72,12 +72,12 @@ class ReturnLimit(NamedTuple):
 
     parameter: str
     mm: int
-    need: Callable[[Vehicle], Need | None]
+    need: Callable[[VehicleLimits], Need | None]
     may_be_off: bool = False
     words: Mapping[float, str] = {}
     proved: str = "at the height that is proved"
 
-    def wrong(self, value: float, vehicle: Vehicle) -> WrongSetting | None:
+    def wrong(self, value: float, vehicle: VehicleLimits) -> WrongSetting | None:
         """What is wrong with its value for the vehicle of a policy."""
         need = self.need(vehicle)
         return None if need is None or (self.may_be_off and value == 0) else self.misfit(value, need)
@@ -116,7 +116,7 @@ RALLY_TOTAL: Final = ReturnLimit("RALLY_TOTAL", 1, plain, words={0: "none"}, pro
 class ReturnLimits:
     """Of one vehicle, as far as its parameters tell. `limits` are groups of names of the same, of which it has one."""
 
-    def __init__(self, limits: tuple[tuple[ReturnLimit, ...], ...], vehicle: Vehicle) -> None:
+    def __init__(self, limits: tuple[tuple[ReturnLimit, ...], ...], vehicle: VehicleLimits) -> None:
         self._limits = limits if vehicle.return_altitude else ()
         self._vehicle = vehicle
 

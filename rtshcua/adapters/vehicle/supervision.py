@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from rtshcua.adapters.vehicle.effects import STILL, apart, still
 from rtshcua.adapters.vehicle.flavour import KEPT, KEPT_LEVEL, ExpectedProgress, ExpectedTarget
 from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STALE_US, STOPPED, ObservedVehicle, Placed, Reported
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 
 NEVER: Final = (1 << 63) - 1  # us
 #: so many heartbeats after a mode took effect it shows
@@ -77,7 +77,7 @@ class Brakes:
     reaction_us: int
 
     @classmethod
-    def of(cls, vehicle: Vehicle) -> "Brakes":
+    def of(cls, vehicle: VehicleLimits) -> "Brakes":
         """Those of a signed vehicle, or a cautious guess for one that declares none."""
         if not vehicle.braking:
             return cls(UNDECLARED_BRAKING, UNDECLARED_REACTION_US)

@@ -16,7 +16,7 @@ from rtshcua.app.fly.flight_request import FlightContext, FlightRequest
 from rtshcua.app.fly.link_signing import LinkSigning
 from rtshcua.app.fly.previous_log import LogBefore
 from rtshcua.app.fly.replay_check import broke_off, expired, obeys
-from rtshcua.app.fly.start_boundary import UNNAMED, Begun, BoundarySession, of_link_key
+from rtshcua.app.fly.start_boundary import UNNAMED, Begun, StartedBoundary, of_link_key
 from rtshcua.app.fly.verify_bundle import lapsed
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -35,7 +35,7 @@ class Cleared(NamedTuple):
 
     resumed: bool
     refusal: Refusal | None
-    session: BoundarySession
+    session: StartedBoundary
     run: RunFolder
     notes: list[str]
 
@@ -80,7 +80,7 @@ def clear_for_flight(
     if problem is not None:
         return problem
     own_key = None if isinstance(begun.own_key, Refusal) else begun.own_key
-    session = BoundarySession.open(BoundaryStore(request.kept_in, loaded.vehicle), own_key, aloft=resumed)
+    session = StartedBoundary.open(BoundaryStore(request.kept_in, loaded.vehicle), own_key, aloft=resumed)
     if isinstance(session, Refusal):
         return session
     settled = begun.trusted.settle(resumed=resumed)

@@ -26,7 +26,7 @@ from rtshcua.app.fly.setting_notes import foreign
 from rtshcua.app.fly.simulated_flight import SIMULATED, pace_of
 from rtshcua.app.fly.start_boundary import Begun
 from rtshcua.app.fly.stop_wishes import Wish
-from rtshcua.app.fly.story import Note, Plan, Snapshot, Summary
+from rtshcua.app.fly.story import FlightPlanView, Note, Snapshot, Summary
 from rtshcua.app.fly.verify_bundle import LogNotSigned
 from rtshcua.app.fly.view_ports import LiveView
 from rtshcua.app.fly.witnesses import FlightWitnesses
@@ -216,11 +216,11 @@ class FlightSession:
         """The hash of the last line of its log."""
         return self._recorder.final_hash
 
-    def _plan(self) -> Plan:
+    def _plan(self) -> FlightPlanView:
         bundle = self._loaded.bundle
         return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._context.request.speed)
 
-    def _replan(self) -> Plan:
+    def _replan(self) -> FlightPlanView:
         """The mission was replaced: this is the plan from now on."""
         self._teller.replace(self._loaded.bundle.mission)
         return self._plan()

@@ -12,7 +12,17 @@ import msgspec
 
 from rtshcua.adapters.preparation import PERMITTED
 from rtshcua.app.fly.agents import Agents
-from rtshcua.app.fly.story import Area, Asks, Happened, Happening, Note, Plan, Signal, Snapshot, Step
+from rtshcua.app.fly.story import (
+    Area,
+    Asks,
+    FlightPlanView,
+    Happened,
+    Happening,
+    LiveStep,
+    Note,
+    SignalFormat,
+    Snapshot,
+)
 from rtshcua.app.fly.view_ports import LiveView
 from rtshcua.decision.outline import rings
 from rtshcua.evidence.log_writer import BOUNDARY
@@ -91,10 +101,10 @@ class _Line(msgspec.Struct):
 _read = msgspec.json.Decoder(_Line).decode
 
 
-def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> Plan:
+def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> FlightPlanView:
     """The plan of a loaded bundle."""
     paths = [invocation.plan.path for invocation in mission.invocations if invocation.plan.kind != MotionKind.HOME]
-    return Plan(
+    return FlightPlanView(
         mission=mission.name,
         intent=mission.intent,
         policy=f"{policy.name}@{policy.version}",
@@ -102,8 +112,8 @@ def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> Pla
         mode=mode,
         speed=speed,
         phases=mission.phases,
-        steps=tuple(Step(call(policy, invocation), invocation.phase) for invocation in mission.invocations),
-        signals=tuple(Signal(signal.name, signal.dimension, dict(signal.labels)) for signal in policy.signals),
+        steps=tuple(LiveStep(call(policy, invocation), invocation.phase) for invocation in mission.invocations),
+        signals=tuple(SignalFormat(signal.name, signal.dimension, dict(signal.labels)) for signal in policy.signals),
         position=next((signal.name for signal in policy.signals if signal.kind == POSITION), ""),
         path=tuple(point for path in paths for point in zip(path[::2], path[1::2], strict=True)),
         areas=tuple(_areas(policy)),
@@ -279,7 +289,7 @@ class Watching:
 
     def __init__(
         self, feed: LiveView, teller: Teller, view: Callable[[Now], RuntimeView], unready: Callable[[], str | None], *,
-        live: bool, replan: Callable[[], Plan] | None = None, agents: Agents | None = None,
+        live: bool, replan: Callable[[], FlightPlanView] | None = None, agents: Agents | None = None,
     ) -> None:  # fmt: skip
         self._feed = feed
         self._teller = teller

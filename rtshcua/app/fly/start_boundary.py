@@ -124,7 +124,7 @@ def _unnamed(kid: bytes, good: set[bytes], vehicle: str) -> Refusal | None:
     return Refusal("unknown-key", text, _KEY_HELP, ExitCode.UNTRUSTED)
 
 
-class BoundarySession:
+class StartedBoundary:
     """One flight's session of a boundary, with or without a key. `note` is what there is to tell of it. `aloft`: the
     vehicle comes down whatever the state folder says.
     """
@@ -137,7 +137,7 @@ class BoundarySession:
         self._session = 0 if key is None else key.session
 
     @classmethod
-    def open(cls, store: BoundaryStore, key: OwnKey, *, aloft: bool) -> "BoundarySession | Refusal":
+    def open(cls, store: BoundaryStore, key: OwnKey, *, aloft: bool) -> "StartedBoundary | Refusal":
         """The session after the last one, where nobody knows of one for a vehicle that is `aloft`. Raises OSError."""
         if key is None:
             return cls(store, None, "", aloft=aloft)

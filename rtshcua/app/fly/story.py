@@ -5,14 +5,14 @@ import msgspec
 from rtshcua.onboard.runtime.view import RuntimeView
 
 
-class Step(msgspec.Struct, frozen=True):
+class LiveStep(msgspec.Struct, frozen=True):
     """A mission step as it was written, and the index of its phase."""
 
     text: str
     phase: int
 
 
-class Signal(msgspec.Struct, frozen=True):
+class SignalFormat(msgspec.Struct, frozen=True):
     """How to write a signal's value: its dimension, and the labels of an enumeration."""
 
     name: str
@@ -42,7 +42,7 @@ class Asks(msgspec.Struct, frozen=True):
     commands: tuple[tuple[str, ...], ...]
 
 
-class Plan(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
+class FlightPlanView(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
     """What is going to fly. `position` names the signal that is one, `path` holds x, y in mm of every place gone to."""
 
     mission: str
@@ -52,8 +52,8 @@ class Plan(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
     mode: str
     speed: float
     phases: tuple[str, ...]
-    steps: tuple[Step, ...]
-    signals: tuple[Signal, ...]
+    steps: tuple[LiveStep, ...]
+    signals: tuple[SignalFormat, ...]
     position: str
     path: tuple[tuple[int, int], ...]
     areas: tuple[Area, ...] = ()
@@ -135,7 +135,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     km_measured: int = 0
 
 
-Message = Plan | Snapshot | Happened | Note | Summary
+Message = FlightPlanView | Snapshot | Happened | Note | Summary
 
 
 def tenths(thousandths: int) -> str:

@@ -18,7 +18,7 @@ from rtshcua.model.flat.policy import (
     Rule,
     RuleKind,
     Speeds,
-    Vehicle,
+    VehicleLimits,
     WithoutEvidence,
 )
 from rtshcua.model.flat.signal import ENUMERATION, NUMBER, POSITION, SignalSource
@@ -87,7 +87,7 @@ def _without(policy: Policy) -> Iterator[str]:
             yield f"`{left_out.text}` is left out of `{left_out.part}`, which no contract has"
 
 
-def _numbers(vehicle: Vehicle) -> Iterator[str]:
+def _numbers(vehicle: VehicleLimits) -> Iterator[str]:
     yield from within("home distance", vehicle.home_within, 0, MAX_COORDINATE)
     yield from within("speed", vehicle.speed, 1, limits.MAX_SPEED)
     yield from within("climb", vehicle.climb, 1, limits.MAX_SPEED)
@@ -113,7 +113,7 @@ def _speeds(speeds: Speeds) -> Iterator[str]:
     yield from within("time of flight", speeds.flight_us, 1, limits.MAX_DURATION)
 
 
-def _offsets(vehicle: Vehicle) -> Iterator[str]:
+def _offsets(vehicle: VehicleLimits) -> Iterator[str]:
     """The local time of a time zone is known from its first moment to its last, by the data that is named."""
     if len({bool(vehicle.time_zone), bool(vehicle.time_zone_data), bool(vehicle.offsets)}) > 1:
         yield "a time zone has a name, a version of its data, and offsets"

@@ -18,7 +18,7 @@ from rtshcua.front.cli.showing.bundle import show_bundle
 from rtshcua.front.cli.showing.document import kind_of_document, show_document
 from rtshcua.front.cli.showing.keys import KEY_FILE, show_key, show_root
 from rtshcua.front.cli.showing.log import show_log
-from rtshcua.front.cli.showing.page import Page, for_terminal
+from rtshcua.front.cli.showing.page import TextPage, for_terminal
 from rtshcua.front.cli.showing.qualification import is_qualification, show_qualification
 from rtshcua.front.cli.stdout import out_json, out_rendered
 from rtshcua.wire import cbor, cose, names
@@ -67,7 +67,7 @@ def show(
     return ExitCode.OK
 
 
-def _show(page: Page, path: Path) -> dict[str, object] | None:
+def _show(page: TextPage, path: Path) -> dict[str, object] | None:
     """Adds what the file holds to the page; None for what nobody here knows. Raises `Untrusted`."""
     now_us = time.time_ns() // 1000
     with open_regular(path) as file:

@@ -20,7 +20,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse
 from rtshcua.front.cli.findings import Findings
-from rtshcua.front.cli.showing.page import Page, for_terminal
+from rtshcua.front.cli.showing.page import TextPage, for_terminal
 from rtshcua.front.cli.showing.why import Case, show_why
 from rtshcua.front.cli.stdout import out_json, out_rendered
 from rtshcua.front.cli.subject import Subject, prepared, unpacked
@@ -109,7 +109,7 @@ def _subject(path: Path, mission: str | None, at_us: int | None, as_json: bool) 
 
 
 def _by_hand(
-    page: Page,
+    page: TextPage,
     subject: Subject,
     step: int | None,
     texts: list[str],

@@ -20,7 +20,7 @@ from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, G
 from rtshcua.front.cli.faults import fail
 from rtshcua.front.cli.showing.link import show_link
 from rtshcua.front.cli.showing.log import Names
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.showing.people import People
 from rtshcua.front.cli.showing.why import Case, show_why
 from rtshcua.front.cli.subject import Subject, after, unpacked
@@ -184,7 +184,7 @@ def _for_unknown(record: DecisionRecord | Effect | Close | Recover | Seal) -> bo
     return isinstance(record, Effect) and record.event == "violated" and _UNKNOWN in record.detail
 
 
-def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | ExitCode:
+def from_log(page: TextPage, path: Path, number: int | None) -> dict[str, object] | ExitCode:
     """Adds the record asked for to the page, and what ended the flight."""
     log = _Log(path, number)
     refused = log.read()
@@ -230,7 +230,7 @@ def from_log(page: Page, path: Path, number: int | None) -> dict[str, object] | 
 
 
 def _decision(
-    page: Page, chosen: DecisionRecord, subject: Subject, aloft: bool, people: People
+    page: TextPage, chosen: DecisionRecord, subject: Subject, aloft: bool, people: People
 ) -> dict[str, object] | ExitCode:
     state = state_of(chosen)
     if len(state.values) != subject.policy.policy.slots or len(state.ages) != len(state.values):
@@ -248,7 +248,7 @@ def _decision(
     return fail(ExitCode.INPUT, f"record {chosen.seq} decides on a step or link that the bundle does not have")
 
 
-def _effect(page: Page, chosen: Effect | Close | Recover | Seal, log: _Log) -> dict[str, object]:
+def _effect(page: TextPage, chosen: Effect | Close | Recover | Seal, log: _Log) -> dict[str, object]:
     event = chosen.event if isinstance(chosen, Effect) else chosen.type
     detail = chosen.detail if isinstance(chosen, Effect) else chosen.ending if isinstance(chosen, Close) else ""
     page.head(f"{event}: something that happened, not a decision")
@@ -256,7 +256,7 @@ def _effect(page: Page, chosen: Effect | Close | Recover | Seal, log: _Log) -> d
     return {"kind": "why", "event": event, "detail": detail}
 
 
-def _list(page: Page, title: str, told: list[_Told], start_us: int) -> None:
+def _list(page: TextPage, title: str, told: list[_Told], start_us: int) -> None:
     if not told:
         return
     page.head(title)

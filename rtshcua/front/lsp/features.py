@@ -12,7 +12,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.front.lsp.disk import name_of
 from rtshcua.front.lsp.searching import Search
-from rtshcua.front.lsp.session import Session
+from rtshcua.front.lsp.session import EditorSession
 from rtshcua.front.lsp.texts import ITEMS, SYMBOLS, Spot, Texts, diagnostic, place, range_of
 from rtshcua.ground.editor import document_structure as coloured
 from rtshcua.ground.editor import document_structure as outlined
@@ -39,7 +39,7 @@ class NotDone(JsonRpcException):
 # ------------------------------------------------------------------------------------------ about a place
 
 
-def hovered(session: Session, params: lsp.HoverParams) -> lsp.Hover | None:
+def hovered(session: EditorSession, params: lsp.HoverParams) -> lsp.Hover | None:
     """What stands at a place."""
     spot = session.spot(params.text_document.uri, params.position)
     found = spot and hover(spot.view, spot.name, spot.offset, session.dialect)
@@ -49,13 +49,13 @@ def hovered(session: Session, params: lsp.HoverParams) -> lsp.Hover | None:
     return lsp.Hover(text, range_of(spot.lines, found.span.start, found.span.end))
 
 
-def defined(session: Session, params: lsp.DefinitionParams) -> list[lsp.Location]:
+def defined(session: EditorSession, params: lsp.DefinitionParams) -> list[lsp.Location]:
     """Where a name is given."""
     spot = session.spot(params.text_document.uri, params.position)
     return [] if spot is None else _locations(session, definitions(spot.view, spot.name, spot.offset))
 
 
-def highlighted(session: Session, params: lsp.DocumentHighlightParams) -> list[lsp.DocumentHighlight]:
+def highlighted(session: EditorSession, params: lsp.DocumentHighlightParams) -> list[lsp.DocumentHighlight]:
     """All places of the file that mean the same."""
     spot = session.spot(params.text_document.uri, params.position)
     if spot is None:
@@ -67,7 +67,7 @@ def highlighted(session: Session, params: lsp.DocumentHighlightParams) -> list[l
             for span, gives in places.items()]  # fmt: skip
 
 
-def completed(session: Session, params: lsp.CompletionParams) -> lsp.CompletionList:
+def completed(session: EditorSession, params: lsp.CompletionParams) -> lsp.CompletionList:
     """What may be written at a place."""
     spot, opened = session.spot(params.text_document.uri, params.position), session.cut(params.text_document.uri)
     if spot is None or opened is None:
@@ -86,7 +86,7 @@ def completed(session: Session, params: lsp.CompletionParams) -> lsp.CompletionL
     return lsp.CompletionList(is_incomplete=False, items=items)
 
 
-def signed(session: Session, params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
+def signed(session: EditorSession, params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
     """What the call that is being written takes."""
     spot, opened = session.spot(params.text_document.uri, params.position), session.cut(params.text_document.uri)
     found = None if spot is None or opened is None else signature(spot.view, opened[0], spot.offset)
@@ -98,7 +98,7 @@ def signed(session: Session, params: lsp.SignatureHelpParams) -> lsp.SignatureHe
     return lsp.SignatureHelp([one], 0, found.active)
 
 
-def outline(session: Session, params: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
+def outline(session: EditorSession, params: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
     """The declarations of a file."""
     opened = session.cut(params.text_document.uri)
     if opened is None:
@@ -118,7 +118,7 @@ def outline(session: Session, params: lsp.DocumentSymbolParams) -> list[lsp.Docu
     return [told(each) for each in outlined.outline(cut)]
 
 
-def folded(session: Session, params: lsp.FoldingRangeParams) -> list[lsp.FoldingRange]:
+def folded(session: EditorSession, params: lsp.FoldingRangeParams) -> list[lsp.FoldingRange]:
     """What may be folded."""
     opened = session.cut(params.text_document.uri)
     if opened is None:
@@ -133,7 +133,7 @@ def folded(session: Session, params: lsp.FoldingRangeParams) -> list[lsp.Folding
     return found
 
 
-def coloured_all(session: Session, params: lsp.SemanticTokensParams) -> lsp.SemanticTokens:
+def coloured_all(session: EditorSession, params: lsp.SemanticTokensParams) -> lsp.SemanticTokens:
     """What each name is, as the protocol packs it: relative to the one before."""
     name = name_of(params.text_document.uri)
     lines = session.lines(name)
@@ -152,7 +152,7 @@ def coloured_all(session: Session, params: lsp.SemanticTokensParams) -> lsp.Sema
 # ------------------------------------------------------------------------------------------ about changes
 
 
-def may_rename(session: Session, params: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder:
+def may_rename(session: EditorSession, params: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder:
     """The name that would be changed. Raises NotDone with the reason why it may not."""
     view, name, lines, offset = _renaming(session, params)
     found = renamable(session.desk, view, name, offset)
@@ -184,7 +184,7 @@ def _renaming(texts: Texts, params: lsp.PrepareRenameParams | lsp.RenameParams) 
     return spot
 
 
-def laid_out(session: Session, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
+def laid_out(session: EditorSession, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
     """The change that puts a text into the one style, as wide as its project says: from the first character that
     differs to the last. Nothing where the text has errors, which are told of anyway, or the project leaves it out.
     """
@@ -201,7 +201,7 @@ def laid_out(session: Session, params: lsp.DocumentFormattingParams) -> list[lsp
     return [lsp.TextEdit(range_of(lines, start, end), made[start : start + length])]
 
 
-def offered(session: Session, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
+def offered(session: EditorSession, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
     """What may be done about the findings in a range, and about all of them where that is safe."""
     name = name_of(params.text_document.uri)
     lines = session.lines(name)

@@ -18,7 +18,7 @@ from rtshcua import __version__
 from rtshcua.front.lsp import features
 from rtshcua.front.lsp.disk import path_of
 from rtshcua.front.lsp.searching import Shown
-from rtshcua.front.lsp.session import Session
+from rtshcua.front.lsp.session import EditorSession
 from rtshcua.front.lsp.texts import place
 from rtshcua.ground.editor.positions import Encoding, TextChange
 
@@ -38,7 +38,7 @@ def _change(change: lsp.TextDocumentContentChangeEvent) -> TextChange:
 
 
 #: what the editor tells, and what the session does then
-_NOTICES: dict[str, Callable[[Session, Any], None]] = {
+_NOTICES: dict[str, Callable[[EditorSession, Any], None]] = {
     lsp.TEXT_DOCUMENT_DID_OPEN: lambda session, told: session.open(
         told.text_document.uri, told.text_document.version, told.text_document.text
     ),
@@ -124,10 +124,10 @@ def _is_a_fault(record: logging.LogRecord) -> bool:
     return not (record.exc_info and isinstance(record.exc_info[1], features.NotDone))
 
 
-def make(library: str) -> tuple[LanguageServer, Session]:
+def make(library: str) -> tuple[LanguageServer, EditorSession]:
     """The server with all its features, and its session. `library` is the folder that `lib:` stands for."""
     server = LanguageServer("rtshcua", __version__, protocol_cls=Protocol)
-    session = Session(library, server.text_document_publish_diagnostics, _saying(server))
+    session = EditorSession(library, server.text_document_publish_diagnostics, _saying(server))
     _lifecycle(server, session)
     for notice, act in _NOTICES.items():
         server.feature(notice)(_asked(act, session))
@@ -203,7 +203,7 @@ class Watched:
         return data
 
 
-def _asked(answer: Any, session: Session) -> Any:
+def _asked(answer: Any, session: EditorSession) -> Any:
     """The answer as a handler of its own: pygls looks at the names of a handler's arguments."""
 
     def handler(params: Any) -> Any:
@@ -212,7 +212,7 @@ def _asked(answer: Any, session: Session) -> Any:
     return handler
 
 
-def _searched(server: LanguageServer, search: Any, session: Session, title: str) -> Any:
+def _searched(server: LanguageServer, search: Any, session: EditorSession, title: str) -> Any:
     """The answer from the thread that searches, with its progress where the editor wants to show it."""
 
     async def handler(params: Any) -> Any:
@@ -225,7 +225,7 @@ def _searched(server: LanguageServer, search: Any, session: Session, title: str)
     return handler
 
 
-def _lifecycle(server: LanguageServer, session: Session) -> None:
+def _lifecycle(server: LanguageServer, session: EditorSession) -> None:
     def initialize(params: lsp.InitializeParams) -> None:
         session.encoding = Encoding(server.workspace.position_encoding or "utf-16")
         folders = [each.uri for each in params.workspace_folders or ()] or [params.root_uri or ""]

@@ -18,7 +18,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.front.lsp.disk import desk, name_of, path_of
 from rtshcua.front.lsp.prover import Found, Proving
 from rtshcua.front.lsp.searching import Searching
-from rtshcua.front.lsp.texts import Opened, Texts, diagnostic
+from rtshcua.front.lsp.texts import OpenText, Texts, diagnostic
 from rtshcua.ground.editor.incremental_parse import ParsedText, moved_finding
 from rtshcua.ground.editor.positions import LineIndex, TextChange, edited
 from rtshcua.ground.pipeline.program import check_declared
@@ -33,7 +33,7 @@ PAUSE = 0.25
 _IGNORE = "rtshcua:"
 
 
-class Session(Texts):
+class EditorSession(Texts):
     """One editor's session. `tell` publishes the findings of one text, `say` tells a person what could not be done."""
 
     def __init__(
@@ -72,7 +72,7 @@ class Session(Texts):
         name = name_of(uri)
         if not self.folders and path_of(uri) is not None:
             self._readable.ask(name)
-        self.opened[name] = Opened(uri, version, LineIndex(text, self.encoding))
+        self.opened[name] = OpenText(uri, version, LineIndex(text, self.encoding))
         self.desk.put(name, text)
         self.desk.forget()
         gc.freeze()  # what is open stays: the collector need not look at it with every keystroke
@@ -141,7 +141,7 @@ class Session(Texts):
         if len(waiting) > 1:  # others may wait until the loop has looked for newer changes
             self._soon = asyncio.get_running_loop().call_later(AT_ONCE, self._check, None)
 
-    def _quick(self, name: str, opened: Opened) -> None:
+    def _quick(self, name: str, opened: OpenText) -> None:
         view = self.desk.view(name)
         opened.quick_stamp = opened.stamp
         opened.files = frozenset(view.program.sources)

@@ -52,7 +52,7 @@ ITEMS = {
 
 
 @dataclass(slots=True)
-class Opened:
+class OpenText:
     """One text that is open: as the editor calls it, its lines, and what was found in the program that it makes."""
 
     uri: str
@@ -92,7 +92,7 @@ class Texts:
     encoding: Encoding = Encoding.UTF_16
     folders: list[str] = field(default_factory=list)
     versioned: bool = False  # whether the editor takes changes that name the version they are for
-    opened: dict[str, Opened] = field(default_factory=dict)
+    opened: dict[str, OpenText] = field(default_factory=dict)
 
     def copied(self) -> "Texts":
         """The same as they are just now, for another thread: what is found in them is true of these versions."""

@@ -394,7 +394,7 @@ class VehicleInArgumentZone(Atom):
         return sorted(elements) if elements is not None else list(range(low, high + 1))
 
 
-class Negation:
+class NotCondition:
     """Kleene's `not`."""
 
     __slots__ = ("operand",)
@@ -431,7 +431,7 @@ class Pair:
         return undecided(self.left if left & (left - 1) else self.right, box)
 
 
-Condition: TypeAlias = Negation | Pair | Atom
+Condition: TypeAlias = NotCondition | Pair | Atom
 
 
 def undecided(condition: Condition, box: ValueBox) -> Atom:
@@ -447,7 +447,7 @@ def over_boxes(node: tree.Node, space: SituationSpace, box: ValueBox) -> Conditi
         case tree.Either(left, right):
             return Pair(over_boxes(left, space, box), over_boxes(right, space, box), both=False)
         case tree.Negation(operand):
-            return Negation(over_boxes(operand, space, box))
+            return NotCondition(over_boxes(operand, space, box))
         case _:
             atom = _atom(node, space)
             atom.enter(box, space)

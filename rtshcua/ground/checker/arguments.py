@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.scope import Argument, Entry, Scope
 from rtshcua.ground.checker.substitution import named_at
@@ -19,7 +19,7 @@ from rtshcua.model.quantity import display
 
 
 def bind_arguments(
-    context: Context, skill: SkillDecl, written: Sequence[ArgumentValue], span: Span
+    context: CheckContext, skill: SkillDecl, written: Sequence[ArgumentValue], span: Span
 ) -> tuple[Bound, ...] | None:
     """The value of every parameter of `skill`, defaults filled in; None after a finding. `span` is the whole call."""
     pairs = pair(context, skill, written, span)
@@ -38,7 +38,7 @@ def bind_arguments(
 
 
 def pair(
-    context: Context, skill: SkillDecl | TemplateDecl, written: Sequence[ArgumentValue], span: Span
+    context: CheckContext, skill: SkillDecl | TemplateDecl, written: Sequence[ArgumentValue], span: Span
 ) -> dict[str, Value] | None:
     """The written arguments by the name of their parameter; None after a finding."""
     names = [parameter.name.text for parameter in skill.parameters]
@@ -96,7 +96,7 @@ def pair(
     return None if len(report.found) > before else {name: argument.value for name, argument in pairs.items()}
 
 
-def _decimal(context: Context, written: Sequence[ArgumentValue], position: int) -> str | None:
+def _decimal(context: CheckContext, written: Sequence[ArgumentValue], position: int) -> str | None:
     """What to write for `20,5 m`, where a comma stands between two numbers without a space."""
     if not position:
         return None

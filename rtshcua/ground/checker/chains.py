@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.arguments import bind_arguments
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import quantity
 from rtshcua.ground.checker.lookup import find_skill
 from rtshcua.model.flat.limits import MAX_LINKS
@@ -18,7 +18,7 @@ from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 from rtshcua.model.quantity import Dimension, display
 
 
-def check_link(context: Context, link: LinkDecl) -> SkillDecl | None:
+def check_link(context: CheckContext, link: LinkDecl) -> SkillDecl | None:
     """The skill of one link, whose arguments and limit were checked and bound; None where there is no such skill."""
     skill = find_skill(context, link.skill)
     if skill is None:
@@ -38,7 +38,7 @@ def check_link(context: Context, link: LinkDecl) -> SkillDecl | None:
     return skill
 
 
-def check_chain(context: Context, links: Sequence[LinkDecl], owner: SkillDecl | None, span: Span) -> None:
+def check_chain(context: CheckContext, links: Sequence[LinkDecl], owner: SkillDecl | None, span: Span) -> None:
     """Report a chain that might not end; `owner` is the skill whose fallback it is, `span` the whole chain."""
     if len(links) > MAX_LINKS:
         context.report.add(
@@ -62,7 +62,7 @@ def check_chain(context: Context, links: Sequence[LinkDecl], owner: SkillDecl | 
             check_end(context, link, skill)
 
 
-def check_end(context: Context, link: LinkDecl, skill: SkillDecl) -> None:
+def check_end(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
     """Report a link that something comes after, and that does not end: of a chain, or the target of a `degrade`."""
     if link.limit is None and not _ends(skill):
         context.report.add(
@@ -75,7 +75,7 @@ def check_end(context: Context, link: LinkDecl, skill: SkillDecl) -> None:
         )
 
 
-def _limit(context: Context, link: LinkDecl, skill: SkillDecl) -> None:
+def _limit(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
     """Report a link that is to fly for longer than its skill lasts."""
     limit, lasts = link.limit, skill.duration
     if limit is None or lasts is None or {limit.dimension, lasts.dimension} != {Dimension.DURATION}:
@@ -96,7 +96,7 @@ def _ends(skill: SkillDecl) -> bool:
     return skill.duration is not None or (skill.motion is not None and skill.motion.kind != "hold")
 
 
-def _last(context: Context, link: LinkDecl, skill: SkillDecl) -> None:
+def _last(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
     """The last link is always possible, and leaves the vehicle on the ground."""
     needs = [*skill.require, *skill.assume]
     if needs:

@@ -13,7 +13,7 @@ from rtshcua.ground.checker.checks.tests import check_tests
 from rtshcua.ground.checker.checks.times import check_times
 from rtshcua.ground.checker.checks.vehicles import check_vehicles
 from rtshcua.ground.checker.checks.zones import check_zones
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 
 CHECKS = (
     check_names,
@@ -36,7 +36,7 @@ CHECKS = (
 )
 
 
-def check_declarations(context: Context) -> None:
+def check_declarations(context: CheckContext) -> None:
     """Report everything that is wrong with the declarations of a program."""
     for check in CHECKS:
         check(context)

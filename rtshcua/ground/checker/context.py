@@ -35,7 +35,7 @@ class Instance(NamedTuple):
 
 
 @dataclass(slots=True)
-class Context:
+class CheckContext:
     """One compilation's checks.
 
     What the arguments of a call were bound to is kept by its skill and the arguments as written, the place included

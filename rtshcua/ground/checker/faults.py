@@ -4,7 +4,7 @@ from typing import Any
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import listed
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, size
 from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.symbols import correction, suggestion
@@ -24,7 +24,7 @@ FULL_TURN = 360
 MAX_COPIES = 1_000
 
 
-def fault_of(context: Context, call: FaultCall) -> Fault | None:
+def fault_of(context: CheckContext, call: FaultCall) -> Fault | None:
     """The fault that a source describes, at the time 0; None after a finding."""
     if not one_of(context, codes.UNKNOWN_FAULT, call.name, NAMED, "fault"):
         return None
@@ -54,7 +54,7 @@ def example(parameter: FaultField) -> str:
     return EXAMPLES[dimension]
 
 
-def _given(context: Context, call: FaultCall, known: dict[str, FaultField]) -> dict[str, ArgumentValue]:
+def _given(context: CheckContext, call: FaultCall, known: dict[str, FaultField]) -> dict[str, ArgumentValue]:
     """The arguments that have the name of a parameter, each once."""
     report, given = context.report, dict[str, ArgumentValue]()
     takes = f"it takes {listed(known)}" if known else "it takes nothing"
@@ -90,7 +90,7 @@ def _given(context: Context, call: FaultCall, known: dict[str, FaultField]) -> d
     return given
 
 
-def _value(context: Context, call: FaultCall, parameter: FaultField, value: Value) -> Any:
+def _value(context: CheckContext, call: FaultCall, parameter: FaultField, value: Value) -> Any:
     """The value as the kind has it; anything after a finding."""
     if parameter.words:
         return _word(context, call, parameter, value)
@@ -100,7 +100,7 @@ def _value(context: Context, call: FaultCall, parameter: FaultField, value: Valu
 
 
 def _word(
-    context: Context, call: FaultCall, parameter: FaultField, value: Value
+    context: CheckContext, call: FaultCall, parameter: FaultField, value: Value
 ) -> FlightMode | Direction | Voice | bool | None:
     word = value.name if isinstance(value, Reference) else None
     if word not in parameter.words:
@@ -118,7 +118,7 @@ def _word(
     return WORD_TYPES[parameter.name](word)
 
 
-def _name(context: Context, parameter: FaultField, value: Value) -> str | None:
+def _name(context: CheckContext, parameter: FaultField, value: Value) -> str | None:
     if not isinstance(value, Reference):
         context.report.add(
             codes.WRONG_TYPE,
@@ -139,7 +139,7 @@ def _name(context: Context, parameter: FaultField, value: Value) -> str | None:
     return value.name
 
 
-def _number(context: Context, parameter: FaultField, value: Value) -> int | None:
+def _number(context: CheckContext, parameter: FaultField, value: Value) -> int | None:
     """A number in the unit of its field."""
     unit = parameter.unit
     dimension = Dimension.COUNT if unit is None else unit.dimension or Dimension.COUNT
@@ -171,7 +171,7 @@ def _number(context: Context, parameter: FaultField, value: Value) -> int | None
     return whole // canonical if _fits(context, parameter, value, whole // canonical, dimension) else None
 
 
-def _fits(context: Context, parameter: FaultField, value: Value, least: int, dimension: Dimension) -> bool:
+def _fits(context: CheckContext, parameter: FaultField, value: Value, least: int, dimension: Dimension) -> bool:
     """Whether a number is one that such a fault can have; reports it where it is not."""
     written = context.report.text(value.span)
     if least < 0 and parameter.name not in SIGNED:

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import Code
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import HEIGHT, Type, number
 from rtshcua.ground.checker.values import typed
@@ -35,7 +35,12 @@ MAX_LONGITUDE = 1_800_000_000
 
 
 def quantity(
-    context: Context, node: Quantity | None, dimension: Dimension, *, positive: bool = True, most: int | None = None
+    context: CheckContext,
+    node: Quantity | None,
+    dimension: Dimension,
+    *,
+    positive: bool = True,
+    most: int | None = None,
 ) -> None:
     """Report a field that is no quantity of `dimension`, not above zero where it must be, or larger than fits."""
     if node is None or not _is(context, node, number(dimension)):
@@ -51,25 +56,25 @@ def quantity(
         )
 
 
-def height(context: Context, node: Quantity | None) -> None:
+def height(context: CheckContext, node: Quantity | None) -> None:
     """Report a field that is no altitude, above home or above sea."""
     expected = HEIGHT if node is None or node.datum is not Datum.SEA else ABOVE_SEA
     if node is not None and _is(context, node, expected):
         size(context, node, Dimension.ALTITUDE, node.value)
 
 
-def elevation(context: Context, node: Quantity | None) -> None:
+def elevation(context: CheckContext, node: Quantity | None) -> None:
     """Report a field that is no altitude above sea."""
     if node is not None and _is(context, node, ABOVE_SEA):
         size(context, node, Dimension.ALTITUDE, node.value, MAX_ELEVATION)
 
 
-def _is(context: Context, node: Quantity, expected: Type) -> bool:
+def _is(context: CheckContext, node: Quantity, expected: Type) -> bool:
     """Whether a number is of a type; reports it where it is not."""
     return number(node.dimension, node.datum) is expected or typed(context.scope(), node, expected) is not None
 
 
-def size(context: Context, node: Node, dimension: Dimension, value: int, most: int | None = None) -> bool:
+def size(context: CheckContext, node: Node, dimension: Dimension, value: int, most: int | None = None) -> bool:
     """Whether a number of a dimension fits on board; reports it where it does not."""
     limit = LARGEST[dimension] if most is None else most
     if abs(value) <= limit:
@@ -83,7 +88,7 @@ def size(context: Context, node: Node, dimension: Dimension, value: int, most: i
     return False
 
 
-def one_of(context: Context, code: Code, name: Name, known: Collection[str], what: str) -> bool:
+def one_of(context: CheckContext, code: Code, name: Name, known: Collection[str], what: str) -> bool:
     """Whether a name is among the known ones; reports it when it is not."""
     if name.text in known:
         return True
@@ -97,7 +102,7 @@ def one_of(context: Context, code: Code, name: Name, known: Collection[str], wha
     return False
 
 
-def on_globe(context: Context, place: Coordinates) -> bool:
+def on_globe(context: CheckContext, place: Coordinates) -> bool:
     """Whether coordinates can be projected; reports them when they cannot."""
     if abs(place.latitude) <= MAX_LATITUDE and abs(place.longitude) <= MAX_LONGITUDE:
         return True

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import TypeVar
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.symbols import WORDS, Declaration, correction, suggestion
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Name
@@ -17,47 +17,47 @@ from rtshcua.model.ir.tests import NominalDecl
 D = TypeVar("D", bound=Declaration)
 
 
-def find_skill(context: Context, name: Name) -> SkillDecl | None:
+def find_skill(context: CheckContext, name: Name) -> SkillDecl | None:
     """The skill of that name."""
     return _find(context, name, context.symbols.skills, SkillDecl)
 
 
-def find_zone(context: Context, name: Name) -> ZoneDecl | None:
+def find_zone(context: CheckContext, name: Name) -> ZoneDecl | None:
     """The zone of that name."""
     return _find(context, name, context.symbols.zones, ZoneDecl)
 
 
-def find_signal(context: Context, name: Name) -> SignalDecl | None:
+def find_signal(context: CheckContext, name: Name) -> SignalDecl | None:
     """The signal of that name."""
     return _find(context, name, context.symbols.signals, SignalDecl)
 
 
-def find_policy(context: Context, name: Name) -> PolicyDecl | None:
+def find_policy(context: CheckContext, name: Name) -> PolicyDecl | None:
     """The policy of that name."""
     return _find(context, name, context.symbols.policies, PolicyDecl)
 
 
-def find_template(context: Context, name: Name) -> TemplateDecl | None:
+def find_template(context: CheckContext, name: Name) -> TemplateDecl | None:
     """The template of that name."""
     return _find(context, name, context.symbols.templates, TemplateDecl)
 
 
-def find_nominal(context: Context, name: Name) -> NominalDecl | None:
+def find_nominal(context: CheckContext, name: Name) -> NominalDecl | None:
     """The nominal of that name."""
     return _find(context, name, context.symbols.nominals, NominalDecl)
 
 
-def find_vehicle(context: Context, name: Name) -> VehicleDecl | None:
+def find_vehicle(context: CheckContext, name: Name) -> VehicleDecl | None:
     """The vehicle of that name."""
     return _find(context, name, context.symbols.vehicles, VehicleDecl)
 
 
-def find_flown(context: Context, name: Name) -> MissionDecl | None:
+def find_flown(context: CheckContext, name: Name) -> MissionDecl | None:
     """The mission of that name, where a source names it."""
     return _find(context, name, context.symbols.missions, MissionDecl)
 
 
-def find_mission(context: Context, name: str) -> MissionDecl | None:
+def find_mission(context: CheckContext, name: str) -> MissionDecl | None:
     """The mission of that name, asked for on the command line: there is no place to point at."""
     found = context.symbols.missions.get(name)
     if found is None and name not in context.symbols.broken:
@@ -70,7 +70,7 @@ def find_mission(context: Context, name: str) -> MissionDecl | None:
     return found
 
 
-def _find(context: Context, name: Name, table: Mapping[str, D], kind: type[D]) -> D | None:
+def _find(context: CheckContext, name: Name, table: Mapping[str, D], kind: type[D]) -> D | None:
     found = table.get(name.text)
     if found is not None:
         return found

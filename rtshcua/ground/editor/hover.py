@@ -16,7 +16,7 @@ from rtshcua.ground.editor.syntax import nodes_in, note_before, path_to, token_a
 from rtshcua.ground.editor.workspace import ProgramView
 from rtshcua.ground.geometry.polygons import doubled_area
 from rtshcua.ground.geometry.projection import projection_at
-from rtshcua.ground.geometry.shapes import Disc, Shape, bounds
+from rtshcua.ground.geometry.shapes import RoundArea, Shape, bounds
 from rtshcua.ground.language.exact_values import CANONICAL
 from rtshcua.ground.lower.ground_plan import GroundPlans
 from rtshcua.mavlink.dialect import DATUM, Dialect
@@ -81,7 +81,7 @@ def _metres(length: int) -> str:
 
 
 def _area(shape: Shape) -> int:
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         return int(_PI * shape.radius * shape.radius / _MM2)
     doubled = sum(doubled_area(ring) for ring in shape.rings)
     return abs(doubled) // (2 * _MM2)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.checks.policies import SOURCES, shared_arguments
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of
 from rtshcua.ground.checker.lookup import find_skill
 from rtshcua.ground.checker.report import Report
@@ -25,7 +25,9 @@ OWN_SOURCE = "operator"
 MOST_DELEGATIONS = 4_096
 
 
-def delegated(context: Context, policy: PolicyDecl, rules: Sequence[RuleDecl], *, whole: bool) -> tuple[RuleDecl, ...]:
+def delegated(
+    context: CheckContext, policy: PolicyDecl, rules: Sequence[RuleDecl], *, whole: bool
+) -> tuple[RuleDecl, ...]:
     """The rules of a policy with those that its delegations make of them; `whole` where no rule is missing."""
     found = list(rules)
     if _too_many(context.report, policy.delegations):
@@ -105,7 +107,7 @@ def _report_circle(report: Report, circle: Sequence[Delegation]) -> None:
     )
 
 
-def _made(context: Context, delegation: Delegation, rules: Sequence[RuleDecl], *, whole: bool) -> list[RuleDecl]:
+def _made(context: CheckContext, delegation: Delegation, rules: Sequence[RuleDecl], *, whole: bool) -> list[RuleDecl]:
     """The rules that one delegation makes of those before it."""
     known = [find_skill(context, name) for name in delegation.skills]
     sources = [one_of(context, codes.UNKNOWN_SOURCE, name, SOURCES, "source") for name in delegation.through]
@@ -122,7 +124,7 @@ def _made(context: Context, delegation: Delegation, rules: Sequence[RuleDecl], *
     return made + [forbid for rule in forbids if (forbid := _forbid(delegation, rule)) is not None]
 
 
-def _readable(context: Context, delegation: Delegation, skills: Sequence[SkillDecl]) -> bool:
+def _readable(context: CheckContext, delegation: Delegation, skills: Sequence[SkillDecl]) -> bool:
     """Whether the condition reads what all the delegated skills have."""
     if delegation.when is None:
         return True
@@ -181,7 +183,9 @@ def _names(names: Iterable[Name], text: str) -> bool:
     return any(name.text == text for name in names)
 
 
-def _nothing(context: Context, delegation: Delegation, permits: Sequence[RuleDecl], made: Sequence[RuleDecl]) -> None:
+def _nothing(
+    context: CheckContext, delegation: Delegation, permits: Sequence[RuleDecl], made: Sequence[RuleDecl]
+) -> None:
     """Report every delegated skill that the grantor is not permitted. What anybody may needs no delegation."""
     if not delegation.skills and not made:
         _report_nothing(context, delegation, delegation.grantor, "anything of its own", permits)
@@ -193,7 +197,9 @@ def _nothing(context: Context, delegation: Delegation, permits: Sequence[RuleDec
             _report_nothing(context, delegation, name, f"`{name.text}`", about)
 
 
-def _report_nothing(context: Context, delegation: Delegation, at: Name, what: str, about: Sequence[RuleDecl]) -> None:
+def _report_nothing(
+    context: CheckContext, delegation: Delegation, at: Name, what: str, about: Sequence[RuleDecl]
+) -> None:
     named = [rule for rule in about if rule.roles]
     through = " or ".join(f"`{name.text}`" for name in delegation.through)
     context.report.add(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.context import Context, Instance
+from rtshcua.ground.checker.context import CheckContext, Instance
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.elaborate.delegation import delegated
 from rtshcua.ground.elaborate.parameters import ParameterSettings, ambiguous, assigned, instances
@@ -87,7 +87,7 @@ class ElaboratedProgram(NamedTuple):
 
 
 def elaborate(
-    context: Context,
+    context: CheckContext,
     units: Sequence[Unit],
     closure: Closure,
     chosen: str | None = None,
@@ -118,7 +118,7 @@ def elaborate(
     return ElaboratedProgram(tuple(found), missions.instances, tuple(samples))
 
 
-def _policy(context: Context, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
+def _policy(context: CheckContext, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
     """A policy with all its rules in source order, then those of its delegations; `seen` gathers used templates."""
     if len(policy.rules) > MAX_RULES:
         return policy.copied(rules=_fitting(context, policy, policy.rules), uses=(), delegations=())
@@ -142,7 +142,7 @@ def _policy(context: Context, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
     return policy.copied(rules=delegated(context, policy, plain, whole=whole))
 
 
-def _fitting(context: Context, policy: PolicyDecl, rules: tuple[RuleDecl, ...]) -> tuple[RuleDecl, ...]:
+def _fitting(context: CheckContext, policy: PolicyDecl, rules: tuple[RuleDecl, ...]) -> tuple[RuleDecl, ...]:
     """As many rules as are looked at; that there are more is reported."""
     context.report.add(
         codes.TOO_MANY,
@@ -154,7 +154,9 @@ def _fitting(context: Context, policy: PolicyDecl, rules: tuple[RuleDecl, ...]) 
 
 
 class _Missions:
-    def __init__(self, context: Context, closure: Closure, chosen: str | None, settings: ParameterSettings) -> None:
+    def __init__(
+        self, context: CheckContext, closure: Closure, chosen: str | None, settings: ParameterSettings
+    ) -> None:
         self.instances: dict[str, tuple[Instance, ...]] = {}
         self._context = context
         self._closure = closure

@@ -17,7 +17,7 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.agent_values import parse_value
 from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.conditions import references
-from rtshcua.ground.checker.context import Bound, Context, Instance
+from rtshcua.ground.checker.context import Bound, CheckContext, Instance
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.substitution import names_in, substitute
@@ -42,7 +42,7 @@ def value_of(bound: Bound, argument: Argument, span: Span) -> Value:
     return Quantity(span=span, value=bound, dimension=argument.type.dimension, datum=argument.type.datum)
 
 
-def bound_value(context: Context, argument: Argument, written: Value, *, heard: bool = True) -> Value | None:
+def bound_value(context: CheckContext, argument: Argument, written: Value, *, heard: bool = True) -> Value | None:
     """The one value that a written one comes to; None after a finding. A default is heard where it is declared."""
     report = context.report if heard else Report(context.report.sources)
     before = len(report.found)
@@ -100,7 +100,7 @@ MAX_INSTANCES = 64
 MOST_STEPS = 4_096
 
 
-def assigned(context: Context, mission: MissionDecl, settings: ParameterSettings) -> Instance | None:
+def assigned(context: CheckContext, mission: MissionDecl, settings: ParameterSettings) -> Instance | None:
     """The mission with the values that are given and its defaults; None after a finding."""
     before = len(context.report.found)
     given = _given(context, mission, settings)
@@ -130,7 +130,7 @@ def assigned(context: Context, mission: MissionDecl, settings: ParameterSettings
     return _instance(mission, values)
 
 
-def _given(context: Context, mission: MissionDecl, settings: ParameterSettings) -> Mapping[str, Value]:
+def _given(context: CheckContext, mission: MissionDecl, settings: ParameterSettings) -> Mapping[str, Value]:
     context.report.found += settings.diagnostics
     known = {parameter.name.text for parameter in mission.parameters}
     for name, _ in settings.values:
@@ -146,7 +146,7 @@ def _given(context: Context, mission: MissionDecl, settings: ParameterSettings) 
     return {name.text: value for name, value in settings.values if name.text in known}
 
 
-def instances(context: Context, mission: MissionDecl, files: frozenset[str]) -> Iterator[Instance]:
+def instances(context: CheckContext, mission: MissionDecl, files: frozenset[str]) -> Iterator[Instance]:
     """The mission for the values that it is checked with; `files` are those of its policy, of which the zones are.
 
     None where nothing is known of a parameter but that it is some place: that is noted.
@@ -196,7 +196,7 @@ def _repeating(sizes: Sequence[int]) -> Iterator[tuple[int, ...]]:
     yield from product(*map(range, sizes))
 
 
-def ambiguous(context: Context, mission: MissionDecl) -> bool:
+def ambiguous(context: CheckContext, mission: MissionDecl) -> bool:
     """Whether a clause of a step reads a name that may be the mission's parameter, or something else; reports it."""
     own = {parameter.name.text: parameter for parameter in mission.parameters}
     before = len(context.report.found)
@@ -219,7 +219,7 @@ def ambiguous(context: Context, mission: MissionDecl) -> bool:
     return len(context.report.found) > before
 
 
-def _candidates(context: Context, mission: MissionDecl, argument: Argument, files: frozenset[str]) -> list[Value]:
+def _candidates(context: CheckContext, mission: MissionDecl, argument: Argument, files: frozenset[str]) -> list[Value]:
     """The values with which a parameter is checked, its default first; each is written as the default, or its type."""
     parameter = argument.declaration
     default = parameter.default

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import pair
 from rtshcua.ground.checker.checks.parameters import ROLE
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.lookup import find_template
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.substitution import names_in, substitute, substitute_roles
@@ -28,14 +28,14 @@ class TemplateBinding(NamedTuple):
     roles: dict[str, str]
 
 
-def used(context: Context, use: Use) -> tuple[RuleDecl, ...] | None:
+def used(context: CheckContext, use: Use) -> tuple[RuleDecl, ...] | None:
     """The rules that a `use` stands for; None after a finding."""
     template = find_template(context, use.template)
     given = None if template is None else _bound(context, template, use)
     return None if template is None or given is None else tuple(_rules(template, given, (use,)))
 
 
-def sample(context: Context, template: TemplateDecl) -> tuple[RuleDecl, ...]:
+def sample(context: CheckContext, template: TemplateDecl) -> tuple[RuleDecl, ...]:
     """The rules of a template that nothing uses, with values that its parameters may have: its names and types are
     checked with them. Without those that read a parameter which may have none.
     """
@@ -55,7 +55,7 @@ def sample(context: Context, template: TemplateDecl) -> tuple[RuleDecl, ...]:
     return tuple(put for rule, put in expanded if without.isdisjoint(names_in(rule)))
 
 
-def _possible(context: Context, argument: Argument) -> Value | None:
+def _possible(context: CheckContext, argument: Argument) -> Value | None:
     """A value that a parameter may have: its default, or one of its type."""
     parameter = argument.declaration
     if parameter.default is not None:
@@ -66,7 +66,7 @@ def _possible(context: Context, argument: Argument) -> Value | None:
     return value_of(zones[0], argument, parameter.span) if argument.type.kind is Kind.ZONE and zones else None
 
 
-def _bound(context: Context, template: TemplateDecl, use: Use) -> TemplateBinding | None:
+def _bound(context: CheckContext, template: TemplateDecl, use: Use) -> TemplateBinding | None:
     pairs = pair(context, template, use.arguments, use.span)
     if pairs is None:
         return None
@@ -93,7 +93,7 @@ def _bound(context: Context, template: TemplateDecl, use: Use) -> TemplateBindin
     return given if good else None
 
 
-def _role(context: Context, parameter: ParameterDecl, written: Value) -> str | None:
+def _role(context: CheckContext, parameter: ParameterDecl, written: Value) -> str | None:
     kind = "no name"
     if isinstance(written, Reference) and "." not in written.name:
         declared = context.symbols.kind_of(written.name)

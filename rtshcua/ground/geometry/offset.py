@@ -34,7 +34,7 @@ from rtshcua.ground.geometry.polygons import (
     is_near,
     scaled,
 )
-from rtshcua.ground.geometry.shapes import Disc, Polygonal, Shape, SimplePolygon, contains, edges, parts, polygonal
+from rtshcua.ground.geometry.shapes import Polygonal, RoundArea, Shape, SimplePolygon, contains, edges, parts, polygonal
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
 #: rounding moves a corner by at most 0.71 mm, hence an edge too
@@ -57,7 +57,7 @@ def inner(shape: Shape, margin: int) -> Shape:
     """A region within the points nearer than `margin` to `shape` (or, negative, further than that from its outside)."""
     if margin == 0:
         return shape
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         return _disc(shape, margin)
     if isinstance(shape, SimplePolygon) and is_convex(shape):
         return _convex_inner(shape, margin)
@@ -77,7 +77,7 @@ def outer(shape: Shape, margin: int) -> Shape:
     """A region around the points nearer than `margin` to `shape` (or, negative, further than that from its outside)."""
     if margin == 0:
         return shape
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         return _disc(shape, margin)
     if isinstance(shape, SimplePolygon) and is_convex(shape):
         return _convex_outer(shape, margin)
@@ -92,11 +92,11 @@ def outer(shape: Shape, margin: int) -> Shape:
     return _made(lambda slack: _convolved_shrunk(shape, within_disc((0, 0), -margin - slack, fine)))
 
 
-def _disc(shape: Disc, margin: int) -> Disc:
+def _disc(shape: RoundArea, margin: int) -> RoundArea:
     radius = shape.radius + margin
     if radius <= 0:
         raise NoSuchOffset("nothing")
-    return Disc(shape.center, radius)
+    return RoundArea(shape.center, radius)
 
 
 def _fineness(shape: Polygonal) -> int:

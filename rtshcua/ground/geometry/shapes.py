@@ -17,7 +17,7 @@ from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 
 
 @dataclass(frozen=True, slots=True)
-class Disc:
+class RoundArea:
     """All points nearer to `center` than `radius`."""
 
     center: Point
@@ -46,7 +46,7 @@ class MultiPolygon:
 
 
 Polygonal = SimplePolygon | MultiPolygon
-Shape = Disc | SimplePolygon | MultiPolygon
+Shape = RoundArea | SimplePolygon | MultiPolygon
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class Region:
 
 def _flat(shape: Shape) -> tuple[int, tuple[int, ...]]:
     """The kind of a shape and its numbers, as `Zone` has them."""
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         return CIRCLE, (*shape.center, shape.radius * shape.radius)
     coordinates = tuple(c for corner in corners(shape) for c in corner)
     if isinstance(shape, SimplePolygon):
@@ -102,7 +102,7 @@ def shape_of(zone: Zone) -> Shape | None:
         return polygonal(tuple(outline(zone)))
     x, y, square = zone.data
     radius = isqrt(square)
-    return Disc((x, y), radius) if radius * radius == square else None
+    return RoundArea((x, y), radius) if radius * radius == square else None
 
 
 def polygonal(rings: tuple[Ring, ...]) -> Polygonal:
@@ -138,7 +138,7 @@ def parts(shape: Polygonal) -> list[tuple[Ring, tuple[Ring, ...]]]:
 
 def bounds(shape: Shape) -> tuple[int, int, int, int]:
     """West, south, east, north."""
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         (x, y), r = shape.center, shape.radius
         return x - r, y - r, x + r, y + r
     xs, ys = zip(*corners(shape), strict=True)
@@ -168,12 +168,12 @@ def _above(high: int, low: int, high_within: int, low_within: int, surely: bool)
 
 @lru_cache(maxsize=1024)  # programs share zones, and an editor asks again at every change
 def _flat_within(inner: Shape, outer: Shape, surely: bool) -> bool:
-    if isinstance(outer, Disc):
-        if isinstance(inner, Disc):
+    if isinstance(outer, RoundArea):
+        if isinstance(inner, RoundArea):
             room = outer.radius - inner.radius
             return room >= 0 and square(inner.center, outer.center) <= room * room
         return all(square(corner, outer.center) <= outer.radius * outer.radius for corner in corners(inner))
-    if isinstance(inner, Disc):
+    if isinstance(inner, RoundArea):
         return contains(outer, inner.center) and all(
             is_beyond(inner.center, edge, inner.radius) for edge in edges(outer)
         )
@@ -197,12 +197,12 @@ def are_disjoint(one: Region, other: Region, *, surely: bool = True) -> bool:
 
 @lru_cache(maxsize=1024)
 def _flat_disjoint(one: Shape, other: Shape, surely: bool) -> bool:
-    if isinstance(one, Disc):
-        if isinstance(other, Disc):
+    if isinstance(one, RoundArea):
+        if isinstance(other, RoundArea):
             reach = one.radius + other.radius
             return square(one.center, other.center) >= reach * reach
         return not contains(other, one.center) and all(is_beyond(one.center, edge, one.radius) for edge in edges(other))
-    if isinstance(other, Disc):
+    if isinstance(other, RoundArea):
         return _flat_disjoint(other, one, surely)
     try:
         return not any(first and second for first, second in _sides(one, other))

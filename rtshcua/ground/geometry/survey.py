@@ -23,7 +23,7 @@ from rtshcua.ground.geometry.polygons import (
     path_length,
     sides,
 )
-from rtshcua.ground.geometry.shapes import Disc, Shape, parts
+from rtshcua.ground.geometry.shapes import RoundArea, Shape, parts
 
 #: the outer ring of an area, and its holes
 Rings = tuple[Ring, ...]
@@ -139,7 +139,7 @@ def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | N
         shape = _inset(area, max(inset, LEAST_INSET))
     except NoSuchOffset:
         return None
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         rings: Rings = (_regular(shape.center, shape.radius),)
     else:
         found = parts(shape)

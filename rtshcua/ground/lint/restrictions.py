@@ -21,12 +21,12 @@ from rtshcua.ground.analysis.box import clipped, present
 from rtshcua.ground.analysis.plane import rings_of
 from rtshcua.ground.analysis.solve import Goal, No
 from rtshcua.ground.analysis.space import SituationSpace
-from rtshcua.ground.geometry.shapes import Disc, Region, lies_within, polygonal
+from rtshcua.ground.geometry.shapes import Region, RoundArea, lies_within, polygonal
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.ruleset import Ruleset
 from rtshcua.model.flat.contract import PLACE, Contract
 from rtshcua.model.flat.limits import DAY, MAX_VALUE
-from rtshcua.model.flat.policy import Policy, RuleKind, Vehicle
+from rtshcua.model.flat.policy import Policy, RuleKind, VehicleLimits
 from rtshcua.model.flat.signal import NUMBER
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 from rtshcua.model.ir.policies import Delegation, RuleDecl
@@ -51,14 +51,14 @@ class VehicleReach(NamedTuple):
             x, y, squared = zone.data
             return isqrt(squared) - isqrt(x * x + y * y) - 1 > self.across
         plan = Region(polygonal(rings_of(zone)), LOWEST, HIGHEST)
-        return lies_within(Region(Disc((0, 0), self.across), LOWEST, HIGHEST), plan)
+        return lies_within(Region(RoundArea((0, 0), self.across), LOWEST, HIGHEST), plan)
 
     def misses(self, zone: Zone) -> bool:
         """Whether it is proved that a zone has nothing of it."""
         return zone.floor > self.up or zone.ceiling < self.down or _distance(zone) > self.across
 
 
-def reach_of(vehicle: Vehicle) -> VehicleReach:
+def reach_of(vehicle: VehicleLimits) -> VehicleReach:
     """Where a vehicle may come. Down it may come faster than it climbs, but not further than it flies."""
 
     def flown(speed: int) -> int:
@@ -86,7 +86,7 @@ def region_of(zone: Zone) -> Region:
     """A zone as a region of the plane, without its times; a circle is no smaller than it is."""
     if zone.shape == CIRCLE:
         x, y, squared = zone.data
-        return Region(Disc((x, y), isqrt(squared) + 1), zone.floor, zone.ceiling)
+        return Region(RoundArea((x, y), isqrt(squared) + 1), zone.floor, zone.ceiling)
     return Region(polygonal(rings_of(zone)), zone.floor, zone.ceiling)
 
 

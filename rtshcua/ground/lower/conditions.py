@@ -24,7 +24,7 @@ from typing import Any, NamedTuple, TypeAlias
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arithmetic import COHERENT
 from rtshcua.ground.checker.conditions import is_about_phase
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.types import ZONE
 from rtshcua.ground.checker.values import typed
@@ -207,7 +207,7 @@ class ConditionPlace(NamedTuple):
 class ConditionLowering:
     """Lowers the conditions of one policy into shared slots, zones, sets and monitors."""
 
-    def __init__(self, context: Context, slots: SignalSlots, zones: ZoneTable, files: SourceTable) -> None:
+    def __init__(self, context: CheckContext, slots: SignalSlots, zones: ZoneTable, files: SourceTable) -> None:
         self._context = context
         self.slots = slots
         self.zones = zones

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from rtshcua.decision.tree import slots_read
-from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
@@ -22,7 +22,7 @@ from rtshcua.model.flat.contract import (
     Parameter,
     TimingClass,
 )
-from rtshcua.model.flat.policy import LeftOut, Vehicle
+from rtshcua.model.flat.policy import LeftOut, VehicleLimits
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ZoneDecl
@@ -57,7 +57,7 @@ class ContractLowering:
     """Lowers the skills of one policy; `numbers` are their indexes, `left_out` the clauses left out."""
 
     def __init__(
-        self, context: Context, numbers: Mapping[str, int], conditions: ConditionLowering, vehicle: Vehicle
+        self, context: CheckContext, numbers: Mapping[str, int], conditions: ConditionLowering, vehicle: VehicleLimits
     ) -> None:
         self._context = context
         self.numbers = numbers

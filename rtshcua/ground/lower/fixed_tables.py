@@ -11,7 +11,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.conditions import references
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.tables import SourceTable
@@ -34,7 +34,7 @@ class MissingFromPolicy(NamedTuple):
 class FixedTables:
     """Lowers conditions under one policy; places are those of `files`."""
 
-    def __init__(self, context: Context, under: LoweredPolicy, files: SourceTable) -> None:
+    def __init__(self, context: CheckContext, under: LoweredPolicy, files: SourceTable) -> None:
         self._context = context
         self._under = under
         self._files = files
@@ -75,7 +75,7 @@ class FixedTables:
         return unread, sound
 
 
-def knows_zone(context: Context, under: LoweredPolicy, zone: Name) -> bool:
+def knows_zone(context: CheckContext, under: LoweredPolicy, zone: Name) -> bool:
     """Whether a policy has a zone that is declared; reports it where it has not."""
     if zone.text in under.zones.index:
         return True
@@ -89,7 +89,7 @@ def knows_zone(context: Context, under: LoweredPolicy, zone: Name) -> bool:
     return False
 
 
-def _copy(context: Context, under: LoweredPolicy, files: SourceTable) -> ConditionLowering:
+def _copy(context: CheckContext, under: LoweredPolicy, files: SourceTable) -> ConditionLowering:
     """The tables of the policy, copied: what conditions add to the copy is seen, and thrown away."""
     # `deepcopy` asks by identity what to leave as it is
     memo: dict[int, Any] = {id(each): each for each in (context, context.report, context.symbols)}

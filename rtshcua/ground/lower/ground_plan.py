@@ -18,7 +18,7 @@ from rtshcua.ground.checker.report import Report
 from rtshcua.ground.geometry.offset import within_disc
 from rtshcua.ground.geometry.overlay import Curve, TooManyPieces, Windings, nested, rounded_boundary
 from rtshcua.ground.geometry.polygons import Point, Ring, counter_clockwise, scaled, touching_edges
-from rtshcua.ground.geometry.shapes import Disc, Polygonal, Shape, SimplePolygon, corners, polygonal
+from rtshcua.ground.geometry.shapes import Polygonal, RoundArea, Shape, SimplePolygon, corners, polygonal
 from rtshcua.model.flat.zone import MAX_COORDINATE, MAX_RINGS, MAX_VERTICES, Projection, project
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import Circle, Combination, Corridor, GeoJson, Polygon, ZoneDecl
@@ -63,7 +63,7 @@ class GroundPlans:
         match shape:
             case Circle():
                 center = self.place(shape.center)
-                return None if center is None else Disc(center, shape.radius.value)
+                return None if center is None else RoundArea(center, shape.radius.value)
             case Polygon():
                 return self._polygon(shape, zone)
             case Corridor():
@@ -193,7 +193,7 @@ class GroundPlans:
 
 
 def _polygonal(shape: Shape) -> Polygonal:
-    return SimplePolygon(within_disc(shape.center, shape.radius)) if isinstance(shape, Disc) else shape
+    return SimplePolygon(within_disc(shape.center, shape.radius)) if isinstance(shape, RoundArea) else shape
 
 
 def _turned(ring: Sequence[Point], *, hole: bool) -> Ring:

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from rtshcua.decision.tree import slots_read
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.geometry.shapes import MultiPolygon, parts
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, survey
@@ -42,7 +42,7 @@ class LoweredMission(NamedTuple):
 
 
 def lower_mission(
-    context: Context, mission: MissionDecl, under: LoweredPolicy, names: Mapping[str, str], issued_at_us: int
+    context: CheckContext, mission: MissionDecl, under: LoweredPolicy, names: Mapping[str, str], issued_at_us: int
 ) -> LoweredMission | None:
     """The mission under its lowered policy, issued at a UTC time in us; None after a finding."""
     assert mission.role is not None
@@ -82,7 +82,7 @@ def lower_mission(
     return LoweredMission(flat, joint)
 
 
-def _fits(context: Context, mission: MissionDecl) -> bool:
+def _fits(context: CheckContext, mission: MissionDecl) -> bool:
     good = True
     steps = sum(len(phase.steps) for phase in mission.phases)
     for code, count, limit, what in (
@@ -100,7 +100,7 @@ def _fits(context: Context, mission: MissionDecl) -> bool:
     return good
 
 
-def argument_span(context: Context, step: Step, parameter: str) -> Span:
+def argument_span(context: CheckContext, step: Step, parameter: str) -> Span:
     """Where the argument of a parameter is written in a step; the step itself where the default holds."""
     skill = context.symbols.skills[step.skill.text]
     for position, argument in enumerate(step.arguments):
@@ -113,7 +113,7 @@ def argument_span(context: Context, step: Step, parameter: str) -> Span:
 class StepLowering:
     """Lowers the steps of one mission; `files` are the policy's and the mission's."""
 
-    def __init__(self, context: Context, mission: MissionDecl, under: LoweredPolicy, files: SourceTable) -> None:
+    def __init__(self, context: CheckContext, mission: MissionDecl, under: LoweredPolicy, files: SourceTable) -> None:
         self._context = context
         self._mission = mission
         self._under = under

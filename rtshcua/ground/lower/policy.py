@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.conditions import references
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.scope import Scope, signal_type
 from rtshcua.ground.checker.symbols import brought_about
 from rtshcua.ground.checker.types import Type
@@ -69,7 +69,7 @@ class LoweredPolicy:
 
 
 def lower_policy(
-    context: Context, policy: PolicyDecl, vehicle: VehicleDecl, files: frozenset[str], names: Mapping[str, str]
+    context: CheckContext, policy: PolicyDecl, vehicle: VehicleDecl, files: frozenset[str], names: Mapping[str, str]
 ) -> LoweredPolicy | None:
     """The policy for a vehicle; `files` is its import closure, `names` what a file is called in what is signed.
 
@@ -135,7 +135,9 @@ def lower_policy(
     )
 
 
-def _index_sources(context: Context, sources: SourceTable, parts: Iterable[Node], skills: Sequence[SkillDecl]) -> None:
+def _index_sources(
+    context: CheckContext, sources: SourceTable, parts: Iterable[Node], skills: Sequence[SkillDecl]
+) -> None:
     """Name all the files that the policy rests on, quoted or not."""
     sizes = [context.symbols.sizes[each.name.text] for each in skills if each.name.text in context.symbols.sizes]
     parts = (*parts, *skills, *sizes)
@@ -149,7 +151,7 @@ def _index_sources(context: Context, sources: SourceTable, parts: Iterable[Node]
 
 
 def _read_measured(
-    context: Context, vehicle: VehicleDecl, conditions: ConditionLowering, files: frozenset[str]
+    context: CheckContext, vehicle: VehicleDecl, conditions: ConditionLowering, files: frozenset[str]
 ) -> None:
     """Give slots to the signals that are watched where they are declared; last, so that the others keep theirs."""
     if vehicle.cells is None and any(each.name == CELL for each in conditions.slots.signals):
@@ -165,7 +167,7 @@ def _read_measured(
             conditions.slots.of(name)
 
 
-def _skills(context: Context, policy: PolicyDecl, files: frozenset[str]) -> list[SkillDecl]:
+def _skills(context: CheckContext, policy: PolicyDecl, files: frozenset[str]) -> list[SkillDecl]:
     """The skills of a policy, sorted by name."""
     table = context.symbols.skills
     links: list[LinkDecl] = [*policy.contingency, *(rule.target for rule in policy.rules if rule.target is not None)]
@@ -188,7 +190,7 @@ def _roles(policy: PolicyDecl) -> tuple[str, ...]:
     return tuple(sorted(named | asked))
 
 
-def _well_known(context: Context, policy: PolicyDecl, read: Mapping[str, Type], files: frozenset[str]) -> bool:
+def _well_known(context: CheckContext, policy: PolicyDecl, read: Mapping[str, Type], files: frozenset[str]) -> bool:
     """Whether the signals are declared that every decision reads, or all supervision."""
     good = True
     declared = {name: type for name, type in {**MEASURED, **PER_CELL}.items() if _is_declared(context, name, files)}
@@ -215,7 +217,7 @@ def _well_known(context: Context, policy: PolicyDecl, read: Mapping[str, Type], 
     return good
 
 
-def _is_declared(context: Context, name: str, files: frozenset[str]) -> bool:
+def _is_declared(context: CheckContext, name: str, files: frozenset[str]) -> bool:
     signal = context.symbols.signals.get(name)
     return signal is not None and signal.span.file in files
 
@@ -238,7 +240,7 @@ def _airspace(policy: PolicyDecl, zones: ZoneTable, files: SourceTable) -> Airsp
 class RuleLowering:
     """Lowers the rules of one policy; `roles` are the indexes of its roles."""
 
-    def __init__(self, context: Context, roles: Mapping[str, int], contracts: ContractLowering) -> None:
+    def __init__(self, context: CheckContext, roles: Mapping[str, int], contracts: ContractLowering) -> None:
         self._context = context
         self._roles = roles
         self._contracts = contracts

@@ -20,7 +20,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.zones import named
 from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import references
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.symbols import WORDS, brought_about
 from rtshcua.model.flat import limits
 from rtshcua.model.flat.contract import Contract
@@ -32,7 +32,7 @@ from rtshcua.model.ir.skills import ClauseDecl, LinkDecl, SkillDecl
 
 
 def is_self_contained(
-    context: Context, policy: PolicyDecl, skills: Sequence[SkillDecl], vehicle: VehicleDecl, files: frozenset[str]
+    context: CheckContext, policy: PolicyDecl, skills: Sequence[SkillDecl], vehicle: VehicleDecl, files: frozenset[str]
 ) -> bool:
     """Whether everything that a policy and its skills name is declared in its files; reports what is not, once each."""
     foreign: dict[str, Span] = {}
@@ -67,7 +67,7 @@ def is_self_contained(
     return not [each for each in skills if not _own_sizes(context, policy, each, files)] and not foreign
 
 
-def _own_sizes(context: Context, policy: PolicyDecl, skill: SkillDecl, files: frozenset[str]) -> bool:
+def _own_sizes(context: CheckContext, policy: PolicyDecl, skill: SkillDecl, files: frozenset[str]) -> bool:
     """Whether what is said of a skill's sizes stands in the policy's files; reports what does not."""
     sizes = context.symbols.sizes.get(skill.name.text)
     if sizes is None or sizes.span.file in files:
@@ -136,7 +136,11 @@ def rule_applies(rule: RuleDecl, without: frozenset[str]) -> bool:
 
 
 def check_fitted(
-    context: Context, policy: PolicyDecl, vehicle: VehicleDecl, skills: Iterable[SkillDecl], zones: Iterable[ZoneDecl]
+    context: CheckContext,
+    policy: PolicyDecl,
+    vehicle: VehicleDecl,
+    skills: Iterable[SkillDecl],
+    zones: Iterable[ZoneDecl],
 ) -> None:
     """Report the rules and clauses of a policy, and its zones, that read what the vehicle is without."""
     for rule in policy.rules:
@@ -159,7 +163,7 @@ def check_fitted(
             _clock(context, vehicle, [zone.daily.span], f"`{zone.name.text}` is active at times of the local day")
 
 
-def check_step_fitted(context: Context, vehicle: VehicleDecl, own: Sequence[ClauseDecl]) -> bool:
+def check_step_fitted(context: CheckContext, vehicle: VehicleDecl, own: Sequence[ClauseDecl]) -> bool:
     """Whether a step's own clauses read only sensors that the vehicle has; reports what else they read."""
     for clause in own:
         _clock(context, vehicle, _timed(clause.condition))
@@ -169,7 +173,7 @@ def check_step_fitted(context: Context, vehicle: VehicleDecl, own: Sequence[Clau
     return len(context.report.found) == before
 
 
-def _sensors(context: Context, vehicle: VehicleDecl, condition: Condition, help: str) -> None:
+def _sensors(context: CheckContext, vehicle: VehicleDecl, condition: Condition, help: str) -> None:
     listed = {name.text: name.span for name in vehicle.without}
     for name, span in unfitted_signals(condition, frozenset(listed)).items():
         context.report.add(
@@ -189,7 +193,7 @@ def _timed(condition: Condition) -> Iterator[Span]:
 
 
 def _clock(
-    context: Context, vehicle: VehicleDecl, spans: Iterable[Span], words: str = "this reads the local time"
+    context: CheckContext, vehicle: VehicleDecl, spans: Iterable[Span], words: str = "this reads the local time"
 ) -> None:
     if vehicle.utc_offset is not None or vehicle.time_zone is not None:
         return
@@ -207,7 +211,7 @@ def _clock(
 _Count = tuple[Span, str, int, int]
 
 
-def fits_on_board(context: Context, policy: PolicyDecl, flat: Policy) -> bool:
+def fits_on_board(context: CheckContext, policy: PolicyDecl, flat: Policy) -> bool:
     """Whether a lowered policy fits on board; reports each number that does not."""
     good = True
     skills = ((contract, context.symbols.skills[contract.name].name.span) for contract in flat.contracts)

@@ -7,7 +7,7 @@ from math import gcd
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.signals import selected_value, sentinel
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import Kind, Type
@@ -66,7 +66,7 @@ class MonitorTable:
 class SignalSlots:
     """Slots in the order in which signals are first asked for; a position has two. `cells` are those of the battery."""
 
-    def __init__(self, context: Context, cells: int = 1) -> None:
+    def __init__(self, context: CheckContext, cells: int = 1) -> None:
         self._context = context
         self._cells = cells
         self._slots: dict[str, int] = {}
@@ -137,7 +137,7 @@ class SignalSlots:
             yield each.field.text, value
 
 
-def enum_labels(context: Context, enum: EnumDecl) -> tuple[tuple[int, str], ...]:
+def enum_labels(context: CheckContext, enum: EnumDecl) -> tuple[tuple[int, str], ...]:
     """Every value of an enumeration with its name, by value: the declared ones, then what else the dialect knows."""
     labels: dict[int, str] = {}
     if enum.dialect is not None:

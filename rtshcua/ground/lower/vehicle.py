@@ -9,7 +9,7 @@ from typing import Final
 
 from rtshcua.ground.checker import time_zones
 from rtshcua.ground.checker.checks.vehicles import deceleration, gained
-from rtshcua.model.flat.policy import Speeds, Vehicle
+from rtshcua.model.flat.policy import Speeds, VehicleLimits
 from rtshcua.model.ir.places import VehicleDecl
 
 #: mm/s; below which height a landing is slow, mm; mm/s in a second
@@ -52,10 +52,10 @@ def speeds_of(vehicle: VehicleDecl) -> Speeds:
 
 def lower_vehicle(
     vehicle: VehicleDecl, position: int, height: int, battery: int, north: int = -1, east: int = -1, down: int = -1
-) -> Vehicle:
+) -> VehicleLimits:
     """The vehicle in the flat form; the numbers are the slots of the signals that supervision reads, -1 for none."""
     braking, zone = vehicle.braking, vehicle.time_zone
-    return Vehicle(
+    return VehicleLimits(
         name=vehicle.name.text,
         identity=vehicle.identity,
         home_within=vehicle.within.value,

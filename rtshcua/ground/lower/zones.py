@@ -18,7 +18,7 @@ from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.geometry.offset import NoSuchOffset, inner, outer
 from rtshcua.ground.geometry.polygons import Point, square
-from rtshcua.ground.geometry.shapes import Disc, Region, Shape, are_disjoint, bounds, contains, lies_within
+from rtshcua.ground.geometry.shapes import Region, RoundArea, Shape, are_disjoint, bounds, contains, lies_within
 from rtshcua.ground.lower.ground_plan import GroundPlans
 from rtshcua.ground.lower.tables import ValueSets
 from rtshcua.model.flat.code import Op
@@ -90,7 +90,7 @@ class ZoneHeights:
 NOWHERE = Zone("nowhere", CIRCLE, LOWEST, LOWEST, (0, 0, 1))
 EVERYWHERE = Zone("everywhere", CIRCLE, LOWEST, HIGHEST, (0, 0, MAX_COORDINATE * MAX_COORDINATE))
 #: stands for a zone that has no ground plan, after a finding
-_UNKNOWN = Disc((0, 0), 1)
+_UNKNOWN = RoundArea((0, 0), 1)
 
 
 class ZoneTable:
@@ -277,7 +277,7 @@ def _hours(zone: ZoneDecl) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 
 def _contains(shape: Shape, point: Point) -> bool:
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         return square(point, shape.center) < shape.radius * shape.radius
     return contains(shape, point)
 

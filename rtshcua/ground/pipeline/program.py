@@ -10,7 +10,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.check import check_declarations
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.lookup import find_mission
 from rtshcua.ground.checker.report import Report
@@ -168,12 +168,12 @@ class Compilation:
         self._tested: dict[tuple[str, str], PolicyUnderTest | None] = {}
         self._flown: dict[str, ScenarioMission] = {}
         data = DataFiles(program.data, program.data_names)
-        self.context = Context(collect(program.units, program.broken), self.report, dialect, data=data)
+        self.context = CheckContext(collect(program.units, program.broken), self.report, dialect, data=data)
         if self.whole:
             plain = elaborate(self.context, program.units, self._imports.closure, chosen, given)
             symbols = collect(plain.units, program.broken)
             instances, samples = plain.instances, plain.samples
-            self.context = Context(symbols, self.report, dialect, instances=instances, samples=samples, data=data)
+            self.context = CheckContext(symbols, self.report, dialect, instances=instances, samples=samples, data=data)
 
     def check(self) -> None:
         """Check all declarations; where a file is missing or an import unread, half of all names would be unknown."""

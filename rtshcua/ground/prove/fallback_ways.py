@@ -26,7 +26,7 @@ from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.step_starts import StartPlace, from_home, planned
 from rtshcua.ground.prove.step_times import MissionStep, StepTime, zone_span
 from rtshcua.model.flat.contract import PLACE, MotionKind
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 from rtshcua.model.flat.zone import HIGHEST
 from rtshcua.model.quantity import Dimension, display
 
@@ -175,7 +175,7 @@ class FallbackWays:
         to: Sequence[Point],
         home: bool,
         airspace: PreparedAirspace,
-        vehicle: Vehicle,
+        vehicle: VehicleLimits,
         told: AbstractSet[Point] = frozenset(),
     ) -> Departure | None:
         """A place of the path from where the straight way leaves the airspace, but not of a leg from one that was
@@ -198,7 +198,7 @@ class FallbackWays:
         return None
 
     def _leg(
-        self, leg: Leg, flown: FlownPath, to: Sequence[Point], returns: Vehicle | None, airspace: PreparedAirspace
+        self, leg: Leg, flown: FlownPath, to: Sequence[Point], returns: VehicleLimits | None, airspace: PreparedAirspace
     ) -> Stretch | None:
         """The part of the way from somewhere on a leg that leaves the airspace; `returns` is who flies home on it."""
         limit = 0 if returns is None else near_home(returns)
@@ -343,7 +343,7 @@ def _above(height: int) -> str:
 
 
 def _stretches(
-    points: Sequence[Point], flown: FlownPath, to: Sequence[Point], returns: Vehicle | None, *, near: bool
+    points: Sequence[Point], flown: FlownPath, to: Sequence[Point], returns: VehicleLimits | None, *, near: bool
 ) -> list[Stretch]:
     """The parts of the way from some places to where it leads; `near`: some of these are near home."""
     if returns is None:

@@ -13,7 +13,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span as Where
 from rtshcua.ground.analysis.condition_trees import ALWAYS, NEVER, replace_atoms
 from rtshcua.ground.analysis.solve import Questions
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.model.flat.code import Clause
@@ -65,7 +65,7 @@ class ProofContext:
     `impossible` are the skills whose contracts were reported to contradict themselves: no step of one is looked at.
     """
 
-    context: Context
+    context: CheckContext
     lowered: LoweredPolicy
     prepared: PreparedPolicy
     anything: tuple[Value, ...]

@@ -10,7 +10,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.solve import Questions
 from rtshcua.ground.analysis.space import signals
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.prove.contradiction import prove_contracts, prove_step_contract
 from rtshcua.ground.prove.deferral import prove_deferrals, prove_observation_time, prove_step_deferral
@@ -47,7 +47,7 @@ POLICY_PROOFS = (
 )  # fmt: skip
 
 
-def prove_policy(context: Context, lowered: LoweredPolicy) -> ProofContext | None:
+def prove_policy(context: CheckContext, lowered: LoweredPolicy) -> ProofContext | None:
     """The policy prepared as on board, after its proofs; None where it would be refused there."""
     found = _prepared(lowered.policy)
     if isinstance(found, Refusal):
@@ -105,7 +105,7 @@ def prove_mission(proof: ProofContext, declared: MissionDecl, mission: Mission) 
     return flown
 
 
-def report_refused(context: Context, lowered: LoweredPolicy, malformed: Refusal) -> None:
+def report_refused(context: CheckContext, lowered: LoweredPolicy, malformed: Refusal) -> None:
     """Report what would not be loaded on board."""
     context.report.add(
         codes.REFUSED_ON_BOARD,

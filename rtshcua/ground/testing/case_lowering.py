@@ -17,7 +17,7 @@ from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.arguments import bind_value, pair
 from rtshcua.ground.checker.checks.premises import TestStart, nominal_of, start_of
 from rtshcua.ground.checker.checks.tests import unranged
-from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.lower.mission import lower_mission
@@ -46,7 +46,7 @@ OWN_SOURCE = "operator"
 class Requests:
     """The requests of the tests under one policy; those that are the same are made once. `names` are for spans."""
 
-    def __init__(self, context: Context, policy: PolicyUnderTest, names: Mapping[str, str]) -> None:
+    def __init__(self, context: CheckContext, policy: PolicyUnderTest, names: Mapping[str, str]) -> None:
         self._context = context
         self._policy = policy
         self._names = names
@@ -197,13 +197,13 @@ Lower = Callable[[PolicyDecl, VehicleDecl], PolicyUnderTest | None]
 class _Under:
     """What is kept for all tests under one policy."""
 
-    def __init__(self, context: Context, policy: PolicyUnderTest, names: Mapping[str, str]) -> None:
+    def __init__(self, context: CheckContext, policy: PolicyUnderTest, names: Mapping[str, str]) -> None:
         self.policy = policy
         self.requests = Requests(context, policy, names)
         self.situations = Situations(context, policy)
 
 
-def cases_of(context: Context, lower: Lower, names: Mapping[str, str]) -> Iterator[PolicyCase]:
+def cases_of(context: CheckContext, lower: Lower, names: Mapping[str, str]) -> Iterator[PolicyCase]:
     """The cases of the tests in `context`, which were checked; without those in which something is found.
 
     `lower` gives a policy for a vehicle, `names` what files are called in what is signed.
@@ -226,7 +226,9 @@ def cases_of(context: Context, lower: Lower, names: Mapping[str, str]) -> Iterat
 class _Cases:
     """The cases of one test."""
 
-    def __init__(self, context: Context, under: _Under, test: TestDecl, request: RequestDecl, start: TestStart) -> None:
+    def __init__(
+        self, context: CheckContext, under: _Under, test: TestDecl, request: RequestDecl, start: TestStart
+    ) -> None:
         self._context = context
         self._under = under
         self._test = test

@@ -13,7 +13,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.analysis.space import means_unknown
 from rtshcua.ground.checker.condition_nodes import walk
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.lower.conditions import ConditionLowering
 from rtshcua.ground.lower.policy import LoweredPolicy
@@ -54,7 +54,7 @@ class MonitorIndex:
             self.texts.append(text)
 
 
-def monitors_of(context: Context, under: LoweredPolicy) -> MonitorIndex:
+def monitors_of(context: CheckContext, under: LoweredPolicy) -> MonitorIndex:
     """All that the rules of a policy, and the contracts under it, observe over time."""
     found = MonitorIndex()
     for condition in _conditions(context, under) if under.policy.monitors else ():
@@ -64,7 +64,7 @@ def monitors_of(context: Context, under: LoweredPolicy) -> MonitorIndex:
     return found
 
 
-def _conditions(context: Context, under: LoweredPolicy) -> Iterator[Condition]:
+def _conditions(context: CheckContext, under: LoweredPolicy) -> Iterator[Condition]:
     for rule in under.rules:
         if rule.when is not None:
             yield rule.when
@@ -113,7 +113,7 @@ class SubjectValue(NamedTuple):
 class Situations:
     """Makes the states of the cases under one policy; what it does not read is reported, once each."""
 
-    def __init__(self, context: Context, policy: PolicyUnderTest) -> None:
+    def __init__(self, context: CheckContext, policy: PolicyUnderTest) -> None:
         self._context = context
         self._policy = policy
         self._signals = {signal.name: signal for signal in policy.lowered.policy.signals}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import nearest
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.lower.tables import shortened
 from rtshcua.ground.testing.case import PolicyUnderTest
 from rtshcua.ground.testing.coverage_goals import clauses_of
@@ -40,7 +40,7 @@ def quotes(quoted: str, text: str) -> bool:
 
 
 def quoted_clauses(
-    context: Context, expected: Expectation, invocation: PreparedInvocation, policy: PolicyUnderTest
+    context: CheckContext, expected: Expectation, invocation: PreparedInvocation, policy: PolicyUnderTest
 ) -> tuple[Decisive, ...]:
     """The clause that an expectation quotes, in all its flat forms; none where it quotes none, or after a finding: that
     it quotes what no decision on this request can name, or what could be several.
@@ -61,7 +61,7 @@ def quoted_clauses(
 
 
 def _unknown(
-    context: Context, expected: Expectation, invocation: PreparedInvocation, every: Sequence[_Candidate]
+    context: CheckContext, expected: Expectation, invocation: PreparedInvocation, every: Sequence[_Candidate]
 ) -> None:
     quoted = expected.clause
     assert quoted is not None
@@ -108,7 +108,7 @@ def _nearest(words: str, texts: Sequence[str]) -> str | None:
     return f"{near} {REST}" if len(fitting) == 1 else fitting[0]
 
 
-def _ambiguous(context: Context, expected: Expectation, fitting: Sequence[_Candidate]) -> None:
+def _ambiguous(context: CheckContext, expected: Expectation, fitting: Sequence[_Candidate]) -> None:
     quoted = expected.clause
     assert quoted is not None
     texts = list(dict.fromkeys(shortened(each.text) for each in fitting))

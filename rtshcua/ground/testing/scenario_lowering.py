@@ -11,7 +11,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.checks.scenarios import OBSTACLE
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.faults import fault_of
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.lower.conditions import ConditionPlace
@@ -99,7 +99,7 @@ class ScenarioSuite:
 
 
 def scenarios_of(
-    context: Context, missions: Mapping[str, ScenarioMission], names: Mapping[str, str]
+    context: CheckContext, missions: Mapping[str, ScenarioMission], names: Mapping[str, str]
 ) -> Iterator[ScenarioFlight]:
     """The scenarios in `context`, which were checked; without those in which something is found.
 
@@ -116,7 +116,7 @@ def scenarios_of(
 class _Lowering:
     """One scenario's lowering."""
 
-    def __init__(self, context: Context, under: ScenarioMission, names: Mapping[str, str]) -> None:
+    def __init__(self, context: CheckContext, under: ScenarioMission, names: Mapping[str, str]) -> None:
         self._context = context
         self._under = under
         self._lowered = under.policy.lowered

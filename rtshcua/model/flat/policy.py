@@ -110,7 +110,7 @@ class Speeds(Flat, frozen=True):
     flight_us: int
 
 
-class Vehicle(Flat, frozen=True):
+class VehicleLimits(Flat, frozen=True):
     """The one aircraft this policy is for. Lengths mm, speeds mm/s, times us, charge 1/10000.
 
     `position`, `height`, `battery` are the state slots of the well-known signals (-1: the policy declares none).
@@ -178,7 +178,7 @@ class Policy(Flat, frozen=True):
 
     name: str
     version: int
-    vehicle: Vehicle
+    vehicle: VehicleLimits
     projection: Projection
     roles: tuple[str, ...]
     signals: tuple[Signal, ...]

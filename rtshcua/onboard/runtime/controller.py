@@ -27,7 +27,7 @@ from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback import Fallback
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.onboard.runtime.limits import Limits
-from rtshcua.onboard.runtime.link import STOOD_STILL, LinkSilence, LinkState, LinkSupervision
+from rtshcua.onboard.runtime.link import STOOD_STILL, EndedSilence, LinkState, LinkSupervision
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView
@@ -180,7 +180,7 @@ class MissionController:
             limit_us += self._policy.vehicle.endurance_us
         return self.link.waited_us(now_us) > limit_us
 
-    def _heard_again(self, now: Now, silence: LinkSilence) -> None:
+    def _heard_again(self, now: Now, silence: EndedSilence) -> None:
         """State is judged again after a silence. One that was too long ends the mission, if the policy says so."""
         policy, waited = self._policy, f"after {silence.awaited_us // 1_000} ms"
         if silence.missing:

@@ -30,7 +30,7 @@ STOOD_STILL: Final = "stood-still"
 AIR_STATE = "whether it is in the air"
 
 
-class LinkSilence(Frozen):
+class EndedSilence(Frozen):
     """A silence that is over, or a stall of this computer: how long the vehicle was not heard (0 if there was only a
     stall), how long fresh state was then waited for, both in us, and what was not reported again in time.
     """
@@ -177,7 +177,7 @@ class LinkSupervision:
             return True
         return False
 
-    def judged(self, now_us: int) -> tuple[int, LinkSilence | None]:
+    def judged(self, now_us: int) -> tuple[int, EndedSilence | None]:
         """State is judged now, though some may still be awaited: for how long it was not, and the silence if that is
         over with it.
 
@@ -190,7 +190,7 @@ class LinkSupervision:
         if self._first_back_us is not None:
             lasted_us = 0 if self._since_us is None else self._back_us - self._since_us
             awaited_us = now_us - max(self._back_us, self._resumed_us)
-            silence = LinkSilence(lasted_us, awaited_us, self._missing(now_us))
+            silence = EndedSilence(lasted_us, awaited_us, self._missing(now_us))
             self._since_us = self._waits_us = self._first_back_us = None
         if now_us >= self._until_us or not (self._awaits_air or self._pending):
             self._forget()

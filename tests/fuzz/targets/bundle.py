@@ -11,7 +11,7 @@ from fuzz.mutation.trees import changed
 from reference import world as reference
 from rtshcua.app.documents import claimed
 from rtshcua.decision.prepare import prepare
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.showing.policy import show_mission, show_policy
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -90,7 +90,7 @@ def raw(data: bytes, vehicle: str = reference.VEHICLE, utc_us: int = reference.S
     except Untrusted:
         pass
     else:
-        page = Page()
+        page = TextPage()
         show_mission(page, what.mission, what.policy)
         show_policy(page, what.policy)
         assert str(page).replace("\n", "").isprintable()

@@ -11,7 +11,7 @@ from reference.random_expressions import PHASES
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import check_condition
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.language.parse import parse
@@ -34,7 +34,7 @@ def one(data: bytes) -> None:
     symbols, known = declared()
     for clause in (clause for skill in parsed.unit.skills for clause in skill.require):
         report = Report(sources)
-        context = Context(symbols, report, known)
+        context = CheckContext(symbols, report, known)
         check_condition(Scope(symbols, report, context.arguments(symbols.skills["probe"])), clause.condition)
         world.hold(report.found, sources)
         grown = any(isinstance(part, Grow) for part in walk(clause.condition))  # of these circles, none is built

@@ -12,7 +12,7 @@ from rtshcua.decision.volume import Planner, flown_at, near_home
 from rtshcua.decision.zones import WellKnown
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import Motion, MotionKind
-from rtshcua.model.flat.policy import Policy, Vehicle
+from rtshcua.model.flat.policy import Policy, VehicleLimits
 from virtual.rows import rows
 
 M = 1_000
@@ -27,7 +27,7 @@ def returning(metres: int) -> Policy:
     return msgspec.structs.replace(policy, vehicle=vehicle)
 
 
-def vehicle(metres: int) -> Vehicle:
+def vehicle(metres: int) -> VehicleLimits:
     return returning(metres).vehicle
 
 

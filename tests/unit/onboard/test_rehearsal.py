@@ -7,7 +7,7 @@ from reference.flat_case import BATTERY, HEIGHT, LINK, MISSION, POSITION_X, POSI
 from reference.world import START, FakeVehicle, Run, allowed, loaded
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Plan
-from rtshcua.model.flat.policy import Vehicle
+from rtshcua.model.flat.policy import VehicleLimits
 from rtshcua.model.flat.situation import State
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.ports import Ending
@@ -95,6 +95,6 @@ def test_what_was_never_told_stays_unknown_and_what_is_not_declared_is_left_alon
     unknown = state(**{f"s{POSITION_X}": None, f"s{HEIGHT}": None})
     after = flown(unknown, Plan(MotionKind.FLY, (5, 6), 7, 0), vehicle)
     assert (after.values[POSITION_X], after.values[HEIGHT]) == (None, None)
-    without = Vehicle(**{name: getattr(vehicle, name) for name in vehicle.__struct_fields__} | {"position": -1})
+    without = VehicleLimits(**{name: getattr(vehicle, name) for name in vehicle.__struct_fields__} | {"position": -1})
     moved = flown(state(), Plan(MotionKind.FLY, (5, 6), 7, 0), without)
     assert (moved.values[POSITION_X], moved.values[HEIGHT]) == (0, 7)

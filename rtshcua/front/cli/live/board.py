@@ -3,7 +3,7 @@
 from collections import deque
 from typing import NamedTuple
 
-from rtshcua.app.fly.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, tenths
+from rtshcua.app.fly.story import Asks, FlightPlanView, Happened, Happening, Message, Note, Snapshot, Summary, tenths
 from rtshcua.front.cli.live.lines import alarm, sentence, waiting_for
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView, SignalReading
@@ -18,7 +18,7 @@ _STATES = {"dispatched": "running", "succeeded": "done", "skipped": "skipped"} |
 )
 
 
-class Said(NamedTuple):
+class BoardLine(NamedTuple):
     """A line of what happened, and the outcome of the decision that it tells (`note`: a word about the run)."""
 
     text: str
@@ -41,12 +41,12 @@ class Board:
     """
 
     def __init__(self) -> None:
-        self.plan: Plan | None = None
+        self.plan: FlightPlanView | None = None
         self.view: RuntimeView | None = None
         self.summary: Summary | None = None
         self.note = ""
         self.steps: dict[int, str] = {}
-        self.latest: deque[Said] = deque(maxlen=_LATEST)
+        self.latest: deque[BoardLine] = deque(maxlen=_LATEST)
         self.track: deque[tuple[int, int]] = deque(maxlen=_TRACK)
         self.longest_us = 0
         self._alarm: Happening | None = None
@@ -57,7 +57,7 @@ class Board:
     def take(self, message: Message) -> None:
         """Take in one message."""
         match message:
-            case Plan():
+            case FlightPlanView():
                 self.plan = message
             case Snapshot(view):
                 self._look(view)
@@ -65,7 +65,7 @@ class Board:
                 self._happen(what)
             case Note(text):
                 self.note = text
-                self.latest.append(Said(text, "note"))
+                self.latest.append(BoardLine(text, "note"))
             case Summary():
                 self.summary = message
 
@@ -116,7 +116,7 @@ class Board:
             self.track.append((x, y))
 
     def _happen(self, what: Happening) -> None:
-        self.latest.append(Said(line(what), what.outcome))
+        self.latest.append(BoardLine(line(what), what.outcome))
         self._alarm = what if alarm(what) else self._alarm
         self._wait(what)
         if what.step < 0 or what.subject.startswith("fallback: "):

@@ -6,7 +6,7 @@ from typing import Final
 
 import msgspec
 
-from rtshcua.app.fly.story import Asks, Happened, Happening, Message, Note, Plan, Snapshot, Summary, duration
+from rtshcua.app.fly.story import Asks, FlightPlanView, Happened, Happening, Message, Note, Snapshot, Summary, duration
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.evidence.gaps import seconds
@@ -38,7 +38,7 @@ def plain(message: Message) -> Iterable[str]:
 
 def _plain(message: Message) -> Iterable[str]:
     match message:
-        case Plan():
+        case FlightPlanView():
             yield f"mission {message.mission} under {message.policy} on {message.vehicle}, mode {message.mode}"
         case Happened(what):
             yield f"{what.t_us / 1_000_000:9.2f} s  {_sentence(what)}"

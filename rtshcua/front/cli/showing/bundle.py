@@ -3,14 +3,14 @@
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.documents import claimed
-from rtshcua.front.cli.showing.page import Page, named
+from rtshcua.front.cli.showing.page import TextPage, named
 from rtshcua.front.cli.showing.policy import show_mission, show_policy
 from rtshcua.wire.bundle import open_bundle
 from rtshcua.wire.trust import open_root
 from rtshcua.wire.untrusted import Untrusted
 
 
-def show_bundle(page: Page, data: bytes, now_us: int) -> dict[str, object]:
+def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
     """Adds a bundle to the page, and gives it for a program. Raises `Untrusted`."""
     trusted, verdict = _verdict(data, now_us)
     what = claimed(data, trusted=trusted)

@@ -4,7 +4,7 @@ from base64 import b64decode
 from typing import NamedTuple
 
 from rtshcua.app.wording import utc
-from rtshcua.front.cli.showing.page import Page, named
+from rtshcua.front.cli.showing.page import TextPage, named
 from rtshcua.front.cli.showing.people import NOBODY, People
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
 from rtshcua.model.flat.mission import Invocation
@@ -80,7 +80,7 @@ def kind_of_document(data: bytes) -> Artefact | None:
         return None
 
 
-def show_document(page: Page, data: bytes) -> dict[str, object]:
+def show_document(page: TextPage, data: bytes) -> dict[str, object]:
     """Adds a document to the page, and gives it for a program. Raises `Untrusted`."""
     what = said(data)
     kind = _NAMES[what.kind]

@@ -1,7 +1,7 @@
 """A trust root, and a key file: never its secret."""
 
 from rtshcua.app.wording import utc
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.wire import cose, key_file
 from rtshcua.wire.keys import ANY, Duty, VerificationKey
 from rtshcua.wire.trust import MAX_ROOT, open_root
@@ -10,7 +10,7 @@ from rtshcua.wire.trust import MAX_ROOT, open_root
 KEY_FILE = b"duty: "
 
 
-def show_root(page: Page, data: bytes, now_us: int) -> dict[str, object]:
+def show_root(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
     """Adds a trust root to the page. Its own signature is checked; whose it is, only a pin can tell.
 
     Raises `Untrusted`.
@@ -43,7 +43,7 @@ def show_root(page: Page, data: bytes, now_us: int) -> dict[str, object]:
     }
 
 
-def show_key(page: Page, data: bytes) -> dict[str, object]:
+def show_key(page: TextPage, data: bytes) -> dict[str, object]:
     """Adds a key file to the page. An encrypted one keeps its name to itself: the passphrase is not asked for.
 
     Raises `Untrusted`.

@@ -3,7 +3,7 @@
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.showing.why import truth_of
 from rtshcua.ground.why.logged_decisions import LinkTrace, state_of
 from rtshcua.model.flat.policy import Policy
@@ -13,7 +13,7 @@ from rtshcua.model.step_number import number_of, step_words
 
 
 def show_link(
-    page: Page, record: DecisionRecord, found: LinkTrace, of: PreparedInvocation | None, policy: Policy
+    page: TextPage, record: DecisionRecord, found: LinkTrace, of: PreparedInvocation | None, policy: Policy
 ) -> dict[str, object]:
     """Adds a decision on a link to the page, and gives it for a program."""
     whose = (

@@ -19,7 +19,7 @@ from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, G
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.document import recorded
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.showing.people import NOBODY, People
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.dispatcher import OBEYED
@@ -38,7 +38,7 @@ _US = re.compile(r"([+-]?)(\d{1,18}) us\b", re.ASCII)
 _KINDS = {STEP: "step", FALLBACK_LINK: "fallback of step", CONTINGENCY_LINK: "contingency"}
 
 
-def show_log(page: Page, lines: Iterable[bytes]) -> dict[str, object]:
+def show_log(page: TextPage, lines: Iterable[bytes]) -> dict[str, object]:
     """Adds a log to the page, and gives it for a program."""
     start_us, names, entries, stopped = 0, Names(None), [], None
     for number, record in enumerate(_records(lines)):
@@ -101,7 +101,7 @@ def _records(lines: Iterable[bytes]) -> Iterator[AnyRecord | Flaw]:
     return (read(line) for line in lines)
 
 
-def _head(page: Page, genesis: Genesis) -> None:
+def _head(page: TextPage, genesis: Genesis) -> None:
     page.head(f"Log of mission {genesis.mission} on {genesis.vehicle}")
     page.row("begun", f"{utc(genesis.utc_us)}, {true_to(genesis.utc_error_us)}")
     found = _bundle(genesis)

@@ -12,7 +12,7 @@ from rtshcua.front.cli.width import fitted
 _NAME = 12
 
 
-class Page:
+class TextPage:
     """Lines in order; `str()` gives them all. Every text is made harmless for a terminal before it goes in."""
 
     def __init__(self, *, bold: bool = False) -> None:
@@ -45,9 +45,9 @@ class Page:
         return "\n".join(self._lines)
 
 
-def for_terminal() -> Page:
+def for_terminal() -> TextPage:
     """A page with bold headings where the standard output shows them."""
-    return Page(bold=sys.stdout.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb")
+    return TextPage(bold=sys.stdout.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb")
 
 
 def named(value: object) -> object:

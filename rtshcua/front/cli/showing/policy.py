@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rtshcua.adapters.loop import WAIT_US
 from rtshcua.app.wording import utc
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible
@@ -17,7 +17,7 @@ from rtshcua.onboard.runtime.limits import Limits, falling_us
 _NOTHING = "nothing"
 
 
-def show_contract(page: Page, policy: Policy, contract: Contract) -> None:
+def show_contract(page: TextPage, policy: Policy, contract: Contract) -> None:
     """Adds a contract to the page."""
     parameters = [words.parameter(policy, parameter) for parameter in contract.parameters]
     page.text(f"{contract.name}({'' if parameters else ')'}")
@@ -77,7 +77,7 @@ _HOUR_US = 3_600_000_000
 _MINUTE_US = 60_000_000
 
 
-def show_policy(page: Page, policy: Policy) -> None:
+def show_policy(page: TextPage, policy: Policy) -> None:
     """Adds a policy to the page."""
     vehicle, projection = policy.vehicle, policy.projection
     page.head(f"Policy {policy.name} version {policy.version}")
@@ -157,7 +157,7 @@ def _signal(signal: Signal) -> str:
     return "; ".join(parts)
 
 
-def show_mission(page: Page, mission: Mission, policy: Policy) -> None:
+def show_mission(page: TextPage, mission: Mission, policy: Policy) -> None:
     """Adds a mission to the page."""
     page.head(f"Mission {mission.name}")
     page.row("intent", mission.intent or "not said")
@@ -174,7 +174,7 @@ def show_mission(page: Page, mission: Mission, policy: Policy) -> None:
         _show_step(page, invocation, mission, policy)
 
 
-def _show_step(page: Page, step: Invocation, mission: Mission, policy: Policy) -> None:
+def _show_step(page: TextPage, step: Invocation, mission: Mission, policy: Policy) -> None:
     contract = step.contract
     page.text(
         f"{number_of(step.step):>2} {contract.name}({words.arguments(policy, contract.parameters, step.arguments)})"

@@ -8,7 +8,7 @@ import msgspec
 
 from rtshcua.adapters.doctor.identity import unflown
 from rtshcua.app.wording import utc
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.onboard.ports import Ending
 from rtshcua.wire import cose, names
 from rtshcua.wire.qualification import MAX_QUALIFICATION, CheckOutcome, Qualification, read_qualification
@@ -71,7 +71,7 @@ def is_qualification(data: bytes) -> bool:
     return cose.unverified(data, limit=limit).content_type == names.QUALIFICATION.content_type
 
 
-def show_qualification(page: Page, data: bytes) -> dict[str, object]:
+def show_qualification(page: TextPage, data: bytes) -> dict[str, object]:
     """Adds a record to the page, and gives it for a program. Raises `Untrusted`."""
     envelope = cose.unverified(data, limit=max(len(data), MAX_QUALIFICATION))
     record = read_qualification(envelope.payload)

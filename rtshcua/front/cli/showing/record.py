@@ -12,7 +12,7 @@ from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, G
 from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.log import Names, detail_of
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.showing.people import NOBODY, People
 from rtshcua.model.durability import SYNCED
 from rtshcua.model.durability import WORDS as DURABILITIES
@@ -79,7 +79,7 @@ class Told:
             self.sealed_by = record
 
 
-def show_record(page: Page, told: Told, report: LogReport) -> dict[str, object]:
+def show_record(page: TextPage, told: Told, report: LogReport) -> dict[str, object]:
     """Adds the record to the page, and gives it for a program."""
     record, genesis = told.record, told.genesis
     assert record is not None
@@ -117,7 +117,7 @@ def show_record(page: Page, told: Told, report: LogReport) -> dict[str, object]:
     }
 
 
-def _decision(page: Page, record: DecisionRecord, told: Told, genesis: Genesis) -> None:
+def _decision(page: TextPage, record: DecisionRecord, told: Told, genesis: Genesis) -> None:
     of = f", for invocation {record.invocation}" if record.invocation else ""
     page.row("asked", f"{_ASKED.get(record.kind, 'something')}{of}")
     page.row("decided", f"{record.outcome}: {record.reason}, at step {record.rule_step} of the rules")
@@ -177,7 +177,7 @@ def _age(age_us: int) -> str:
     return f"{age_us / 1_000:g} ms old"
 
 
-def _effect(page: Page, record: Effect, told: Told) -> None:
+def _effect(page: TextPage, record: Effect, told: Told) -> None:
     page.row("event", record.event)
     if record.detail:
         page.row("says", detail_of(record.event, record.detail, told.people))

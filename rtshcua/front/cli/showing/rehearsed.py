@@ -5,7 +5,7 @@ import msgspec
 from rtshcua.app.fly.dry_run import FlightRehearsal
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.page import Page, for_terminal
+from rtshcua.front.cli.showing.page import TextPage, for_terminal
 from rtshcua.front.cli.showing.why import would_pass
 from rtshcua.front.cli.stdout import out_json, out_rendered
 from rtshcua.model.outcome import Outcome
@@ -24,7 +24,7 @@ def show_rehearsal(rehearsal: FlightRehearsal, *, as_json: bool) -> ExitCode:
     return rehearsal.exit_code
 
 
-def _page(rehearsal: FlightRehearsal) -> Page:
+def _page(rehearsal: FlightRehearsal) -> TextPage:
     loaded, found, _, refusal, unready, _ = rehearsal
     mission, page = loaded.bundle.mission, for_terminal()
     page.head(f"Rehearsal of {mission.name} on {loaded.vehicle}: nothing is sent, nothing is used up")

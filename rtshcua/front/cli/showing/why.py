@@ -8,7 +8,7 @@ from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.showing.people import NOBODY, People
 from rtshcua.ground.why.trace import ConditionCheck, ReadValue, Trace, TracedStep, read_values
 from rtshcua.model.decision import Decisive
@@ -38,7 +38,7 @@ class Case(NamedTuple):
     people: People = NOBODY
 
 
-def show_why(page: Page, trace: Trace, case: Case) -> dict[str, object]:
+def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:
     """Adds a trace to the page, and gives it for a program."""
     invocation = case.invocation
     policy, flat = invocation.policy.policy, invocation.invocation
@@ -92,7 +92,7 @@ def _subject(policy: Policy, invocation: PreparedInvocation) -> str:
     return f"Step {number_of(flat.step)}, {flat.contract.name}({arguments})"
 
 
-def _step(page: Page, step: TracedStep, case: Case, decisive: Decisive) -> dict[str, object]:
+def _step(page: TextPage, step: TracedStep, case: Case, decisive: Decisive) -> dict[str, object]:
     invocation, state = case.invocation, case.state
     verdict = {True: "passes", False: "decides", None: "not reached"}[step.passed]
     fact = "" if step.passed is None else _fact(step.number, case)

@@ -19,7 +19,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.chains import check_chain
 from rtshcua.ground.checker.conditions import check_condition
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import DURATION, HEIGHT, POSITION, SPEED, ZONE, Kind, Type
@@ -41,7 +41,7 @@ RECORDS = (*KINDS, *DURABILITIES)
 PATTERNS = ("grid", "perimeter", "orbit")
 
 
-def check_contracts(context: Context) -> None:
+def check_contracts(context: CheckContext) -> None:
     """Report every contract that leaves open what the decision needs."""
     for skill in context.symbols.skills.values():
         _complete(context, skill)
@@ -61,7 +61,7 @@ def check_contracts(context: Context) -> None:
             check_condition(scope, clause.condition)
 
 
-def more_than_full(context: Context, energy: Quantity | None, what: str) -> None:
+def more_than_full(context: CheckContext, energy: Quantity | None, what: str) -> None:
     """Report a share of the energy that no battery has."""
     if energy is not None and energy.dimension is Dimension.RATIO and energy.value > FULL:
         context.report.add(
@@ -72,7 +72,7 @@ def more_than_full(context: Context, energy: Quantity | None, what: str) -> None
         )
 
 
-def _complete(context: Context, skill: SkillDecl) -> None:
+def _complete(context: CheckContext, skill: SkillDecl) -> None:
     """Everything that has no default which would be safe in silence; a landing needs nothing to fall back on."""
     kind = None if skill.motion is None else skill.motion.kind
     written = {
@@ -96,7 +96,7 @@ def _complete(context: Context, skill: SkillDecl) -> None:
         )
 
 
-def _motion(context: Context, skill: SkillDecl, motion: MotionDecl) -> None:
+def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None:
     _parameter(context, skill, motion.altitude, HEIGHT)
     _parameter(context, skill, motion.speed, SPEED)
     _parameter(context, skill, motion.time, DURATION)
@@ -119,7 +119,7 @@ def _motion(context: Context, skill: SkillDecl, motion: MotionDecl) -> None:
                 one_of(context, codes.BAD_MOTION, choice, PATTERNS, "survey pattern")
 
 
-def _parameter(context: Context, skill: SkillDecl, name: Name | None, type: Type) -> None:
+def _parameter(context: CheckContext, skill: SkillDecl, name: Name | None, type: Type) -> None:
     if name is None:
         return
     argument = context.arguments(skill).get(name.text)
@@ -127,7 +127,7 @@ def _parameter(context: Context, skill: SkillDecl, name: Name | None, type: Type
         _not_parameter(context, skill, name, type.describe())
 
 
-def _not_parameter(context: Context, skill: SkillDecl, name: Name, asked: str) -> None:
+def _not_parameter(context: CheckContext, skill: SkillDecl, name: Name, asked: str) -> None:
     names = [parameter.name.text for parameter in skill.parameters]
     labels = [(p.span, f"`{name.text}` is declared here") for p in skill.parameters if p.name.text == name.text]
     context.report.add(
@@ -139,7 +139,7 @@ def _not_parameter(context: Context, skill: SkillDecl, name: Name, asked: str) -
     )
 
 
-def check_fallbacks(context: Context) -> None:
+def check_fallbacks(context: CheckContext) -> None:
     """Report every fallback chain that might not end on the ground."""
     for skill in context.symbols.skills.values():
         if skill.fallback:
@@ -150,7 +150,7 @@ _ASKED = ("decision", "state", "authorization")
 NEEDED = {"semantic": _ASKED, "tactical": _ASKED, "reflex": ("decision", "state", "effect")}
 
 
-def check_records(context: Context) -> None:
+def check_records(context: CheckContext) -> None:
     """Report every skill that leaves out what an auditor needs."""
     for skill in context.symbols.skills.values():
         written = {name.text for name in skill.record}
@@ -172,7 +172,7 @@ def check_records(context: Context) -> None:
             )
 
 
-def check_durability(context: Context) -> None:
+def check_durability(context: CheckContext) -> None:
     """Report every skill whose `record` asks for two durabilities, or for less than its class may have."""
     for skill in context.symbols.skills.values():
         words = durability(context, skill.record)
@@ -189,7 +189,7 @@ def check_durability(context: Context) -> None:
             )
 
 
-def durability(context: Context, record: Sequence[Name]) -> Name | None:
+def durability(context: CheckContext, record: Sequence[Name]) -> Name | None:
     """The word for the durability among those of a `record` clause; reports a second one that is another."""
     words = [name for name in record if name.text in WORDS]
     other = next((name for name in words if name.text != words[0].text), None)

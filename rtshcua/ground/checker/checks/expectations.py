@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed, nearest
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import PolicyDecl
 from rtshcua.model.ir.skills import SkillDecl
@@ -16,7 +16,7 @@ _REASONS = {str(reason.value): reason for reason in Reason}
 
 
 def check_expectation(
-    context: Context, expected: Expectation, skill: SkillDecl | None, policy: PolicyDecl | None
+    context: CheckContext, expected: Expectation, skill: SkillDecl | None, policy: PolicyDecl | None
 ) -> None:
     """Report a reason that there is not, one that another outcome has, and a target that never flies."""
     if expected.reason is not None:
@@ -25,7 +25,7 @@ def check_expectation(
         _target(context, expected.target, skill, policy)
 
 
-def _reason(context: Context, expected: Expectation, name: Name) -> None:
+def _reason(context: CheckContext, expected: Expectation, name: Name) -> None:
     reason = _REASONS.get(name.text)
     if reason is None:
         fitting = [slug for slug, each in _REASONS.items() if outcome_of(each) is Outcome[expected.outcome.upper()]]
@@ -49,7 +49,7 @@ def _reason(context: Context, expected: Expectation, name: Name) -> None:
         )
 
 
-def _target(context: Context, target: Name, skill: SkillDecl, policy: PolicyDecl) -> None:
+def _target(context: CheckContext, target: Name, skill: SkillDecl, policy: PolicyDecl) -> None:
     places = list(_targets(skill, policy))
     names = list(dict.fromkeys(name for name, _ in places))
     if target.text in names or target.text in context.symbols.broken:

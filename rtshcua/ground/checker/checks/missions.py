@@ -5,7 +5,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_arguments
 from rtshcua.ground.checker.checks.contracts import RECORDS, durability, more_than_full
 from rtshcua.ground.checker.conditions import check_condition
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_policy, find_skill, find_vehicle
 from rtshcua.model.durability import WORDS
@@ -18,7 +18,7 @@ from rtshcua.model.quantity import Dimension, display
 PROPOSERS = ("agent", "operator")
 
 
-def check_missions(context: Context) -> None:
+def check_missions(context: CheckContext) -> None:
     """Report every mission whose parts do not exist."""
     for mission in context.symbols.missions.values():
         _header(context, mission)
@@ -35,7 +35,7 @@ def check_missions(context: Context) -> None:
                 _step(context, step)
 
 
-def _header(context: Context, mission: MissionDecl) -> None:
+def _header(context: CheckContext, mission: MissionDecl) -> None:
     policy = find_policy(context, mission.policy)
     find_vehicle(context, mission.vehicle)
     if policy is not None and policy.version != mission.policy_version:
@@ -60,7 +60,7 @@ def _header(context: Context, mission: MissionDecl) -> None:
         one_of(context, codes.UNKNOWN_SOURCE, mission.source, PROPOSERS, "source of missions")
 
 
-def _step(context: Context, step: Step) -> None:
+def _step(context: CheckContext, step: Step) -> None:
     skill = find_skill(context, step.skill)
     if skill is not None:
         bound = bind_arguments(context, skill, step.arguments, step.span)
@@ -74,7 +74,7 @@ def _step(context: Context, step: Step) -> None:
 DEFAULT_GRACE_US = 500_000
 
 
-def check_overrides(context: Context, skill: SkillDecl, overrides: Overrides) -> None:
+def check_overrides(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
     """Report what is wrong with the block after a step of `skill`."""
     for field in (overrides.deadline, overrides.validity, overrides.duration):
         quantity(context, field, Dimension.DURATION)
@@ -91,7 +91,7 @@ def check_overrides(context: Context, skill: SkillDecl, overrides: Overrides) ->
         check_condition(scope, clause.condition)
 
 
-def _shorter(context: Context, skill: SkillDecl, overrides: Overrides) -> None:
+def _shorter(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
     """No time is longer than the skill's, and no less energy is kept ready."""
     for words, mine, skills, most in (
         ("deadline", overrides.deadline, skill.deadline, None),
@@ -108,7 +108,7 @@ def _shorter(context: Context, skill: SkillDecl, overrides: Overrides) -> None:
 
 
 def _looser(
-    context: Context, skill: SkillDecl, words: str, mine: Quantity, skills: Quantity | None, limit: str, side: str
+    context: CheckContext, skill: SkillDecl, words: str, mine: Quantity, skills: Quantity | None, limit: str, side: str
 ) -> None:
     less = "" if side == "at most" else ", so less would be kept ready"
     at = (skill.name.span, f"`{skill.name.text}` is declared here, with {limit} where nothing is said")
@@ -123,7 +123,7 @@ def _looser(
     )
 
 
-def _durable(context: Context, skill: SkillDecl, overrides: Overrides) -> None:
+def _durable(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
     """The records of a step are no less durable than its skill's."""
     mine = durability(context, overrides.record)
     least = recorded_as(tuple(name.text for name in skill.record))
@@ -141,7 +141,7 @@ def _durable(context: Context, skill: SkillDecl, overrides: Overrides) -> None:
     )
 
 
-def _phases(context: Context, skill: SkillDecl, overrides: Overrides) -> None:
+def _phases(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
     """A step is valid in no phase in which its skill is not."""
     valid = {name.text for name in skill.phases}
     for name in overrides.phases:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.conditions import references
-from rtshcua.ground.checker.context import Context, Parametric
+from rtshcua.ground.checker.context import CheckContext, Parametric
 from rtshcua.ground.checker.scope import PHASE
 from rtshcua.ground.checker.symbols import WORDS
 from rtshcua.model.ir.node import Name
@@ -12,7 +12,7 @@ from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.skills import SkillDecl
 
 
-def check_names(context: Context) -> None:
+def check_names(context: CheckContext) -> None:
     """Report every name that is declared twice, or that hides another."""
     symbols, report = context.symbols, context.report
     for first, again in symbols.duplicates:
@@ -63,7 +63,7 @@ def check_names(context: Context) -> None:
     _called_phase(context)
 
 
-def _ambiguous(context: Context, template: TemplateDecl) -> None:
+def _ambiguous(context: CheckContext, template: TemplateDecl) -> None:
     """Report a name in a rule that may be the template's parameter, or the rule's argument."""
     own = {parameter.name.text: parameter for parameter in template.parameters}
     for rule in template.rules:
@@ -83,7 +83,7 @@ def _ambiguous(context: Context, template: TemplateDecl) -> None:
                 )
 
 
-def _called_phase(context: Context) -> None:
+def _called_phase(context: CheckContext) -> None:
     """Report a value called `phase`, by which conditions ask for the mission's phase."""
     symbols = context.symbols
     names = [signal.name for signal in symbols.signals.values()] + [zone.name for zone in symbols.zones.values()]
@@ -103,7 +103,7 @@ def _called_phase(context: Context) -> None:
             )
 
 
-def _distinct(context: Context, names: Iterable[Name], what: str) -> None:
+def _distinct(context: CheckContext, names: Iterable[Name], what: str) -> None:
     """Report the second of two equal names in one list."""
     seen: dict[str, Name] = {}
     for name in names:
@@ -117,7 +117,7 @@ def _distinct(context: Context, names: Iterable[Name], what: str) -> None:
             )
 
 
-def _hides(context: Context, name: Name, what: str) -> None:
+def _hides(context: CheckContext, name: Name, what: str) -> None:
     """Report a name within a declaration that is also a declaration's."""
     declaration = context.symbols.declared.get(name.text)
     if declaration is not None:

@@ -3,7 +3,7 @@
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.condition_nodes import walk
-from rtshcua.ground.checker.context import Context, Parametric
+from rtshcua.ground.checker.context import CheckContext, Parametric
 from rtshcua.ground.checker.fields import size
 from rtshcua.ground.checker.fitting import declaration_labels
 from rtshcua.ground.checker.lookup import find_skill
@@ -20,7 +20,7 @@ from rtshcua.model.ir.skills import GivenSize, ParameterDecl, SizesDecl, SkillDe
 ROLE = "role"
 
 
-def check_parameters(context: Context) -> None:
+def check_parameters(context: CheckContext) -> None:
     """Report every parameter whose arguments could not be checked before the flight."""
     symbols = context.symbols
     owners: list[Parametric] = [*symbols.skills.values(), *symbols.templates.values(), *symbols.missions.values()]
@@ -51,7 +51,7 @@ def check_parameters(context: Context) -> None:
                 bind_value(scope, argument, parameter.default)
 
 
-def check_range(context: Context, argument: Argument, range: Range) -> None:
+def check_range(context: CheckContext, argument: Argument, range: Range) -> None:
     """Report the ends of a parameter's range that are no numbers of its type, or too large."""
     scope, before = context.scope(), len(context.report.found)
     ends = whole_range(scope, range, argument.type)
@@ -82,7 +82,7 @@ def _types(owner: type[Parametric]) -> str:
     return ", ".join(f"`{name}`" for name in NAMED) + " and `one of ...`"
 
 
-def _of_template(context: Context, parameter: ParameterDecl) -> bool:
+def _of_template(context: CheckContext, parameter: ParameterDecl) -> bool:
     """Whether no more is to say of a template's parameter: it is a role, or of a type that no rule can use."""
     if parameter.type.text == ROLE and not parameter.choices:
         if parameter.range is not None:
@@ -99,7 +99,7 @@ def _of_template(context: Context, parameter: ParameterDecl) -> bool:
     return False
 
 
-def no_range(context: Context, parameter: ParameterDecl) -> None:
+def no_range(context: CheckContext, parameter: ParameterDecl) -> None:
     """Report a parameter that has no range and is a number, or has one and is none."""
     name = parameter.name.text
     type = NAMED.get(parameter.type.text)
@@ -119,7 +119,7 @@ def no_range(context: Context, parameter: ParameterDecl) -> None:
         )
 
 
-def check_sizes(context: Context) -> None:
+def check_sizes(context: CheckContext) -> None:
     """Report every size that no contract could be checked with."""
     for skill in context.symbols.skills.values():
         for each in skill.sizes:
@@ -138,7 +138,7 @@ def check_sizes(context: Context) -> None:
         )
 
 
-def _declared(context: Context, size: ParameterDecl) -> None:
+def _declared(context: CheckContext, size: ParameterDecl) -> None:
     name, default = size.name.text, size.default
     argument = _argument(context, size)
     if argument is None:
@@ -165,7 +165,7 @@ def _declared(context: Context, size: ParameterDecl) -> None:
         bind_value(context.scope(), argument, default)
 
 
-def _argument(context: Context, size: ParameterDecl) -> Argument | None:
+def _argument(context: CheckContext, size: ParameterDecl) -> Argument | None:
     """A size as an argument is seen; None where it is no number."""
     type = None if size.choices else NAMED.get(size.type.text)
     if type is None or type.kind is not Kind.NUMBER:
@@ -175,7 +175,7 @@ def _argument(context: Context, size: ParameterDecl) -> Argument | None:
     return Argument(size, type, low, high)
 
 
-def _named(context: Context, skill: SkillDecl) -> None:
+def _named(context: CheckContext, skill: SkillDecl) -> None:
     """Report each part of a contract that names what is no size of it."""
     known = [size.name.text for size in skill.sizes]
     for each in skill.sized:
@@ -190,7 +190,7 @@ def _named(context: Context, skill: SkillDecl) -> None:
             )
 
 
-def _given(context: Context, declaration: SizesDecl) -> None:
+def _given(context: CheckContext, declaration: SizesDecl) -> None:
     skill = find_skill(context, declaration.skill)
     if skill is None:
         return

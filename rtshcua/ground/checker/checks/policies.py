@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.chains import check_chain, check_end, check_link
 from rtshcua.ground.checker.conditions import check_condition, references
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_skill, find_zone
 from rtshcua.ground.checker.scope import Argument, Scope
@@ -19,7 +19,7 @@ from rtshcua.model.quantity import Dimension
 SOURCES = tuple(each.name.lower() for each in SourceKind)
 
 
-def check_policies(context: Context) -> None:
+def check_policies(context: CheckContext) -> None:
     """Report every rule that could not be decided, and every policy that leaves the vehicle in the air."""
     for policy in context.symbols.policies.values():
         if policy.version > MAX_VALUE:
@@ -42,7 +42,7 @@ def check_policies(context: Context) -> None:
         _rule(context, rule)
 
 
-def _contingency(context: Context, policy: PolicyDecl) -> None:
+def _contingency(context: CheckContext, policy: PolicyDecl) -> None:
     links = policy.contingency
     if links:
         check_chain(context, links, None, links[0].span.to(links[-1].span))
@@ -56,7 +56,7 @@ def _contingency(context: Context, policy: PolicyDecl) -> None:
     )
 
 
-def _rule(context: Context, rule: RuleDecl) -> None:
+def _rule(context: CheckContext, rule: RuleDecl) -> None:
     skills = [skill for skill in (find_skill(context, name) for name in rule.skills) if skill is not None]
     for source in rule.through:
         one_of(context, codes.UNKNOWN_SOURCE, source, SOURCES, "source")
@@ -72,7 +72,7 @@ def _rule(context: Context, rule: RuleDecl) -> None:
             check_condition(Scope(context.symbols, context.report, shared), rule.when)
 
 
-def _confirm(context: Context, rule: RuleDecl) -> None:
+def _confirm(context: CheckContext, rule: RuleDecl) -> None:
     if rule.within is not None:
         quantity(context, rule.within, Dimension.DURATION)
         return
@@ -84,7 +84,7 @@ def _confirm(context: Context, rule: RuleDecl) -> None:
     )
 
 
-def shared_arguments(context: Context, rule: RuleDecl, skills: Sequence[SkillDecl]) -> dict[str, Argument] | None:
+def shared_arguments(context: CheckContext, rule: RuleDecl, skills: Sequence[SkillDecl]) -> dict[str, Argument] | None:
     """The arguments that a rule's condition may read: those that all its skills have; None after a finding."""
     assert rule.when is not None
     signatures = [context.arguments(skill) for skill in skills]

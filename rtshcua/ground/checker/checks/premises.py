@@ -8,7 +8,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.conditions import check_condition
-from rtshcua.ground.checker.context import Bound, Context
+from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.fields import on_globe, one_of, quantity, size
 from rtshcua.ground.checker.lookup import find_nominal, find_policy, find_vehicle
 from rtshcua.ground.checker.ranges import beyond
@@ -39,7 +39,7 @@ TRUTHS = ("true", "false")
 SOURCES = tuple(kind.name.lower() for kind in SourceKind)
 
 
-def check_premises(context: Context, premises: Premises) -> None:
+def check_premises(context: CheckContext, premises: Premises) -> None:
     """Report what a nominal or a test gives that nothing can have."""
     for assignment in premises.given:
         check_subject(context, assignment.subject)
@@ -55,13 +55,13 @@ def check_premises(context: Context, premises: Premises) -> None:
         _order(context, phase.order)
 
 
-def check_asker(context: Context, asker: Asker | None) -> None:
+def check_asker(context: CheckContext, asker: Asker | None) -> None:
     """Report a source that there is not; roles are those of the policy, which is looked at when it is lowered."""
     if asker is not None and asker.source is not None:
         one_of(context, codes.UNKNOWN_SOURCE, asker.source, SOURCES, "source of requests")
 
 
-def check_subject(context: Context, subject: Subject) -> None:
+def check_subject(context: CheckContext, subject: Subject) -> None:
     """Report what is no signal, and what is no condition over time."""
     scope = context.scope()
     if isinstance(subject, Named):
@@ -81,8 +81,8 @@ def check_subject(context: Context, subject: Subject) -> None:
         )
 
 
-def check_cell(context: Context, subject: Subject, cell: TableCell) -> None:
-    """Report a value that the subject cannot have, and keep the one that it has, in `Context.given`."""
+def check_cell(context: CheckContext, subject: Subject, cell: TableCell) -> None:
+    """Report a value that the subject cannot have, and keep the one that it has, in `CheckContext.given`."""
     quantity(context, cell.measured, Dimension.DURATION, positive=False)
     if isinstance(subject, OverTime):
         _truth(context, cell)
@@ -105,19 +105,21 @@ def check_cell(context: Context, subject: Subject, cell: TableCell) -> None:
             context.given[signal.name.text, cell.value] = bound
 
 
-def check_size(context: Context, value: Value, bound: Bound, dimension: Dimension | None) -> bool:
+def check_size(context: CheckContext, value: Value, bound: Bound, dimension: Dimension | None) -> bool:
     """Report a value that is no place on earth, or a number that is too large; whether it is neither."""
     if isinstance(bound, Coordinates):
         return on_globe(context, bound)
     return not isinstance(bound, int) or dimension is None or size(context, value, dimension, bound)
 
 
-def signal_of(context: Context, subject: Named) -> SignalDecl | None:
+def signal_of(context: CheckContext, subject: Named) -> SignalDecl | None:
     """The signal of that name."""
     return context.symbols.signals.get(subject.name.text)
 
 
-def once(context: Context, subjects: Iterable[tuple[Subject, Span]], first_words: str = "first given here") -> None:
+def once(
+    context: CheckContext, subjects: Iterable[tuple[Subject, Span]], first_words: str = "first given here"
+) -> None:
     """Report what is given twice."""
     seen: dict[str, Span] = {}
     for subject, span in subjects:
@@ -133,7 +135,7 @@ def once(context: Context, subjects: Iterable[tuple[Subject, Span]], first_words
             )
 
 
-def _truth(context: Context, cell: TableCell) -> None:
+def _truth(context: CheckContext, cell: TableCell) -> None:
     if cell.value is not None and not (isinstance(cell.value, Reference) and cell.value.name in TRUTHS):
         near = suggestion(cell.value.name, TRUTHS) if isinstance(cell.value, Reference) else None
         context.report.add(
@@ -152,7 +154,7 @@ def _truth(context: Context, cell: TableCell) -> None:
         )
 
 
-def _order(context: Context, order: tuple[Name, ...]) -> None:
+def _order(context: CheckContext, order: tuple[Name, ...]) -> None:
     if len(order) > MAX_PHASES:
         context.report.add(
             codes.TOO_MANY,
@@ -171,7 +173,7 @@ def _order(context: Context, order: tuple[Name, ...]) -> None:
             )
 
 
-def check_nominals(context: Context) -> None:
+def check_nominals(context: CheckContext) -> None:
     """Report every nominal whose parts do not exist or do not fit."""
     for nominal in context.symbols.nominals.values():
         find_policy(context, nominal.policy)
@@ -191,7 +193,7 @@ class TestStart(NamedTuple):
     order: tuple[Name, ...]  # of the phases; never empty where there is a phase
 
 
-def nominal_of(context: Context, test: TestDecl) -> NominalDecl | None:
+def nominal_of(context: CheckContext, test: TestDecl) -> NominalDecl | None:
     """The nominal that a test names; else the only one of its file, or, where that has none, the only one there is.
 
     None after a finding, and where its declaration has an error.

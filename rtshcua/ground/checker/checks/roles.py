@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.checks.parameters import ROLE
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name
@@ -17,7 +17,7 @@ from rtshcua.model.ir.policies import RuleDecl, Use
 OPERATOR = "operator"
 
 
-def check_roles(context: Context) -> None:
+def check_roles(context: CheckContext) -> None:
     """Report every role that is declared twice in a file, and every one that a rule names and nothing declares."""
     for first, again in context.symbols.roles_again:
         text = f"the role `{again.text}` is declared twice"
@@ -38,14 +38,14 @@ def check_roles(context: Context) -> None:
             _rule(context, rule, own)
 
 
-def _rule(context: Context, rule: RuleDecl, own: frozenset[str]) -> None:
+def _rule(context: CheckContext, rule: RuleDecl, own: frozenset[str]) -> None:
     """The roles of a rule, but for the `own` parameters of the template that it stands in."""
     for name in (*rule.roles, rule.approver, rule.another):
         if name is not None and name.text not in own:
             _role(context, name)
 
 
-def _given(context: Context, use: Use) -> Iterator[Name]:
+def _given(context: CheckContext, use: Use) -> Iterator[Name]:
     """The roles that a template is given."""
     template = context.symbols.templates.get(use.template.text)
     if template is None:
@@ -63,7 +63,7 @@ def _given(context: Context, use: Use) -> Iterator[Name]:
             yield Name(span=value.span, text=value.name)
 
 
-def _role(context: Context, name: Name) -> None:
+def _role(context: CheckContext, name: Name) -> None:
     known = {OPERATOR, *context.symbols.roles}
     if name.text in known:
         return

@@ -9,7 +9,7 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.expectations import check_expectation
 from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import check_condition, is_about_phase
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.faults import NAMED, fault_of
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_flown, find_skill, find_zone
@@ -46,7 +46,7 @@ ENDS = tuple(each.replace("-", "_") for each in ENDINGS)
 BATTERY, WIND, AT = "battery", "wind", "at"
 
 
-def check_scenarios(context: Context) -> None:
+def check_scenarios(context: CheckContext) -> None:
     """Report every scenario that cannot be flown, or that expects what cannot be."""
     seen: dict[str, ScenarioDecl] = {}
     for scenario in context.symbols.scenarios:
@@ -62,7 +62,7 @@ def check_scenarios(context: Context) -> None:
         _check(context, scenario)
 
 
-def _check(context: Context, scenario: ScenarioDecl) -> None:
+def _check(context: CheckContext, scenario: ScenarioDecl) -> None:
     mission = find_flown(context, scenario.mission)
     if mission is not None:
         _values(context, scenario, mission)
@@ -87,7 +87,7 @@ def _check(context: Context, scenario: ScenarioDecl) -> None:
         _demand(context, demand)
 
 
-def _values(context: Context, scenario: ScenarioDecl, mission: MissionDecl) -> None:
+def _values(context: CheckContext, scenario: ScenarioDecl, mission: MissionDecl) -> None:
     """A mission with parameters is flown with their defaults."""
     lacking = [each for each in mission.parameters if each.default is None]
     if lacking:
@@ -101,7 +101,7 @@ def _values(context: Context, scenario: ScenarioDecl, mission: MissionDecl) -> N
         )
 
 
-def _flavours(context: Context, scenario: ScenarioDecl) -> None:
+def _flavours(context: CheckContext, scenario: ScenarioDecl) -> None:
     seen: dict[str, Span] = {}
     for name in scenario.flavours:
         if one_of(context, codes.UNKNOWN_AUTOPILOT, name, FLAVOURS, "kind of autopilot"):
@@ -115,7 +115,7 @@ def _flavours(context: Context, scenario: ScenarioDecl) -> None:
                 )
 
 
-def _seeds(context: Context, seeds: Seeds) -> None:
+def _seeds(context: CheckContext, seeds: Seeds) -> None:
     first, last = seeds.first, seeds.last
     if _ascending(context, first, last) and last.value - first.value >= MAX_SEEDS:
         context.report.add(
@@ -125,7 +125,7 @@ def _seeds(context: Context, seeds: Seeds) -> None:
         )
 
 
-def _ascending(context: Context, low: Quantity, high: Quantity) -> bool:
+def _ascending(context: CheckContext, low: Quantity, high: Quantity) -> bool:
     if low.value <= high.value:
         return True
     span = low.span.to(high.span)
@@ -140,7 +140,7 @@ def _ascending(context: Context, low: Quantity, high: Quantity) -> bool:
     return False
 
 
-def _beginning(context: Context, beginning: Beginning) -> None:
+def _beginning(context: CheckContext, beginning: Beginning) -> None:
     if isinstance(beginning, Begins):
         return
     name = beginning.name
@@ -169,7 +169,7 @@ def _beginning(context: Context, beginning: Beginning) -> None:
         )
 
 
-def _once(context: Context, scenario: ScenarioDecl) -> None:
+def _once(context: CheckContext, scenario: ScenarioDecl) -> None:
     seen: dict[str, Span] = {}
     for beginning in scenario.start:
         what = AT if isinstance(beginning, Begins) else beginning.name.text
@@ -184,7 +184,7 @@ def _once(context: Context, scenario: ScenarioDecl) -> None:
             )
 
 
-def _delay(context: Context, delay: Delay | None) -> None:
+def _delay(context: CheckContext, delay: Delay | None) -> None:
     if delay is None:
         return
     before = len(context.report.found)
@@ -195,7 +195,7 @@ def _delay(context: Context, delay: Delay | None) -> None:
             _ascending(context, delay.low, delay.high)
 
 
-def _step(context: Context, moment: AfterStepDecl, mission: MissionDecl | None) -> None:
+def _step(context: CheckContext, moment: AfterStepDecl, mission: MissionDecl | None) -> None:
     skill = find_skill(context, moment.skill)
     if skill is None or mission is None:
         return
@@ -222,7 +222,7 @@ def _step(context: Context, moment: AfterStepDecl, mission: MissionDecl | None) 
     )
 
 
-def _condition(context: Context, condition: Condition) -> None:
+def _condition(context: CheckContext, condition: Condition) -> None:
     before = len(context.report.found)
     check_condition(context.scope(), condition)
     if len(context.report.found) > before:
@@ -245,7 +245,7 @@ def _condition(context: Context, condition: Condition) -> None:
             )
 
 
-def _demand(context: Context, demand: Demand) -> None:
+def _demand(context: CheckContext, demand: Demand) -> None:
     match demand:
         case DecidesDecl():
             expected = demand.decision

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import listed
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import quantity, size
 from rtshcua.ground.checker.ranges import INTEGERS, reported
 from rtshcua.ground.checker.scope import signal_type
@@ -22,7 +22,7 @@ PLACE_UNIT = "degE7"
 _DIRECTION = "orientation"
 
 
-def check_signals(context: Context) -> None:
+def check_signals(context: CheckContext) -> None:
     """Report every enumeration and signal that the dialect does not bear out."""
     for enum in context.symbols.enums.values():
         _enum(context, enum)
@@ -30,7 +30,7 @@ def check_signals(context: Context) -> None:
         _signal(context, signal)
 
 
-def _enum(context: Context, enum: EnumDecl) -> None:
+def _enum(context: CheckContext, enum: EnumDecl) -> None:
     report = context.report
     values: dict[int, Name] = {}
     for member in enum.members:
@@ -67,7 +67,7 @@ def _enum(context: Context, enum: EnumDecl) -> None:
             )
 
 
-def _signal(context: Context, signal: SignalDecl) -> None:
+def _signal(context: CheckContext, signal: SignalDecl) -> None:
     quantity(context, signal.stale_after, Dimension.DURATION, most=MAX_STALE)
     name = signal.type.text
     known = NAMED.get(name)
@@ -89,7 +89,7 @@ def _signal(context: Context, signal: SignalDecl) -> None:
         context.symbols.ranges[signal.name.text] = reported(context.dialect, signal, type.dimension)
 
 
-def _source(context: Context, signal: SignalDecl, source: SourceDecl, type: Type | None) -> None:
+def _source(context: CheckContext, signal: SignalDecl, source: SourceDecl, type: Type | None) -> None:
     report, dialect = context.report, context.dialect
     message = dialect.messages.get(source.message.text)
     if message is None:
@@ -128,7 +128,7 @@ def _source(context: Context, signal: SignalDecl, source: SourceDecl, type: Type
     _selector(context, source, message)
 
 
-def _selector(context: Context, source: SourceDecl, message: Message) -> None:
+def _selector(context: CheckContext, source: SourceDecl, message: Message) -> None:
     """Each selected field is one whole number that has such a value, and a direction is always selected."""
     report, seen = context.report, set[str]()
     for each in source.where:
@@ -184,7 +184,7 @@ def _fields(message: Message) -> str:
     return f"its fields are {listed(message.fields)}"
 
 
-def _count(context: Context, signal: SignalDecl, source: SourceDecl, type: Type | None) -> bool:
+def _count(context: CheckContext, signal: SignalDecl, source: SourceDecl, type: Type | None) -> bool:
     """A position is read from two fields, a speed from one or two, everything else from one."""
     given = len(source.fields)
     allowed = (2,) if type == POSITION else (1, 2) if type == SPEED else (1,)
@@ -201,7 +201,7 @@ def _count(context: Context, signal: SignalDecl, source: SourceDecl, type: Type 
 
 
 def _field(
-    context: Context, signal: SignalDecl, source: SourceDecl, name: Name, field: Field, type: Type | None
+    context: CheckContext, signal: SignalDecl, source: SourceDecl, name: Name, field: Field, type: Type | None
 ) -> None:
     """The field measures what the signal does."""
     if signal.type.text == Dimension.ALTITUDE.value:
@@ -231,7 +231,7 @@ def _field(
 
 
 def _altitude(
-    context: Context, signal: SignalDecl, source: SourceDecl, name: Name, field: Field, type: Type | None
+    context: CheckContext, signal: SignalDecl, source: SourceDecl, name: Name, field: Field, type: Type | None
 ) -> None:
     if field.unit not in UNITS[Dimension.LENGTH]:
         _unit(context, signal, name, field, tuple(UNITS[Dimension.LENGTH]))
@@ -255,7 +255,7 @@ def _altitude(
         )
 
 
-def _unit(context: Context, signal: SignalDecl, name: Name, field: Field, accepted: tuple[str, ...]) -> None:
+def _unit(context: CheckContext, signal: SignalDecl, name: Name, field: Field, accepted: tuple[str, ...]) -> None:
     fits = [each.value for each, units in UNITS.items() if field.unit in units]
     has = f"is in `{field.unit}`" if field.unit else "has no unit"
     words = ", ".join(f"`{unit}`" for unit in accepted if unit) or "no unit"
@@ -268,7 +268,7 @@ def _unit(context: Context, signal: SignalDecl, name: Name, field: Field, accept
     )
 
 
-def _sentinels(context: Context, signal: SignalDecl, field: Field) -> None:
+def _sentinels(context: CheckContext, signal: SignalDecl, field: Field) -> None:
     enum = context.symbols.enums.get(signal.type.text)
     members = {} if enum is None else {member.name.text: member.value for member in enum.members}
     low, high = INTEGERS.get(field.type, (-(1 << 53), 1 << 53))

@@ -19,7 +19,7 @@ from rtshcua.ground.checker.checks.premises import (
     signal_of,
     start_of,
 )
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.lookup import find_skill
 from rtshcua.ground.checker.scope import Argument
 from rtshcua.ground.checker.symbols import correction, suggestion
@@ -32,7 +32,7 @@ from rtshcua.model.ir.tests import CaseTable, Named, RequestDecl, Subject, Table
 MAX_CASES = 4096
 
 
-def check_tests(context: Context) -> None:
+def check_tests(context: CheckContext) -> None:
     """Report every test that does not say what it must, or says what cannot be."""
     tests = context.symbols.tests
     if _too_many(context, tests):
@@ -51,7 +51,7 @@ def check_tests(context: Context) -> None:
         _check(context, test)
 
 
-def _too_many(context: Context, tests: tuple[TestDecl, ...]) -> bool:
+def _too_many(context: CheckContext, tests: tuple[TestDecl, ...]) -> bool:
     count = 0
     for test in tests:
         count += 1 if test.table is None else len(test.table.rows)
@@ -66,7 +66,7 @@ def _too_many(context: Context, tests: tuple[TestDecl, ...]) -> bool:
     return False
 
 
-def _check(context: Context, test: TestDecl) -> None:
+def _check(context: CheckContext, test: TestDecl) -> None:
     check_premises(context, test.premises)
     request = test.request
     if request is None:
@@ -97,12 +97,12 @@ def _check(context: Context, test: TestDecl) -> None:
         check_expectation(context, expected, skill, policy)
 
 
-def _lacks(context: Context, test: TestDecl, what: str, help: str) -> None:
+def _lacks(context: CheckContext, test: TestDecl, what: str, help: str) -> None:
     message = f"the test does not say {what}"
     context.report.add(codes.INCOMPLETE_TEST, test.name.span, message, help=help)
 
 
-def _complete(context: Context, test: TestDecl, start: TestStart) -> None:
+def _complete(context: CheckContext, test: TestDecl, start: TestStart) -> None:
     """Report what neither the test nor its nominal says; nothing is made up."""
     lacking = [
         (what, help)
@@ -133,7 +133,7 @@ def _complete(context: Context, test: TestDecl, start: TestStart) -> None:
         )
 
 
-def check_request(context: Context, test: TestDecl, request: RequestDecl, skill: SkillDecl) -> None:
+def check_request(context: CheckContext, test: TestDecl, request: RequestDecl, skill: SkillDecl) -> None:
     """Report arguments that do not fit their parameters. One out of its range does: the decision denies it."""
     columns = () if test.table is None else columns_of(test.table, skill)
     stand_ins = tuple(
@@ -163,7 +163,7 @@ def unranged(argument: Argument) -> Argument:
     return Argument(argument.declaration, argument.type)
 
 
-def check_table(context: Context, test: TestDecl, table: CaseTable, skill: SkillDecl | None) -> None:
+def check_table(context: CheckContext, test: TestDecl, table: CaseTable, skill: SkillDecl | None) -> None:
     """Report columns that nothing is called, and cells that do not fit their columns."""
     if len(table.columns) > MAX_COLUMNS:
         context.report.add(
@@ -191,7 +191,7 @@ def check_table(context: Context, test: TestDecl, table: CaseTable, skill: Skill
                 _cell(context, column, cell, arguments)
 
 
-def _column(context: Context, column: Subject, arguments: dict[str, Argument], skill: SkillDecl | None) -> None:
+def _column(context: CheckContext, column: Subject, arguments: dict[str, Argument], skill: SkillDecl | None) -> None:
     if not isinstance(column, Named) or signal_of(context, column) is not None:
         check_subject(context, column)
         return
@@ -213,7 +213,7 @@ def _column(context: Context, column: Subject, arguments: dict[str, Argument], s
         )
 
 
-def _whole(context: Context, table: CaseTable, row: TableRow) -> bool:
+def _whole(context: CheckContext, table: CaseTable, row: TableRow) -> bool:
     if len(row.cells) == len(table.columns):
         return True
     more = len(row.cells) - len(table.columns)
@@ -228,7 +228,7 @@ def _whole(context: Context, table: CaseTable, row: TableRow) -> bool:
     return False
 
 
-def _cell(context: Context, column: Subject, cell: TableCell, arguments: dict[str, Argument]) -> None:
+def _cell(context: CheckContext, column: Subject, cell: TableCell, arguments: dict[str, Argument]) -> None:
     argument = arguments.get(column.name.text) if isinstance(column, Named) else None
     if argument is None:
         check_cell(context, column, cell)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.checks.missions import DEFAULT_GRACE_US
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import Overrides, Step
 from rtshcua.model.ir.node import Name
@@ -37,7 +37,7 @@ class _Times(NamedTuple):
     grace: Quantity | None
 
 
-def check_times(context: Context) -> None:
+def check_times(context: CheckContext) -> None:
     """Report every contract, override and `confirm` rule whose times cannot all be meant."""
     for skill in context.symbols.skills.values():
         _coherent(context, _of(skill))
@@ -67,7 +67,7 @@ def _overridden(skill: _Times, step: _Times) -> _Times:
     return _Times(*(theirs if mine is None else mine for mine, theirs in zip(step, skill, strict=True)))
 
 
-def _coherent(context: Context, times: _Times, of: Iterable[Quantity | None] = ()) -> None:
+def _coherent(context: CheckContext, times: _Times, of: Iterable[Quantity | None] = ()) -> None:
     """Report what contradicts each other; with `of`, only what one of these contributes to."""
     own = {quantity for quantity in of if quantity is not None}
     deadline, validity, duration, grace = times
@@ -100,7 +100,7 @@ def _coherent(context: Context, times: _Times, of: Iterable[Quantity | None] = (
         )
 
 
-def _class(context: Context, skill: SkillDecl) -> None:
+def _class(context: CheckContext, skill: SkillDecl) -> None:
     deadline = _time(skill.deadline)
     if deadline is None or skill.timing_class is None:
         return
@@ -118,7 +118,7 @@ def _class(context: Context, skill: SkillDecl) -> None:
         )
 
 
-def _approval(context: Context, rule: RuleDecl) -> None:
+def _approval(context: CheckContext, rule: RuleDecl) -> None:
     within = _time(rule.within)
     for name in rule.skills:
         skill = context.symbols.skills.get(name.text)
@@ -134,7 +134,7 @@ def _approval(context: Context, rule: RuleDecl) -> None:
             )
 
 
-def _awaited(context: Context, policy: Name, step: Step) -> None:
+def _awaited(context: CheckContext, policy: Name, step: Step) -> None:
     """An approval that a step's own validity does not leave time for, where its skill's does."""
     under, skill = context.symbols.policies.get(policy.text), context.symbols.skills.get(step.skill.text)
     own = None if step.overrides is None else _time(step.overrides.validity)

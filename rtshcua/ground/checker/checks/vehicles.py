@@ -5,7 +5,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker import time_zones
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import elevation, on_globe, quantity
 from rtshcua.ground.checker.lookup import find_signal
 from rtshcua.ground.checker.symbols import correction, suggestion
@@ -18,7 +18,7 @@ from rtshcua.model.quantity import Dimension, display
 MAX_OFFSET_US = 14 * 3_600_000_000  # local times are at most 14 h from UTC
 
 
-def check_vehicles(context: Context) -> None:
+def check_vehicles(context: CheckContext) -> None:
     """Report every field of a vehicle that is of the wrong dimension or size."""
     for vehicle in context.symbols.vehicles.values():
         on_globe(context, vehicle.home)
@@ -48,7 +48,7 @@ def check_vehicles(context: Context) -> None:
             _time_zone(context, vehicle.time_zone)
 
 
-def _time_zone(context: Context, name: Name) -> None:
+def _time_zone(context: CheckContext, name: Name) -> None:
     known = time_zones.names()
     if name.text not in known:
         context.report.add(
@@ -59,7 +59,7 @@ def _time_zone(context: Context, name: Name) -> None:
         )
 
 
-def _without(context: Context, vehicle: VehicleDecl) -> None:
+def _without(context: CheckContext, vehicle: VehicleDecl) -> None:
     """What it is without are signals, each named once, and none that is always read."""
     needed = read_by_all(vehicle)
     first: dict[str, Span] = {}
@@ -89,7 +89,7 @@ def _without(context: Context, vehicle: VehicleDecl) -> None:
 SPEEDS = ("cruise", "climb", "descent", "landing", "return", "air")
 
 
-def _speeds(context: Context, vehicle: VehicleDecl) -> None:
+def _speeds(context: CheckContext, vehicle: VehicleDecl) -> None:
     """Its speeds are known ones, each written once and no more than the most; the wind leaves it some."""
     quantity(context, vehicle.flight, Dimension.DURATION)
     quantity(context, vehicle.wind, Dimension.SPEED, positive=False)
@@ -139,7 +139,7 @@ def _speeds(context: Context, vehicle: VehicleDecl) -> None:
     _against_wind(context, vehicle)
 
 
-def _against_wind(context: Context, vehicle: VehicleDecl) -> None:
+def _against_wind(context: CheckContext, vehicle: VehicleDecl) -> None:
     wind = vehicle.wind
     air = next((each.speed for each in vehicle.speeds if each.name.text == "air"), vehicle.speed)
     if wind is not None and wind.dimension is air.dimension is Dimension.SPEED and wind.value >= air.value > 0:
@@ -162,7 +162,7 @@ def deceleration(braking: Braking) -> int:
     return braking.speed.value * 1_000_000 // braking.time.value if braking.time.value > 0 else 0
 
 
-def _braking(context: Context, braking: Braking) -> None:
+def _braking(context: CheckContext, braking: Braking) -> None:
     before = len(context.report.found)
     quantity(context, braking.speed, Dimension.SPEED)
     quantity(context, braking.time, Dimension.DURATION)

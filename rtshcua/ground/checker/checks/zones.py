@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from rtshcua.diagnostics import codes
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import height, on_globe, quantity
 from rtshcua.ground.checker.geojson import NoArea
 from rtshcua.ground.checker.lookup import find_zone
@@ -18,7 +18,7 @@ from rtshcua.model.quantity import Dimension
 LEAST_WIDTH = 100  # mm
 
 
-def check_zones(context: Context) -> None:
+def check_zones(context: CheckContext) -> None:
     """Report every zone that no vehicle could be inside of, or that has no clear inside."""
     for zone in context.symbols.zones.values():
         height(context, zone.floor)
@@ -40,7 +40,7 @@ def check_zones(context: Context) -> None:
     circles(context)
 
 
-def _heights(context: Context, zone: ZoneDecl) -> None:
+def _heights(context: CheckContext, zone: ZoneDecl) -> None:
     floor, ceiling = zone.floor, zone.ceiling
     if floor is None or ceiling is None or floor.datum is not ceiling.datum:
         return  # of different datum: compared where the elevation of home is known
@@ -53,14 +53,14 @@ def _heights(context: Context, zone: ZoneDecl) -> None:
         )
 
 
-def _geojson(context: Context, shape: GeoJson) -> None:
+def _geojson(context: CheckContext, shape: GeoJson) -> None:
     found = context.data.area(shape)
     if isinstance(found, NoArea):
         name = context.data.name(shape)
         context.report.add(found.code, shape.span, f"`{name}` cannot be used: {found.message}", help=found.help)
 
 
-def _corridor(context: Context, shape: Corridor) -> None:
+def _corridor(context: CheckContext, shape: Corridor) -> None:
     before = len(context.report.found)
     quantity(context, shape.width, Dimension.LENGTH, positive=False)
     for point in shape.points:
@@ -92,7 +92,7 @@ def _corridor(context: Context, shape: Corridor) -> None:
         )
 
 
-def _polygon(context: Context, zone: ZoneDecl, shape: Polygon) -> None:
+def _polygon(context: CheckContext, zone: ZoneDecl, shape: Polygon) -> None:
     rings = (shape.corners, *shape.holes)
     before = len(context.report.found)
     for ring in rings:
@@ -112,7 +112,7 @@ def _polygon(context: Context, zone: ZoneDecl, shape: Polygon) -> None:
         entry_outside(context.report, zone)
 
 
-def _ring(context: Context, zone: ZoneDecl, shape: Polygon, ring: tuple[Coordinates, ...]) -> bool:
+def _ring(context: CheckContext, zone: ZoneDecl, shape: Polygon, ring: tuple[Coordinates, ...]) -> bool:
     """Whether a ring of a polygon is simple."""
     report = context.report
     corners = _corners(shape, ring)
@@ -150,7 +150,7 @@ def _ring(context: Context, zone: ZoneDecl, shape: Polygon, ring: tuple[Coordina
     return False
 
 
-def _holes(context: Context, zone: ZoneDecl, shape: Polygon) -> bool:
+def _holes(context: CheckContext, zone: ZoneDecl, shape: Polygon) -> bool:
     """Whether all holes lie in the polygon, and apart from each other."""
     rings = (shape.corners, *shape.holes)
     placed = [_corners(shape, ring) for ring in rings]
@@ -217,7 +217,7 @@ def named(zone: ZoneDecl) -> Iterator[Reference]:
     return (each for each in parts(zone.shape) if isinstance(each, Reference))
 
 
-def operands(context: Context, zone: ZoneDecl) -> Iterator[Shape]:
+def operands(context: CheckContext, zone: ZoneDecl) -> Iterator[Shape]:
     """The shapes that a zone is made of, but for other zones: of these, reports names that stand for none."""
     for each in parts(zone.shape):
         if isinstance(each, Reference):
@@ -226,7 +226,7 @@ def operands(context: Context, zone: ZoneDecl) -> Iterator[Shape]:
             yield each
 
 
-def circles(context: Context) -> None:
+def circles(context: CheckContext) -> None:
     """Report each zone that is made of itself, once for each way in which it is."""
     zones = context.symbols.zones
     finished: set[str] = set()
@@ -244,7 +244,7 @@ def circles(context: Context) -> None:
                 way.append((reference.name, named(zones[reference.name])))
 
 
-def _circle(context: Context, closing: Reference, way: list[str]) -> None:
+def _circle(context: CheckContext, closing: Reference, way: list[str]) -> None:
     around = way[way.index(closing.name) :]
     context.report.add(
         codes.ZONE_CYCLE,

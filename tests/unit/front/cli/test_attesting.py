@@ -10,7 +10,7 @@ from reference.flying import refusal_of
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.vehicle_records import BoundaryStore
-from rtshcua.app.fly.start_boundary import BoundarySession, HeldByBoundary, boundary_key
+from rtshcua.app.fly.start_boundary import HeldByBoundary, StartedBoundary, boundary_key
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.front.cli.unlock import unlock
@@ -68,9 +68,9 @@ def test_no_key_or_another_is_refused(store: KeyStore) -> None:
     assert slug(store, of) == "no-boundary-key"
 
 
-def session_of(store: BoundaryStore, key: SigningKey | HeldByBoundary | None, *, aloft: bool) -> BoundarySession:
-    session = BoundarySession.open(store, key, aloft=aloft)
-    assert isinstance(session, BoundarySession)
+def session_of(store: BoundaryStore, key: SigningKey | HeldByBoundary | None, *, aloft: bool) -> StartedBoundary:
+    session = StartedBoundary.open(store, key, aloft=aloft)
+    assert isinstance(session, StartedBoundary)
     return session
 
 
@@ -122,7 +122,7 @@ def test_what_cannot_be_known_or_kept_holds_back_nothing_that_is_in_the_air(tmp_
     store = BoundaryStore(tmp_path, "quad-07")
     store.keep(1, b"a" * 32)
     store.path.write_bytes(b"x")
-    refused = refusal_of(BoundarySession.open(store, case.BOUNDARY_KEY, aloft=False))
+    refused = refusal_of(StartedBoundary.open(store, case.BOUNDARY_KEY, aloft=False))
     assert (refused.slug, refused.code) == ("damaged", ExitCode.INPUT)
     session = session_of(store, case.BOUNDARY_KEY, aloft=True)
     assert session.key == (case.BOUNDARY_KEY, 0, START)

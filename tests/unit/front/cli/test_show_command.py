@@ -20,7 +20,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.front.cli.showing import words
 from rtshcua.front.cli.showing.log import detail_of
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.showing.policy import show_policy
 from rtshcua.model.flat.contract import CHOICE, Parameter
 from rtshcua.model.flat.mission import OnInadmissible
@@ -208,7 +208,7 @@ def test_what_cannot_be_shown(data: bytes, code: ExitCode, tmp_path: Path, capsy
 
 @pytest.mark.parametrize(("number", "said"), [(0, "evidence land: "), (1, "evidence refuse: "), (7, "evidence: 7?")])
 def test_what_is_done_without_evidence(number: int, said: str) -> None:
-    page = Page()
+    page = TextPage()
     show_policy(page, replace(case.policy(), without_evidence=number))
     assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
 
@@ -222,7 +222,7 @@ def test_what_is_done_without_evidence(number: int, said: str) -> None:
     ],
 )
 def test_what_flies_after_a_silence(silence_us: int, then: int, said: str) -> None:
-    page = Page()
+    page = TextPage()
     show_policy(page, replace(case.policy(), silence_us=silence_us, after_silence=then))
     assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
 
@@ -231,7 +231,7 @@ def test_the_sensors_that_a_vehicle_lacks_and_the_clauses_left_out() -> None:
     policy = case.policy()
     vehicle = replace(policy.vehicle, without=("rain", "snow"))
     clause = LeftOut(0, "assume", "rain < 3 m/s", 0, 0, 1)
-    page = Page()
+    page = TextPage()
     show_policy(page, replace(policy, vehicle=vehicle, left_out=(clause,)))
     rows = [" ".join(row.split()) for row in str(page).splitlines()]
     assert "without rain, snow: not fitted; what reads it `where fitted` is left out" in rows
@@ -240,7 +240,7 @@ def test_the_sensors_that_a_vehicle_lacks_and_the_clauses_left_out() -> None:
 
 
 def _shown(policy: Policy) -> list[str]:
-    page = Page()
+    page = TextPage()
     show_policy(page, policy)
     return [row.strip() for row in str(page).splitlines()]
 
@@ -281,10 +281,10 @@ def test_words_of_what_is_out_of_range() -> None:
     ],
 )
 def test_a_temporal_monitor(kind: int, window_us: int, text: str) -> None:
-    page = Page(bold=False)
+    page = TextPage(bold=False)
     show_policy(page, replace(flat.POLICY, monitors=(Monitor(kind, window_us, flat.LOW_BATTERY),)))
     assert text in str(page)
-    bare = Page(bold=False)
+    bare = TextPage(bold=False)
     show_policy(bare, flat.POLICY)
     assert "Temporal monitors" not in str(bare)
 
@@ -298,7 +298,7 @@ def test_words_of_places_and_zones() -> None:
 
 
 def test_pages_wrap_beneath_themselves() -> None:
-    page = Page(bold=True)
+    page = TextPage(bold=True)
     page.head("title")
     page.rows("name", ["word " * 40, "second"])
     page.rows("nothing", [])

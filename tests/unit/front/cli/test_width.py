@@ -17,7 +17,7 @@ from rtshcua.front.cli.faults import fail, say
 from rtshcua.front.cli.findings import Findings
 from rtshcua.front.cli.log_slugs import every, find
 from rtshcua.front.cli.pages import read_page
-from rtshcua.front.cli.showing.page import Page
+from rtshcua.front.cli.showing.page import TextPage
 from rtshcua.front.cli.stdout import out
 from rtshcua.front.cli.verdict import HELPS, MEANINGS
 
@@ -37,7 +37,7 @@ def too_wide(text: str) -> list[str]:
 
 
 def _page() -> None:
-    page = Page()
+    page = TextPage()
     page.head(LONG)
     page.row("digest", LONG)
     page.rows("rules", [LONG, "short"])

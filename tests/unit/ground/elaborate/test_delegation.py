@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rtshcua.diagnostics.render import render
 from rtshcua.diagnostics.span import Source
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import collect
 from rtshcua.ground.elaborate.elaborate import elaborate
@@ -150,7 +150,7 @@ def test_the_grantee_may_what_the_grantor_may_and_no_more(rules: list[Line], del
     parsed = parse(source)
     assert parsed.diagnostics == (), render(parsed.diagnostics, {"x.rts": source})
     report = Report({"x.rts": source})
-    context = Context(collect([parsed.unit]), report, dialect.load())
+    context = CheckContext(collect([parsed.unit]), report, dialect.load())
     plain = elaborate(context, [parsed.unit], lambda file: frozenset({file})).units[0].policies[0].rules
     said = [Said(rule) for rule in plain]
     assert {found.code.id for found in report.found} <= {"E0714"}

@@ -25,9 +25,9 @@ from rtshcua.ground.geometry.polygons import (
 )
 from rtshcua.ground.geometry.projection import projection_at
 from rtshcua.ground.geometry.shapes import (
-    Disc,
     MultiPolygon,
     Region,
+    RoundArea,
     Shape,
     SimplePolygon,
     are_disjoint,
@@ -61,7 +61,7 @@ STARS = st.builds(star, st.lists(st.integers(5_000, 60_000), min_size=3, max_siz
 
 def polygon(shape: Shape) -> shapely.Geometry:
     """The same region for shapely; a disc by a fine polygon."""
-    if isinstance(shape, Disc):
+    if isinstance(shape, RoundArea):
         return shapely.Point(shape.center).buffer(shape.radius, quad_segs=64)
     return shapely.unary_union([shapely.Polygon(ring, holes) for ring, holes in parts(shape)])
 
@@ -130,10 +130,10 @@ def made(offset: Callable[[Shape, int], Shape], shape: Shape, margin: int) -> Sh
 
 
 def test_a_disc_grows_and_shrinks_exactly() -> None:
-    assert inner(Disc((5, 6), 100), 20) == outer(Disc((5, 6), 100), 20) == Disc((5, 6), 120)
-    assert inner(Disc((5, 6), 100), -20) == Disc((5, 6), 80)
+    assert inner(RoundArea((5, 6), 100), 20) == outer(RoundArea((5, 6), 100), 20) == RoundArea((5, 6), 120)
+    assert inner(RoundArea((5, 6), 100), -20) == RoundArea((5, 6), 80)
     with pytest.raises(NoSuchOffset):
-        inner(Disc((5, 6), 100), -100)
+        inner(RoundArea((5, 6), 100), -100)
 
 
 def test_a_hole_is_never_flown_in_and_always_kept_out_of() -> None:
@@ -161,7 +161,7 @@ def test_a_hole_is_never_flown_in_and_always_kept_out_of() -> None:
 
 
 SHAPES = st.one_of(
-    st.builds(Disc, POINTS, st.integers(1, 30)),
+    st.builds(RoundArea, POINTS, st.integers(1, 30)),
     RAW.filter(lambda corners: crossing(corners) is None).map(lambda c: SimplePolygon(tuple(counter_clockwise(c)))),
 )
 
@@ -206,7 +206,7 @@ def test_a_survey_stays_in_its_area(shape: SimplePolygon, pattern: str, spacing:
 
 @given(
     st.one_of(
-        st.builds(Disc, st.just((0, 0)), st.integers(10_000, 90_000)),
+        st.builds(RoundArea, st.just((0, 0)), st.integers(10_000, 90_000)),
         st.builds(
             lambda a, b, c: SimplePolygon(((0, 0), (a, c), (a - c * b // a, c + b), (-c * b // a, b))),
             st.integers(30_000, 90_000),
@@ -283,7 +283,7 @@ def test_a_survey_begins_at_the_end_that_is_nearer() -> None:
 
 def test_a_disc_is_surveyed_too() -> None:
     for pattern in ("grid", "perimeter", "orbit"):
-        points = survey(Disc((0, 0), 50_000), pattern, 10_000, 3_000, None)
+        points = survey(RoundArea((0, 0), 50_000), pattern, 10_000, 3_000, None)
         assert points is not None
         assert all(x * x + y * y <= 47_000**2 for x, y in points)
-    assert survey(Disc((0, 0), 900), "grid", 10_000, 0, None) is None
+    assert survey(RoundArea((0, 0), 900), "grid", 10_000, 0, None) is None

@@ -25,7 +25,7 @@ from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, point
 from rtshcua.decision.zones import PreparedZone, WellKnown
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.conditions import check_condition
-from rtshcua.ground.checker.context import Context
+from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.symbols import Symbols, collect
@@ -110,7 +110,7 @@ def lowered(node: Condition) -> Lowered | None:
     """A well typed condition, lowered; None where it does not fit on board, or asks for what never is."""
     symbols, known = declared()
     report = Report({})
-    context = Context(symbols, report, known)
+    context = CheckContext(symbols, report, known)
     scope = Scope(symbols, report, context.arguments(symbols.skills["probe"]))
     check_condition(scope, node)
     if report.found:  # it asks for a value that a signal never has

@@ -7,7 +7,7 @@ import pytest
 from reference.sources import findings, program
 from rtshcua.decision.prepare import prepare_invocation
 from rtshcua.ground.geometry import survey
-from rtshcua.ground.geometry.shapes import Disc
+from rtshcua.ground.geometry.shapes import RoundArea
 from rtshcua.ground.prove import proof_context
 from rtshcua.model.flat.mission import Invocation
 
@@ -52,7 +52,7 @@ def test_a_step_is_prepared_once_for_all_that_have_the_same_arguments(monkeypatc
 
 def test_an_area_is_shrunk_once() -> None:
     survey._inset.cache_clear()
-    square = Disc((0, 0), 40_000)
+    square = RoundArea((0, 0), 40_000)
     for height in range(10_000, 20_000, 1_000):
         assert survey.survey(square, "grid", height, 2_000, None)
     assert survey._inset.cache_info().misses == 1

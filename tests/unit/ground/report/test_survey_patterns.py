@@ -7,7 +7,7 @@ from math import hypot
 import pytest
 
 from rtshcua.ground.checker.checks.contracts import PATTERNS as KNOWN
-from rtshcua.ground.geometry.shapes import Disc, SimplePolygon
+from rtshcua.ground.geometry.shapes import RoundArea, SimplePolygon
 from rtshcua.ground.geometry.survey import survey
 from rtshcua.ground.report.drawing.survey_patterns import drawn
 from rtshcua.ground.report.html_page import page
@@ -16,7 +16,7 @@ from rtshcua.ground.report.report_model import PolicyReport
 
 M = 1_000
 HOUSE = SimplePolygon(((0, 0), (120 * M, 0), (150 * M, 55 * M), (120 * M, 90 * M), (0, 90 * M)))
-ROUND = Disc((0, 0), 50 * M)
+ROUND = RoundArea((0, 0), 50 * M)
 
 
 def turned(points: tuple[tuple[int, int], ...]) -> int:

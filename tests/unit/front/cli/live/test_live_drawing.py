@@ -4,20 +4,30 @@ import json
 
 import pytest
 
-from rtshcua.app.fly.story import Happened, Happening, Message, Note, Plan, Signal, Snapshot, Step, Summary
+from rtshcua.app.fly.story import (
+    FlightPlanView,
+    Happened,
+    Happening,
+    LiveStep,
+    Message,
+    Note,
+    SignalFormat,
+    Snapshot,
+    Summary,
+)
 from rtshcua.front.cli.live.board import Board
 from rtshcua.front.cli.live.chart import chart
 from rtshcua.front.cli.live.lines import as_json, plain, sentence
 from rtshcua.front.cli.live.screen import picture
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView, SignalReading
 
-PLAN = Plan(
+PLAN = FlightPlanView(
     mission="inspect", intent="Look at it.", policy="bridge@7", vehicle="quad-07", mode="software", speed=10.0,
     phases=("departure", "inspection"),
-    steps=(Step("takeoff(altitude = 20 m)", 0), Step("inspect_area(area = bridge_a)", 1)),
+    steps=(LiveStep("takeoff(altitude = 20 m)", 0), LiveStep("inspect_area(area = bridge_a)", 1)),
     signals=(
-        Signal("battery", "ratio", {}), Signal("gps.fix", "GPS_FIX_TYPE", {3: "fix_3d"}),
-        Signal("position", "position", {}), Signal("height", "altitude", {}),
+        SignalFormat("battery", "ratio", {}), SignalFormat("gps.fix", "GPS_FIX_TYPE", {3: "fix_3d"}),
+        SignalFormat("position", "position", {}), SignalFormat("height", "altitude", {}),
     ),
     position="position", path=((40_000, 20_000),),
 )  # fmt: skip

@@ -22,14 +22,14 @@ from rtshcua.app.fly.narrator import Answering, Teller, plan_of
 from rtshcua.app.fly.story import (
     Area,
     Asks,
+    FlightPlanView,
     Happened,
     Happening,
+    LiveStep,
     Message,
     Note,
-    Plan,
-    Signal,
+    SignalFormat,
     Snapshot,
-    Step,
     Summary,
     tenths,
 )
@@ -46,12 +46,13 @@ COMMAND = ("rtshcua", "approve", "low.bundle", "--step", "3", "--role", "supervi
 ASKS = Asks(("supervisor",), 4 * S, 34 * S, (COMMAND,))
 WAITS = Happening("decision", 4 * S, 2, "inspect_area(area = bridge_a)", "defer", "approval/awaited",
                   "confirm inspect_area", asks=ASKS)  # fmt: skip
-PLAN = Plan(
+PLAN = FlightPlanView(
     mission="inspect", intent="Look at it.", policy="bridge@7", vehicle="quad-07", mode="software", speed=10.0,
     phases=("departure", "inspection", "recovery"),
-    steps=tuple(Step(f"goto(target = 47.3987{number} N, 8.54698 E, altitude = 9 m, speed = 6 m/s)", number // 6)
+    steps=tuple(LiveStep(f"goto(target = 47.3987{number} N, 8.54698 E, altitude = 9 m, speed = 6 m/s)", number // 6)
                 for number in range(18)),
-    signals=(Signal("position", "position", {}), Signal("height", "altitude", {}), Signal("climb", "speed", {})),
+    signals=(SignalFormat("position", "position", {}), SignalFormat("height", "altitude", {}), SignalFormat("climb",
+        "speed", {})),
     position="position", path=((40_000, 20_000), (90_000, 30_000)),
     areas=(
         Area("city", "inside", ((-100_000, -90_000, 170_000, -90_000, 170_000, 90_000, -100_000, 90_000),)),

@@ -11,9 +11,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
+from rtshcua.adapters.store.checkout import checkout_of, lies_in
 from rtshcua.adapters.store.reading import walk
 from rtshcua.adapters.store.runs import LOG
-from rtshcua.adapters.store.source_access import checkout_of, lies_in
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import TYPO, likeness
 from rtshcua.ground.language.paths import shown

@@ -12,8 +12,8 @@ from lsprotocol import types as lsp
 
 from rtshcua import library
 from rtshcua.adapters.store import writing
+from rtshcua.adapters.store.checkout import checkout_of, expect_inside
 from rtshcua.adapters.store.runs import logs_of
-from rtshcua.adapters.store.source_access import checkout_of, expect_inside
 from rtshcua.adapters.store.witness import logs_in
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app

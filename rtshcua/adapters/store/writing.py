@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
+from rtshcua.adapters.store.checkout import expect_inside
 from rtshcua.adapters.store.reading import (
     UNAWAITED,
     NotRegular,
@@ -21,7 +22,6 @@ from rtshcua.adapters.store.reading import (
     read_regular,
     unfollowed,
 )
-from rtshcua.adapters.store.source_access import expect_inside
 
 #: modes of what is made; the umask takes away more, and where it takes nothing, no other user may write all the same
 PRIVATE_FILE: Final = 0o600

@@ -6,10 +6,10 @@ from os.path import lexists, normpath
 from pathlib import Path
 from typing import NamedTuple
 
+from rtshcua.adapters.store.checkout import checkout_of, lies_in
 from rtshcua.adapters.store.folders import cache_folder
 from rtshcua.adapters.store.lint_cache import LintCache
 from rtshcua.adapters.store.project import Project, Projects
-from rtshcua.adapters.store.source_access import checkout_of, lies_in
 from rtshcua.app.files import SOURCE, source_files
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.language.paths import shown

@@ -21,7 +21,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 PACKAGE = Path(rtshcua.__file__).parent
 #: where findings about logs are made
-MAKERS = ("evidence", "ground/audit", "adapters/archive", "cli")
+MAKERS = ("evidence", "ground/audit", "adapters/archive", "app", "front/cli")
 #: those of `verify-proof`, and of notes before they are told as a part of what has them
 OTHERS = ("proof/", "note/")
 #: and the rest of these slugs is that of a refusal of `wire`, or of a session: whatever these raise

@@ -40,16 +40,16 @@ import sys
 from pathlib import Path
 from distributed import LocalCluster
 from rtshcua.adapters.archive.adding import add, verify
-from rtshcua.adapters.archive.examine import Cluster
-from rtshcua.adapters.archive.folder import Folder, Source
+from rtshcua.adapters.archive.examine import SchedulerWorkers
+from rtshcua.adapters.archive.folder import ArchiveFolder, LogSource
 from reference.archived import CHECK
 
 if __name__ == "__main__":
-    folder, logs = Folder(Path(sys.argv[1]), make=True), sorted(Path(sys.argv[2]).glob("*.jsonl"))
+    folder, logs = ArchiveFolder(Path(sys.argv[1]), make=True), sorted(Path(sys.argv[2]).glob("*.jsonl"))
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as local:
-        cluster = Cluster(local.scheduler_address)
+        cluster = SchedulerWorkers(local.scheduler_address)
         check = CHECK._replace(workers=cluster)
-        for work in (add(folder, map(Source, logs), check), verify(folder, check)):
+        for work in (add(folder, map(LogSource, logs), check), verify(folder, check)):
             for done in work:
                 print(done.entry.log, done.entry.status, done.entry.records, done.entry.indexed)
         ran = len(local.scheduler_info["workers"])

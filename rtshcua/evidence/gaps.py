@@ -7,7 +7,7 @@ That time does not count for the epoch. All else does: who leaves records unseal
 
 from typing import Final, NamedTuple
 
-from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
+from rtshcua.evidence.epoch_key import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Claim, Flaw
 from rtshcua.evidence.records import DecisionRecord, Effect, Genesis, Recover, Signed
 from rtshcua.model.quantity import Dimension, display

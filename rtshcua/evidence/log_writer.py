@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, Final, Protocol
 from urllib.parse import quote
 
-from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, LONGEST_US, EpochKey
+from rtshcua.evidence.epoch_key import EPOCH_RECORDS, EPOCH_US, LONGEST_US, EpochKey
 from rtshcua.evidence.gaps import STALLED, detail_of
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.records import (

@@ -16,7 +16,7 @@ from hashlib import sha256
 from typing import Final, NamedTuple
 
 from rtshcua.evidence.clocks import Clocks
-from rtshcua.evidence.epochs import LONGEST_US, MOST_RECORDS
+from rtshcua.evidence.epoch_key import LONGEST_US, MOST_RECORDS
 from rtshcua.evidence.finding import Claim, Flaw
 from rtshcua.evidence.gaps import STALLED, RecordGap, detail_of, told
 from rtshcua.evidence.heads import START

@@ -22,8 +22,8 @@ from random import Random
 import pytest
 from msgspec.structs import replace
 
+from boundary.c_and_python import PIN, SIGNED_ROOT
 from boundary.kept import HEAD, LAYOUT, MOST_OPENED, OPENED
-from boundary.together import PIN, SIGNED_ROOT
 from reference import flat_case as flat
 from reference import outlines
 from reference.documents import presented, replacement

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from boundary.together import PIN, SIGNED_ROOT
+from boundary.c_and_python import PIN, SIGNED_ROOT
 from reference.flat_case import S
 from reference.world import ROOT, START, VEHICLE, answer_to, request_for, sealed
 from rtshcua.adapters.boundary_process import BoundaryProcess, program

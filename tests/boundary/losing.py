@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 import rtshcua.virtual.flight
-from boundary import shadow
+from boundary import both_boundaries
 from rtshcua.mavlink.radio import UnsignedRadio
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Plan
@@ -50,7 +50,7 @@ class Apart:
         policy, mission = claimed(bundle)
         clock = VirtualClock(Now(START.monotonic_us, UTC_US, START.utc_error_us))
         root, signed = case.root(boundary=True)
-        held = shadow.begin(
+        held = both_boundaries.begin(
             boundary, signed, case.KEYS[Duty.ROOT].kid, policy.vehicle.identity, bytes(range(32)), clock.now(),
             link_key=key,
         )  # fmt: skip

@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from boundary import shadow
-from boundary.together import PIN, SIGNED_ROOT
+from boundary import both_boundaries
+from boundary.c_and_python import PIN, SIGNED_ROOT
 from reference.documents import approval
 from reference.own_clock import ARDUPILOT_US, CHALLENGE_US, VEHICLE_US, OwnClock
 from reference.world import ROOT, SESSION_KEY, START, VEHICLE, request_for, sealed
@@ -119,7 +119,7 @@ def test_both_decide_and_take_in_by_their_own_clock_alone(boundary: ctypes.CDLL,
     random = Random(33)
     moment, unknown = START.monotonic_us, replace(START, utc_error_us=UTC_UNKNOWN_US)
     own = OwnClock(unknown, None if stated < 0 else stated)
-    caller = shadow.begin(
+    caller = both_boundaries.begin(
         boundary, SIGNED_ROOT, PIN, VEHICLE, SESSION_KEY, unknown, stated_us=stated, own_us=lambda: moment
     )
     caller.time(settle=True)

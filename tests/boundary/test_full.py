@@ -5,7 +5,7 @@ import ctypes
 import pytest
 from msgspec.structs import replace
 
-from boundary.shadow import Shadow
+from boundary.both_boundaries import Shadow
 from reference import flat_case as flat
 from reference.documents import approval, presented
 from reference.world import (

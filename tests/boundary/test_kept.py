@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from boundary import kept as keeping
-from boundary.together import PIN, SIGNED_ROOT
+from boundary.c_and_python import PIN, SIGNED_ROOT
 from reference.world import MISSION, POLICY, START, VEHICLE, sealed
 from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
 from rtshcua.adapters.clock import monotonic_ns

@@ -4,7 +4,7 @@ import ctypes
 
 from msgspec.structs import replace
 
-from boundary.shadow import begin
+from boundary.both_boundaries import begin
 from reference.flat_case import MISSION
 from reference.world import FLIGHT, ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, allowed, sealed
 from rtshcua.diagnostics.refusal import Refusal

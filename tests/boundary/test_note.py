@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from boundary.shadow import begin
+from boundary.both_boundaries import begin
 from reference.flat_case import MISSION
 from reference.world import ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, sealed
 from rtshcua.diagnostics.refusal import Refusal

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from boundary.shadow import Shadow
+from boundary.both_boundaries import Shadow
 from reference.world import FLIGHT, ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, allowed, sealed
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
@@ -137,7 +137,7 @@ def test_both_stop_at_the_same_number_of_permits(boundary: ctypes.CDLL) -> None:
 def test_a_prepared_flight_is_the_same_under_both(
     flavour: str, boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from boundary.test_shadow import watched
+    from boundary.test_both_boundaries import watched
 
     shadow = watched(boundary, monkeypatch)
     had: dict[str, dict[str, float]] = {"ardupilot": {"FENCE_ALT_MAX": 15.0}, "px4": {"GF_MAX_VER_DIST": 15.0}}
@@ -152,7 +152,7 @@ def test_a_prepared_flight_is_the_same_under_both(
 def test_what_an_earlier_run_left_is_put_back_under_both(
     boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from boundary.test_shadow import watched
+    from boundary.test_both_boundaries import watched
 
     shadow = watched(boundary, monkeypatch)
     left, was = bits_of(80.0) or 0, bits_of(90.0) or 0

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from boundary.shadow import Shadow, begin, library
+from boundary.both_boundaries import Shadow, begin, library
 from reference import world
 from reference.flat_case import S
 from reference.world import ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, allowed, answer_to, request_for, sealed_again

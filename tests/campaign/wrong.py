@@ -28,7 +28,7 @@ from rtshcua.mavlink.modes import Px4Mode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement import allow_list, executor, frames
 from rtshcua.onboard.ports import ClockStepped, Crashed
-from rtshcua.onboard.runtime import admission, controller, dispatcher, fallback, link, runtime, supervisor
+from rtshcua.onboard.runtime import admission, controller, dispatcher, fallback_flight, link, runtime, supervisor
 from rtshcua.wire import approval
 from rtshcua.wire.document import DocumentError
 from rtshcua.wire.request import FALLBACK_LINK, STEP
@@ -291,7 +291,7 @@ WRONG: Final = (
     Wrong("target-taken-ignored", "A target that nothing of ours gave does not count as a takeover.",
           ((supervision.TargetWatch, "is_foreign", _no_target_of_others),), (b"another target",)),
     Wrong("first-link-skipped", "A step's fallback begins with its second link.",
-          ((fallback.Fallback, "begin", _second_link_first),), (b'"kind":1',)),
+          ((fallback_flight.Fallback, "begin", _second_link_first),), (b'"kind":1',)),
     Wrong("sent-before-recorded", "A step's command is not held until the record of its decision is kept.",
           ((executor.Executor, "_dispatch", _record_for(False)),)),  # a disk that is slow for a second shows in no log
     Wrong("fallback-held-for-record", "A fallback is held until its record is kept, as a step is.",
@@ -319,7 +319,7 @@ WRONG: Final = (
     Wrong("stop-unobserved", "A stop counts as done when it was sent.",
           ((manoeuvre.Manoeuvre, "_is_done", _stop_is_done), (supervision.BrakingWatch, "has_failed", _false))),
     Wrong("last-link-once", "The last link of the contingency is not tried again when it fails.",
-          ((fallback.Fallback, "_insist", _false),), (b'"kind":2',)),
+          ((fallback_flight.Fallback, "_insist", _false),), (b'"kind":2',)),
     Wrong("restart-ends-in-air", "Begun again after a crash of the program, it ends and leaves the vehicle flying.",
           ((controller.MissionController, "aloft", _ends_in_the_air),), (b'"resumed"',)),
     Wrong("restart-over-pilot", "Begun again after a crash of the program, it does not ask who flies meanwhile.",

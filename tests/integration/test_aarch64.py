@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from boundary.together import ask_both, decided
+from boundary.c_and_python import ask_both, decided
 from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import Measure, measures_here
 

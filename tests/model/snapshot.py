@@ -26,7 +26,7 @@ from rtshcua.onboard.enforcement.boundary import PermitIssuer, SoftwareBoundary
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.controller import MissionController
-from rtshcua.onboard.runtime.fallback import Fallback
+from rtshcua.onboard.runtime.fallback_flight import Fallback
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
 from rtshcua.onboard.runtime.runtime import EventHandler

@@ -17,7 +17,7 @@ from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.ports import Command
 from rtshcua.onboard.runtime.controller import MissionController
 from rtshcua.onboard.runtime.dispatcher import Dispatcher
-from rtshcua.onboard.runtime.fallback import Fallback
+from rtshcua.onboard.runtime.fallback_flight import Fallback
 from rtshcua.onboard.runtime.link import LinkSupervision
 from rtshcua.onboard.runtime.runtime import EventHandler
 from rtshcua.onboard.runtime.supervisor import Grace, Supervisor

@@ -23,7 +23,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement import executor as executors
 from rtshcua.onboard.enforcement.executor import Commands, Executor
 from rtshcua.onboard.ports import EvidenceFailed, Interrupted, LinkBack, LinkLost, TakenOver
-from rtshcua.onboard.runtime.fallback import Fallback
+from rtshcua.onboard.runtime.fallback_flight import Fallback
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.wire.permit import AGAIN
 

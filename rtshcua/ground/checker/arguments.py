@@ -6,7 +6,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.fitting import stored
-from rtshcua.ground.checker.scope import Argument, Entry, Scope
+from rtshcua.ground.checker.name_scope import Argument, Entry, Scope
 from rtshcua.ground.checker.substitution import named_at
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import Kind

@@ -6,7 +6,7 @@ from fractions import Fraction
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.fitting import declaration_labels, fit
-from rtshcua.ground.checker.scope import Scope
+from rtshcua.ground.checker.name_scope import Scope
 from rtshcua.ground.checker.types import COUNT, DURATION, LENGTH, RATIO, SPEED, Kind, Type, Typed
 from rtshcua.model.ir.expression import Arithmetic, Function, Value
 from rtshcua.model.quantity import Dimension

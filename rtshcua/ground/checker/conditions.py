@@ -3,8 +3,8 @@
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.condition_nodes import Part, children, walk
 from rtshcua.ground.checker.fitting import declaration_labels, stored
+from rtshcua.ground.checker.name_scope import LOCAL_TIME, PHASE, Argument, Scope
 from rtshcua.ground.checker.ranges import check_compared, check_ends
-from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, Argument, Scope
 from rtshcua.ground.checker.types import DURATION, LENGTH, MISSION_PHASE, POSITION, TIME_OF_DAY, ZONE, Kind, Type, Typed
 from rtshcua.ground.checker.values import typed, typed_range, unknown_member
 from rtshcua.ground.checker.well_known import POSITION_SIGNAL

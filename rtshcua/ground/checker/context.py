@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.geojson import DataFiles
+from rtshcua.ground.checker.name_scope import Argument, Scope, parameter_type
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Argument, Scope, parameter_type
 from rtshcua.ground.checker.symbols import Symbols
 from rtshcua.ground.checker.values import whole_range
 from rtshcua.mavlink.dialect import Dialect

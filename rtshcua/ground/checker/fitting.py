@@ -5,7 +5,7 @@ from math import floor
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
-from rtshcua.ground.checker.scope import Argument, Scope
+from rtshcua.ground.checker.name_scope import Argument, Scope
 from rtshcua.ground.checker.types import COUNT, EXAMPLES, LENGTH, POSITION, Kind, Type, Typed
 from rtshcua.ground.language.exact_values import CANONICAL
 from rtshcua.model.ir.expression import Quantity, Reference, Value

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arithmetic import COHERENT
-from rtshcua.ground.checker.scope import Scope
+from rtshcua.ground.checker.name_scope import Scope
 from rtshcua.ground.checker.symbols import Extent
 from rtshcua.ground.checker.types import Typed
 from rtshcua.ground.checker.values import typed

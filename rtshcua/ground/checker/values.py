@@ -8,7 +8,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.arithmetic import arithmetic, function
 from rtshcua.ground.checker.fitting import fit, stored
-from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, Scope
+from rtshcua.ground.checker.name_scope import LOCAL_TIME, PHASE, Scope
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import MISSION_PHASE, POSITION, TIME_OF_DAY, Enumeration, Type, Typed, number
 from rtshcua.model.ir.expression import (

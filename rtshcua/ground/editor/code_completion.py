@@ -9,7 +9,7 @@ from rtshcua.ground.checker.checks.policies import SOURCES
 from rtshcua.ground.checker.checks.roles import OPERATOR
 from rtshcua.ground.checker.checks.scenarios import ENDS
 from rtshcua.ground.checker.faults import NAMED as NAMED_FAULTS
-from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE, parameter_type, signal_type
+from rtshcua.ground.checker.name_scope import LOCAL_TIME, PHASE, parameter_type, signal_type
 from rtshcua.ground.checker.types import NAMED, Type
 from rtshcua.ground.editor.cursor_context import (
     AcceptedSymbols,

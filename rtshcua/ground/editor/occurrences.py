@@ -8,7 +8,7 @@ from msgspec.structs import astuple
 
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.scenarios import OBSTACLE
-from rtshcua.ground.checker.scope import LOCAL_TIME, PHASE
+from rtshcua.ground.checker.name_scope import LOCAL_TIME, PHASE
 from rtshcua.ground.checker.symbols import Declaration, Symbols
 from rtshcua.ground.checker.types import NAMED
 from rtshcua.model.ir.expression import Comparison, OneOf, Reference

@@ -18,8 +18,8 @@ from rtshcua.ground.checker.agent_values import parse_value
 from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import Bound, CheckContext, Instance
+from rtshcua.ground.checker.name_scope import Argument, Scope
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.substitution import names_in, substitute
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import Kind

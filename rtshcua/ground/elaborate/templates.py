@@ -8,7 +8,7 @@ from rtshcua.ground.checker.arguments import pair
 from rtshcua.ground.checker.checks.parameters import ROLE
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.lookup import find_template
-from rtshcua.ground.checker.scope import Argument
+from rtshcua.ground.checker.name_scope import Argument
 from rtshcua.ground.checker.substitution import names_in, substitute, substitute_roles
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.elaborate.parameters import bound_value, value_of

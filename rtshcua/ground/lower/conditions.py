@@ -25,7 +25,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arithmetic import COHERENT
 from rtshcua.ground.checker.conditions import is_about_phase
 from rtshcua.ground.checker.context import CheckContext
-from rtshcua.ground.checker.scope import Argument, Scope
+from rtshcua.ground.checker.name_scope import Argument, Scope
 from rtshcua.ground.checker.types import ZONE
 from rtshcua.ground.checker.values import typed
 from rtshcua.ground.lower.tables import MonitorTable, SignalSlots, SourceTable, ValueSets, enum_labels

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from rtshcua.decision.tree import slots_read
 from rtshcua.ground.checker.context import Bound, CheckContext
-from rtshcua.ground.checker.scope import Argument
+from rtshcua.ground.checker.name_scope import Argument
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
 from rtshcua.ground.lower.policy_checks import applies

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import CheckContext
-from rtshcua.ground.checker.scope import Scope, signal_type
+from rtshcua.ground.checker.name_scope import Scope, signal_type
 from rtshcua.ground.checker.symbols import brought_about
 from rtshcua.ground.checker.types import Type
 from rtshcua.ground.checker.well_known import MEASURED, PER_CELL, VELOCITY, WELL_KNOWN, read_by_all

@@ -8,8 +8,8 @@ from math import gcd
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.checks.signals import selected_value, sentinel
 from rtshcua.ground.checker.context import CheckContext
+from rtshcua.ground.checker.name_scope import signal_type
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.types import Kind, Type
 from rtshcua.mavlink.quantise import UNITS
 from rtshcua.model.flat.code import Clause

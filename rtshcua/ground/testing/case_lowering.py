@@ -18,8 +18,8 @@ from rtshcua.ground.checker.arguments import bind_value, pair
 from rtshcua.ground.checker.checks.premises import TestStart, nominal_of, start_of
 from rtshcua.ground.checker.checks.tests import unranged
 from rtshcua.ground.checker.context import Bound, CheckContext
+from rtshcua.ground.checker.name_scope import Scope
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.lower.mission import lower_mission
 from rtshcua.ground.testing.case import PolicyCase, PolicyUnderTest
 from rtshcua.ground.testing.case_situation import Situations, SubjectValue

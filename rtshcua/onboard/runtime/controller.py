@@ -24,7 +24,7 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import WITHHELD, AirState, CommandFailed, End, Ending, Expect, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
 from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
-from rtshcua.onboard.runtime.fallback import Fallback
+from rtshcua.onboard.runtime.fallback_flight import Fallback
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.link import STOOD_STILL, EndedSilence, LinkState, LinkSupervision

@@ -12,8 +12,8 @@ from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import CheckContext
+from rtshcua.ground.checker.name_scope import Scope
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.language.parse import parse
 from rtshcua.model.ir.expression import Grow
 from unit.ground.lower.test_expression_meaning import NAMES, SOURCE, declared, histories, lowered, on_board

@@ -7,7 +7,7 @@ from hashlib import sha256
 
 import pytest
 
-from rtshcua.evidence.epochs import EpochKey
+from rtshcua.evidence.epoch_key import EpochKey
 from rtshcua.evidence.heads import Head
 from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.merkle import leaf_hash, root_of

@@ -11,7 +11,7 @@ from hypothesis import strategies as some
 from reference.resealing import leaf_of, line_of, resealed, root_of
 from reference.witnessed import LOG_KEY, ORIGIN, PUBLIC, WITNESSES, Judge, Log
 from rtshcua.evidence import quick_verification
-from rtshcua.evidence.epochs import EpochKey
+from rtshcua.evidence.epoch_key import EpochKey
 from rtshcua.evidence.merkle import MerkleTree
 from rtshcua.evidence.quick_verification import LogOutline, SegmentPart, _nodes, outline, quick, scan, signed_line
 from rtshcua.evidence.report import LogReport, LogVerdict

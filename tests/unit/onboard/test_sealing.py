@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference.seeds import epoch_seeds
-from rtshcua.evidence.epochs import EPOCH_RECORDS, EPOCH_US, LONGEST_US
+from rtshcua.evidence.epoch_key import EPOCH_RECORDS, EPOCH_US, LONGEST_US
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.durability import SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from reference.seeds import epoch_seeds
-from rtshcua.evidence.epochs import LONGEST_US
+from rtshcua.evidence.epoch_key import LONGEST_US
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.recovery import Examination, LogState
 from rtshcua.evidence.report import LogVerdict

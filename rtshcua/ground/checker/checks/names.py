@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.conditions import references
 from rtshcua.ground.checker.context import CheckContext, Parametric
-from rtshcua.ground.checker.scope import PHASE
+from rtshcua.ground.checker.name_scope import PHASE
 from rtshcua.ground.checker.symbols import WORDS
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import TemplateDecl

@@ -7,8 +7,8 @@ from rtshcua.ground.checker.context import CheckContext, Parametric
 from rtshcua.ground.checker.fields import size
 from rtshcua.ground.checker.fitting import declaration_labels
 from rtshcua.ground.checker.lookup import find_skill
+from rtshcua.ground.checker.name_scope import Argument, Scope
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Argument, Scope
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import EXAMPLES, NAMED, Kind
 from rtshcua.ground.checker.values import whole_range

@@ -8,7 +8,7 @@ from rtshcua.ground.checker.conditions import check_condition, references
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_skill, find_zone
-from rtshcua.ground.checker.scope import Argument, Scope
+from rtshcua.ground.checker.name_scope import Argument, Scope
 from rtshcua.ground.checker.symbols import brought_about
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.limits import MAX_SILENCE, MAX_VALUE

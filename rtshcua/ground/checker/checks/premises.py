@@ -11,8 +11,8 @@ from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.fields import on_globe, one_of, quantity, size
 from rtshcua.ground.checker.lookup import find_nominal, find_policy, find_vehicle
+from rtshcua.ground.checker.name_scope import Argument, signal_type
 from rtshcua.ground.checker.ranges import beyond
-from rtshcua.ground.checker.scope import Argument, signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.limits import MAX_PHASES

@@ -6,8 +6,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import quantity, size
+from rtshcua.ground.checker.name_scope import signal_type
 from rtshcua.ground.checker.ranges import INTEGERS, reported
-from rtshcua.ground.checker.scope import signal_type
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import NAMED, POSITION, SPEED, ZONE, Kind, Type
 from rtshcua.mavlink.dialect import DATUM, Dialect, Field, Message

@@ -21,7 +21,7 @@ from rtshcua.ground.checker.checks.premises import (
 )
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.lookup import find_skill
-from rtshcua.ground.checker.scope import Argument
+from rtshcua.ground.checker.name_scope import Argument
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name

@@ -6,8 +6,8 @@ from random import Random
 
 from reference.naive_expression import SI, Names, World, known, number
 from reference.random_expressions import ALTITUDE, STEP, Maker
+from rtshcua.ground.checker.name_scope import Scope
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.symbols import Symbols
 from rtshcua.ground.checker.values import typed
 from rtshcua.ground.language.load import load

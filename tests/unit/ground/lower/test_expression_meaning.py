@@ -26,8 +26,8 @@ from rtshcua.decision.zones import PreparedZone, WellKnown
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import CheckContext
+from rtshcua.ground.checker.name_scope import Scope
 from rtshcua.ground.checker.report import Report
-from rtshcua.ground.checker.scope import Scope
 from rtshcua.ground.checker.symbols import Symbols, collect
 from rtshcua.ground.language.parse import parse
 from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace

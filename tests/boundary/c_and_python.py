@@ -24,8 +24,8 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from boundary import kept as keeping
+from boundary.both_boundaries import LOG_KEY, OWN_KEY, same
 from boundary.mutants import damaged
-from boundary.shadow import LOG_KEY, OWN_KEY, same
 from boundary.test_gate import SYSTEM, drawn_command, drawn_frame, drawn_report, pack
 from boundary.test_note import begins
 from boundary.test_preparation import drawn_bits, fitting

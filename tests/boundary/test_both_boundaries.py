@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import rtshcua.virtual.flight
-from boundary.shadow import Differs, Shadow
+from boundary.both_boundaries import Differs, Shadow
 from reference import world
 from reference.documents import approval, hand, low_mission, recall
 from reference.world import ROOT, ROOT_KEY, SESSION_KEY, START, VEHICLE, sealed_again

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from boundary import together
-from boundary.shadow import Differs
-from boundary.together import ask_both, decided
+from boundary import c_and_python
+from boundary.both_boundaries import Differs
+from boundary.c_and_python import ask_both, decided
 from rtshcua.adapters.boundary_process import program
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -37,7 +37,7 @@ def test_both_answer_the_same(tmp_path: Path) -> None:
 @pytest.mark.soak
 def test_both_stop_signing_ahead_at_the_same_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A link that is signed ahead again and again, until no more is."""
-    monkeypatch.setattr(together, "FLOODS", 1)
+    monkeypatch.setattr(c_and_python, "FLOODS", 1)
     assert {"floods", "ahead frame/too-many-ahead"} <= ask_both(0, 600, tmp_path).keys()
 
 

@@ -188,7 +188,7 @@ class StoredTree:
         return [self._hash(start, end) for start, end in inclusion_ranges(index, size)]
 
     def consistency(self, first: int, second: int) -> list[bytes]:
-        """The proof that the tree of the first `second` leaves begins with that of the first `first`."""
+        """The consistency proof between the trees of sizes `first` and `second`."""
         self._check(second)
         return [self._hash(start, end) for start, end in consistency_ranges(first, second)]
 

@@ -26,7 +26,7 @@ _SECOND: Final = 100_000
 LEAD: Final = 3_000_000
 #: It begins anew no more often than this, in us: an attacker who sends it raises time by `LEAD + MOST_AHEAD` a second.
 _LEADS_EVERY_US: Final = 1_000_000
-#: How far it may reach above `LEAD`, in timestamps: one each frame. A batch needs some hundreds.
+#: The most timestamps reserved above `LEAD`, one per frame. A batch needs some hundreds.
 MOST_AHEAD: Final = _SECOND
 #: as many as the C library keeps (MAVLINK_MAX_SIGNING_STREAMS)
 MOST_STREAMS: Final = 16

@@ -49,7 +49,7 @@ _BRAKING: Final = 2_000
 _REACTION_US: Final = 1_000_000
 _STANDS_MM_S: Final = 500
 _TICK_US: Final = 50_000
-#: mm: two heights that a report of the autopilot's target does not tell apart, by what the estimator makes of them
+#: mm: reported target heights this close count as equal (estimator error)
 _SAME_MM: Final = 1_000
 #: a process that is killed has not written the last of these
 _UNWRITTEN_US: Final = 250_000

@@ -25,7 +25,7 @@ def test_the_genesis_of_one_before_the_records_of_another() -> None:
     assert expect(signed([OTHER[0], *LINES[1:]]))[0] == "decision/invocation"
 
 
-def test_the_close_of_another() -> None:
+def test_the_close_of_another_log_is_refused() -> None:
     assert expect([*LINES[:-1], OTHER[-1]])[0] in ("chain/sequence", "chain/broken")
     last = read(LINES[-1])
     timed = edit(OTHER[-1], at_us=last["at_us"], utc_us=last["utc_us"])

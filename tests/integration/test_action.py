@@ -53,7 +53,7 @@ def test_what_is_wrong_is_annotated_and_each_part_runs_all_the_same(run: Run, wo
 
 
 @pytest.mark.slow
-def test_what_an_input_holds_stays_text(run: Run, workspace: Path) -> None:
+def test_inputs_of_the_action_are_not_run_by_the_shell(run: Run, workspace: Path) -> None:
     hostile = "$(touch owned) `touch owned` ; touch owned #"
     ended = run(workspace, paths=hostile, fail_on=hostile, sarif=f"{hostile}.sarif", tests="false")
     assert ended.outcomes["Lint"] == "failure"

@@ -164,7 +164,7 @@ def _alone(folder: Path) -> Iterator[None]:
 def _expiry(marker: Path) -> int | None:
     """When a marker's bundle expires; None for one that a crash left without it: it is kept for ever."""
     try:
-        bytes.fromhex(marker.name)  # what else lies here, floors and unfinished files, is no marker
+        bytes.fromhex(marker.name)  # other files here (floors, unfinished files) are not markers
         return int(read_regular(marker, _LARGEST))
     except ValueError:
         return None

@@ -92,7 +92,7 @@ def refuse(refusal: Refusal, code: ExitCode | None = None) -> ExitCode:
 def tell(
     code: ExitCode, message: str, help: str | None = None, *, slug: str | None = None, usage: str | None = None
 ) -> ExitCode:
-    """`fail` for a person alone: of a command that has told the program in its own way."""
+    """Print an error as text only, for commands that print their own JSON."""
     say(f"{_head(code, slug)}: {message}")
     if usage:
         say_lines(f"usage: {usage}")

@@ -199,7 +199,11 @@ def narrowed(lowered: LoweredPolicy, units: Sequence[Unit], path: str | None) ->
                 "imports": imports,
                 "policy": _object({"name": _const(policy.name), "version": version}),
                 "vehicle": _const(policy.vehicle.name),
-                "intent": {"type": "string", "maxLength": 1000, "description": "What it is for, in a sentence."},
+                "intent": {
+                    "type": "string",
+                    "maxLength": 1000,
+                    "description": "What it is for, in a sentence; no invisible characters.",
+                },
                 "proposed_by": _object(
                     {"source": _const("agent"), "name": name, "role": {"type": "string", "enum": roles}}
                 ),

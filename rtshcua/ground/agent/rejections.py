@@ -131,7 +131,7 @@ def _rejection(
     there, observed = _at(value, pointer)
     message = found.message
     if there and limit is not None and set(limit) == {"type"} and pointer != (found.pointer or ""):
-        message = f"{_ARTICLED[limit['type']]} is asked, and this is `{observed}`"  # `found` is the first of several
+        message = f"expected {_ARTICLED[limit['type']]}; this is `{observed}`"  # `found` is the first of several
     return {
         "code": found.code.id,
         "field": pointer,

@@ -142,7 +142,7 @@ class _MissionBuilder:
         """A name with its place; the language's reserved words are none."""
         span = self.tree.spans[path]
         if text in RESERVED:
-            message = f"`{text}` is a word of the language, and no name"
+            message = f"`{text}` is a reserved word and cannot be used as a name"
             self.found.append(Diagnostic(codes.SPECIFICATION_SHAPE, message, span, "choose another name"))
         return Name(span=span, text=text)
 

@@ -214,7 +214,7 @@ def _wrong_value(path: Path, tree: JsonTree, error: ErrorDetails) -> Diagnostic:
     kind, value = error["type"], error["input"]
     help: str | None = None
     if kind in _EXPECTED_TYPES:
-        message = f"{_EXPECTED_TYPES[kind]} is asked, and this is {_FOUND_TYPES.get(type(value), 'something else')}"
+        message = f"expected {_EXPECTED_TYPES[kind]}; this is {_FOUND_TYPES.get(type(value), 'something else')}"
         if kind == "string_type" and {"arguments", "overrides"} & set(path):
             help = 'write the value as a text with its unit, such as "20 m"'
     elif kind == "literal_error":

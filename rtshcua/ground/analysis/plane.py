@@ -11,7 +11,7 @@ from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zon
 
 #: straight pieces of a quarter circle, where floats draw one
 _QUARTER = 64
-#: how finely a zone is searched for a place before shapely is asked
+#: grid divisions per axis for the point search that is tried before shapely
 _GRID = 8
 _FAR: tuple[Point, ...] = (
     (0, 0),

@@ -26,9 +26,9 @@ def fit(scope: Scope, node: Value, found: Typed, expected: Type, asked: tuple[Sp
     )
     if datum:
         here = "above home" if found.type == LENGTH else f"above {found.type.datum.value}"  # type: ignore[union-attr]
-        message = f"`{scope.report.text(node.span)}` is {here}, where {expected.describe()} is asked"
+        message = f"`{scope.report.text(node.span)}` is {here}; expected {expected.describe()}"
     else:
-        message = f"{expected.describe()} is asked, and `{scope.report.text(node.span)}` is {found.type.describe()}"
+        message = f"expected {expected.describe()}; `{scope.report.text(node.span)}` is {found.type.describe()}"
     replacement = _corrected(scope, node, found, expected)
     scope.report.add(
         codes.DATUM_MISMATCH

@@ -90,7 +90,7 @@ def _find(context: CheckContext, name: Name, table: Mapping[str, D], kind: type[
         context.report.add(
             codes.WRONG_KIND,
             name.span,
-            f"`{name.text}` is {WORDS[type(other)]}, where {asked} is asked",
+            f"`{name.text}` is {WORDS[type(other)]}; expected {asked}",
             help=suggestion(name.text, table),
             fix=correction(context.report, name.span, name.text, table),
             labels=[(other.name.span, "declared here")],

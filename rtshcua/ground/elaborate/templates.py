@@ -103,7 +103,7 @@ def _role(context: CheckContext, parameter: ParameterDecl, written: Value) -> st
     context.report.add(
         codes.WRONG_TYPE,
         written.span,
-        f"`{context.report.text(written.span)}` is {kind}, where a role is asked",
+        f"`{context.report.text(written.span)}` is {kind}; expected a role",
         help="write the name of a role, such as `operator`",
         labels=[(parameter.span, f"`{parameter.name.text}` is declared here")],
     )

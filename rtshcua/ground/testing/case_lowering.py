@@ -39,7 +39,7 @@ from rtshcua.model.ir.tests import Answer, Expectation, Named, RequestDecl, Subj
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
-#: who speaks for a role where nothing says it, as in a `permit`
+#: the default source of a request, as in a `permit`
 OWN_SOURCE = "operator"
 
 

@@ -119,7 +119,7 @@ class SignalOverride(NamedTuple):
 
 
 def read_overrides(texts: Sequence[str]) -> tuple[SignalOverride, ...] | Refusal:
-    """What is set by hand, each signal and each condition once."""
+    """Parse `NAME=VALUE` overrides; a name may be given once."""
     found: dict[str, SignalOverride] = {}
     for each in texts:
         name, equals, text = (" ".join(part.split()) for part in each.rpartition("="))

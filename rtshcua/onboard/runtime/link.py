@@ -59,7 +59,7 @@ class LinkSupervision:
         self._monitor = monitor
         self._limits = limits
         self.state = LinkState.UP
-        self._since_us: int | None = None  # the silence began; None: none is under way
+        self._since_us: int | None = None  # start of the current silence, or None
         self._waits_us: int | None = None  # and is waited out since then
         self._mute_us: int | None = None  # it answers nothing, and that is waited out since then
         self._lost_us = 0  # the link was lost last

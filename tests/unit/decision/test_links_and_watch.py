@@ -85,7 +85,7 @@ def test_a_link_that_flies_elsewhere_keeps_to_the_airspace() -> None:
     assert all(link_admissible(link, flat.state(), anywhere, NOW) for link in anywhere.contingency)
 
 
-def test_a_zone_argument_that_is_none_is_unknown() -> None:
+def test_an_invalid_zone_argument_is_unknown() -> None:
     near = flat.clause("position inside area", (29, 0, 0))
     rules = (flat.rule(RuleKind.DEGRADE, flat.INSPECT, when=near, target=flat.link(HOME)),)
     policy = loaded(replace(flat.POLICY, rules=rules))

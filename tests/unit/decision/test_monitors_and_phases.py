@@ -199,7 +199,7 @@ def test_what_a_monitor_says_decides(said: tuple[int, ...], outcome: Outcome, re
         assert decision.clause == asks(0)
 
 
-def test_a_permit_and_a_forbid_that_ask_a_monitor() -> None:
+def test_permit_and_forbid_rules_follow_a_monitor() -> None:
     def ruled(kind: RuleKind, said: int) -> Reason:
         rules = (flat.rule(RuleKind.PERMIT),) if kind == RuleKind.FORBID else ()
         policy = loaded(replace(P, rules=(*rules, flat.rule(kind, when=asks(0)))))

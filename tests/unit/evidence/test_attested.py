@@ -147,7 +147,7 @@ def test_records_may_come_after_the_statement_that_speaks_of_them(log: Log) -> N
 
 
 @rows("slugs", [("permit/used",), ("permit/late", "permit/forged")])
-def test_others_than_those_that_it_speaks_of(slugs: tuple[str, ...]) -> None:
+def test_refusals_that_differ_from_the_statement_are_found(slugs: tuple[str, ...]) -> None:
     log = Log()
     log.state()
     log.chain.add(Tag.REFUSED, boundary_chain.refused("permit/late", 5))

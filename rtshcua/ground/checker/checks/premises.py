@@ -75,7 +75,7 @@ def check_subject(context: CheckContext, subject: Subject) -> None:
         context.report.add(
             codes.WRONG_TYPE,
             subject.condition.span,
-            f"a condition over time is asked, and `{written}` is about the moment",
+            f"expected a temporal condition; `{written}` is about the moment",
             help="give the signals that it reads; set by hand is what is written with `for the last`, `within the "
             "last`, `rising` or `falling`",
         )
@@ -141,7 +141,7 @@ def _truth(context: CheckContext, cell: TableCell) -> None:
         context.report.add(
             codes.WRONG_TYPE,
             cell.value.span,
-            f"`{context.report.text(cell.value.span)}` is no truth, and a condition over time has one",
+            f"`{context.report.text(cell.value.span)}` is not a truth value",
             help=near or "write `true`, `false` or `unknown`",
             fix=correction(context.report, cell.value.span, context.report.raw(cell.value.span), TRUTHS),
         )

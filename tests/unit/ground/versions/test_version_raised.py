@@ -251,7 +251,7 @@ def test_what_is_fine(before: LoweredPolicy, change: dict[str, str]) -> None:
     assert compared(before, changed(change)).finding is None
 
 
-def test_a_policy_of_another_name_or_for_another_vehicle_is_another(before: LoweredPolicy) -> None:
+def test_a_changed_name_or_vehicle_makes_another_policy(before: LoweredPolicy) -> None:
     for change in ({"policy yard": "policy field_trip"}, {"quad-07": "hexa-01", "vehicle quad": "vehicle hexa"}):
         program = load_text(changed(change | {"version 3": "version 1"}))
         checked = examine_program(program, dialect.load())

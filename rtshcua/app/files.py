@@ -1,8 +1,5 @@
-"""Which files are meant by the paths on a command line, and which of them make programs. It imports no parser.
-
-What no command writes over: a source that it reads itself, whatever that is called.
-
-What was probably meant by the name of a file that is not there.
+"""Which files the paths on a command line mean, which of them make programs, which are never written over, and what a
+missing name probably meant. It imports no parser.
 """
 
 import os
@@ -13,7 +10,6 @@ from typing import Final
 
 from rtshcua.adapters.store.checkout import checkout_of, lies_in
 from rtshcua.adapters.store.reading import walk
-from rtshcua.adapters.store.runs import LOG
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import TYPO, likeness
 from rtshcua.ground.language.paths import shown
@@ -95,6 +91,8 @@ def missing(path: Path) -> tuple[str, str] | None:
     """A text and a help for a file that is missing: where a folder was given for a log, which lacks one, and where a
     file beside it is called almost alike. None where there is nothing to add.
     """
+    from rtshcua.adapters.store.runs import LOG  # its writers take longer to load than files to lint
+
     if path.name == LOG and path.parent.is_dir():
         return f"there is no `{LOG}` in the folder `{path.parent}`", "name a file, or the folder of one run"
     try:

@@ -1,7 +1,4 @@
-"""Times on a command line.
-
-How commands show times and counts to a person.
-"""
+"""How commands read times, and show times and counts to a person."""
 
 from datetime import UTC, datetime
 

@@ -12,7 +12,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
     "modules": 719,
-    "code lines": 84_422,
+    "code lines": 84_422,  # rose once, with a supervision of the judge's own and typed services
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 68,

@@ -1,6 +1,6 @@
 """A run of `lint` over files: what is remembered is taken from the cache, the rest examined, and kept for next time.
 
-Nothing here imports a parser: `fresh` does, and is imported where something must be examined.
+Nothing here imports a parser: `examine` does, and is imported where a file must be examined.
 """
 
 import json

@@ -2,8 +2,8 @@
 
 Python makes an exception of it, wherever it comes: amid imports, or in code of C that does not expect one. A process
 that dies of SIGINT loses nothing that one loses which is killed, and a shell counts it as 130. A command that has
-something to put in order looks at a flag that the signal sets (`interrupts.StopRequest`, `Interrupts`), or asks for the
-exception (`interrupts.breakable`). Nothing may be imported here that takes time.
+something to put in order looks at a flag that the signal sets (`front/cli/interrupts.py`, `app/fly/stop_wishes.py`), or
+asks for the exception (`stop_wishes.breakable`). Nothing may be imported here that takes time.
 """
 
 import signal

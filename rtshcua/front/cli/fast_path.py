@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from rtshcua.app.lint.scope import LintOptions
 from rtshcua.diagnostics.exits import ExitCode
 
 Kind = Literal["flag", "text", "path", "paths"]
@@ -94,6 +93,7 @@ def lint(words: Sequence[str]) -> ExitCode | None:
     found = read(words, LINT)
     if found is None or not found[0]:
         return None
+    from rtshcua.app.lint.scope import LintOptions
     from rtshcua.front.cli.lint_report import run
 
     return run(LintOptions(found[0], **found[1]))

@@ -1,5 +1,5 @@
 """The language server: the editor's protocol (LSP 3.17) over pygls, around the pure answers of `rtshcua.ground.editor`.
 
-`server` puts it together, `session` holds what is open and tells what is found, `features` answers, `convert` turns our
-places and findings into those of the protocol. `proving` keeps the process in which the long proofs run: `prover`.
+`server` puts it together, `session` holds what is open (`texts`, `disk`) and publishes what is found, `features`
+answers; `prover` is the process in which the long proofs run.
 """

@@ -1,1 +1,1 @@
-"""From checked sources to the flat form: `program.compile_program` is the way in."""
+"""From checked sources to the flat form: `policy` lowers a policy, `mission` a mission under it."""

@@ -1,5 +1,5 @@
 """Why a decision is what it is.
 
-`trace` tells it step by step, `reads` what its conditions read; `nominal` makes a state to begin from, `given` changes
-it by hand, `recorded` takes one from a log.
+`trace` tells it step by step, with what its conditions read; `assumed_state` makes a state to begin from, changed by
+hand where that is wanted; `logged_decisions` takes one from a log.
 """

@@ -63,6 +63,26 @@ def test_the_door_opens_without_loading_what_is_behind_it(words: list[str]) -> N
     assert not heavy & set(run.stderr.split())
 
 
+def test_lint_of_files_seen_before_loads_no_evidence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RTSHCUA_DATA_DIR", str(tmp_path / "data"))
+    (tmp_path / "a.rts").write_text("zone pond = circle(47.39840 N, 8.54640 E, 15 m)\n")
+    program = "import sys; from rtshcua.front.cli.app import main; main(['lint', 'a.rts']); print(*sys.modules)"
+    for _ in range(2):
+        run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
+    loaded = run.stdout.splitlines()[-1].split()
+    assert "rtshcua.app.lint.service" in loaded
+    assert not {"msgspec", "lark", "typer", "rtshcua.evidence", "rtshcua.ground.language.parse"} & set(loaded)
+
+
+def test_check_loads_nothing_of_lint(tmp_path: Path) -> None:
+    (tmp_path / "a.rts").write_text("zone pond = circle(47.39840 N, 8.54640 E, 15 m)\n")
+    program = "import sys; from rtshcua.front.cli.app import main; main(['check', 'a.rts']); print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
+    loaded = run.stdout.splitlines()[-1].split()
+    assert "rtshcua.app.check" in loaded
+    assert not {"typer", "platformdirs", "rtshcua.app.lint.scope"} & set(loaded)
+
+
 @pytest.mark.slow
 def test_what_ships_is_checked_without_floating_point_geometry(checkout: Path) -> None:
     """What a check needs not takes long to import, and the floats of geometry differ between machines."""

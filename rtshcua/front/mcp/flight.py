@@ -116,7 +116,7 @@ class Following:
         self.turn = threading.Condition()
         self.heard = 0
         self.connected = False
-        self._tried = False
+        self._attempts = 0  # that ended, or that connected
         self.hello: dict[str, Any] = {}
         self.waiting: dict[str, Any] = {}
         self.vehicle: dict[str, Any] = {}
@@ -141,11 +141,24 @@ class Following:
     def await_first(self) -> None:
         """Wait until it told who it is, or cannot be reached, for a short time."""
         with self.turn:
-            self.turn.wait_for(lambda: self.connected or self._tried, FIRST_S)
+            self.turn.wait_for(lambda: self.connected or self._attempts > 0, FIRST_S)
+
+    def await_current(self) -> None:
+        """Wait for a short time until the fields describe the present flight.
+
+        A new flight is connected to after up to `AGAIN_S`; until then the fields are those of the flight before.
+        """
+        with self.turn:
+            before = self._attempts
+            self.turn.wait_for(
+                lambda: self._attempts > before or (self.connected and not self.close) or self._ended.is_set(), FIRST_S
+            )
 
     def end(self) -> None:
         """Follow no more."""
         self._ended.set()
+        with self.turn:
+            self.turn.notify_all()
         if self._link is not None:
             self._link.close()
 
@@ -159,7 +172,8 @@ class Following:
             except (OSError, ValueError, RecursionError):
                 pass  # it is gone, or says what no flight says
             with self.turn:
-                self.connected, self._tried = False, True
+                self.connected = False
+                self._attempts += 1
                 self.turn.notify_all()
             self._ended.wait(AGAIN_S)
 

@@ -257,10 +257,12 @@ class Tools:
             slug, text = hand_in(self._socket, document)
         except OSError as error:
             slug, text = "unreachable", f"the vehicle does not answer: {error.strerror or error}"
-        with self._lock:
-            if slug == "accepted":
+        if slug == "accepted":
+            with self._lock:
                 self._admitted.append(signed)
                 self._latest = ticket
+            self.following.await_current()
+        with self._lock:
             ticket.state = "admitted" if slug == "accepted" else "refused"
             ticket.slug, ticket.text = slug, text
         with self.following.turn:
@@ -278,7 +280,8 @@ class Tools:
                 )
             told = known.told()
         flight = self.flight()
-        return told | flight | {"over": known.state == "refused" or flight["over"]}
+        over = known.state == "refused" or (known.state == "admitted" and flight["over"])
+        return told | flight | {"over": over}
 
     def flight(self) -> dict[str, Any]:
         """How the flight stands: its stage, the latest decision, who must approve, what happened, how it ended."""

@@ -1,6 +1,7 @@
 """The tools of the MCP server, without its protocol: several calls at a time, and whose decision is explained."""
 
 import json
+import socket
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -111,6 +112,54 @@ def test_two_calls_with_one_key_are_one_proposal(desk: Tools, handed: list[bytes
     assert first["ticket"] == second["ticket"]
     assert status(desk, first["ticket"]) == "admitted"
     assert len(handed) == 1
+
+
+def test_a_submitted_proposal_is_not_over_while_the_vehicle_is_unreachable(
+    desk: Tools, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer = threading.Event()
+
+    def hand_in(socket: Path, document: bytes) -> tuple[str, str]:
+        answer.wait(60)
+        return "malformed", "refused"
+
+    monkeypatch.setattr(desks, "hand_in", hand_in)
+    ticket = desk.propose_mission(PROPOSAL, "one")["ticket"]
+    shown = desk.mission_status(ticket)
+    answer.set()
+    assert (shown["state"], shown["stage"], shown["over"]) == ("submitted", "unreachable", False)
+    assert status(desk, ticket) == "refused"
+    assert desk.mission_status(ticket)["over"]
+
+
+@pytest.mark.parametrize("close", [{}, {"type": "close", "ending": "completed"}])
+def test_an_admitted_proposal_is_judged_by_its_own_flight(
+    desk: Tools, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, close: dict[str, Any]
+) -> None:
+    """Neither the last failed attempt to connect nor the end of an earlier flight makes it over."""
+    path = tmp_path / "flight.sock"
+    desk.following = following = Following(path)
+    following.await_first()
+    following.close = close
+    with socket.socket(socket.AF_UNIX) as listener:
+
+        def hand_in(_: Path, document: bytes) -> tuple[str, str]:
+            listener.bind(str(path))
+            listener.listen()
+            return "accepted", "admitted"
+
+        monkeypatch.setattr(desks, "hand_in", hand_in)
+        ticket = desk.propose_mission(PROPOSAL, "one")["ticket"]
+        while not path.exists():
+            time.sleep(0.001)
+        listener.settimeout(60)
+        link, _ = listener.accept()
+        with link:
+            link.sendall(b'{"type":"hello","flight":"0b","vehicle":"quad-07"}\n')
+            assert status(desk, ticket) == "admitted"
+            shown = desk.mission_status(ticket)
+            following.end()
+    assert (shown["stage"], shown["over"]) == ("waiting", False)
 
 
 def flying(desk: Tools) -> None:

@@ -39,7 +39,7 @@ from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.app.fly.narrator import Teller, Watching
 from rtshcua.app.fly.story import Note
 from rtshcua.codec.frames import Codec
-from rtshcua.front.cli.live.feed import Feed
+from rtshcua.front.cli.render.live.feed import Feed
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.runtime.view import RunStage
 from virtual.flight import Flight

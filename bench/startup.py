@@ -13,7 +13,7 @@ IMPORTS = 50
 ROUNDS = 7
 
 ROOT = Path(__file__).resolve().parents[1]
-NEEDED = "import rtshcua.front.cli.check_report, rtshcua.ground.pipeline.program, rtshcua.mavlink.dialect"
+NEEDED = "import rtshcua.front.cli.render.check_report, rtshcua.ground.pipeline.program, rtshcua.mavlink.dialect"
 COMMANDS = (
     ("--help",),
     ("explain", "E0310"),

@@ -11,13 +11,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the counts of `make size`: lower one with whatever lowers it
 HELD = {
-    "modules": 719,
+    "modules": 722,
     "code lines": 84_422,  # rose once, with a supervision of the judge's own and typed services
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 68,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 15,
+    "modules below 80 lines with one importer": 13,
     "functions of more than 60 lines": 18,
     "functions of a complexity over 15": 131,
     "functions of a complexity over 25": 5,

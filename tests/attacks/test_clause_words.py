@@ -15,8 +15,8 @@ from reference.world import Run, assert_audited, loaded, sealed, try_load
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.showing.log import show_log
-from rtshcua.front.cli.showing.page import TextPage
+from rtshcua.front.cli.render.showing.log import show_log
+from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.calls import is_own

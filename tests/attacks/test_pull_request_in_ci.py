@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from reference.github_runner import ROOT, runner
-from rtshcua.front.cli.init import project
+from rtshcua.front.cli.commands.init import project
 from virtual.forked import Forked
 
 OWN_WORKFLOW = ROOT / "examples/starter/.github/workflows/policy.yml"

@@ -21,7 +21,7 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.documents import deliver
 from rtshcua.front.cli.faults import say
-from rtshcua.front.cli.live.lines import plain
+from rtshcua.front.cli.render.live.lines import plain
 from rtshcua.front.cli.unlock import unlock_person
 from rtshcua.ground.agent.specification import parse_specification
 from rtshcua.ground.language.parse import parse
@@ -75,9 +75,10 @@ def test_what_is_approved_is_told_before_it_is_signed(
 ) -> None:
     """A person at a terminal sees the step, and only then says whether to sign it."""
     seen: list[str] = []
-    monkeypatch.setattr("rtshcua.front.cli.approve.terminal", lambda: True)
+    monkeypatch.setattr("rtshcua.front.cli.commands.approve.terminal", lambda: True)
     monkeypatch.setattr(
-        "rtshcua.front.cli.approve.unlock_person", lambda *a, **k: (seen.append("key"), unlock_person(*a, **k))[1]
+        "rtshcua.front.cli.commands.approve.unlock_person",
+        lambda *a, **k: (seen.append("key"), unlock_person(*a, **k))[1],
     )
     monkeypatch.setattr("sys.stdin", io.StringIO(typed))
     assert main(["approve", "low.bundle", "--step", "3", "-o", "yes", *FLIGHT]) == code
@@ -111,7 +112,7 @@ def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys:
 def test_a_script_at_a_terminal_is_not_asked(
     low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rtshcua.front.cli.approve.terminal", lambda: True)
+    monkeypatch.setattr("rtshcua.front.cli.commands.approve.terminal", lambda: True)
     assert main(["approve", "low.bundle", "--step", "3", "-o", "no", "--refuse", "--yes", *FLIGHT]) == ExitCode.OK
     assert "step 3 of `low` on `quad-07`: `inspect_area(" in capsys.readouterr().err
 

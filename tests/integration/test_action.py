@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from reference.github_runner import ROOT, Run, runner
-from rtshcua.front.cli.init import project
+from rtshcua.front.cli.commands.init import project
 from virtual.forked import Forked
 
 

@@ -13,8 +13,8 @@ from rtshcua.adapters import boundary_process
 from rtshcua.adapters.boundary_process import MISSING, Measure, measures_here
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.adapters.simulator import Simulator
-from rtshcua.front.cli import doctor as doctor_command
-from rtshcua.front.cli.doctor import _boundary
+from rtshcua.front.cli.commands import doctor as doctor_command
+from rtshcua.front.cli.commands.doctor import _boundary
 from rtshcua.onboard.enforcement.load import EnforcementMode
 from virtual.forked import Forked
 

@@ -116,7 +116,7 @@ def test_a_simulated_vehicle_that_dies(ground: Any) -> None:
 def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
     run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
-    os.kill(run.child("rtshcua.front.cli.live"), signal.SIGKILL)
+    os.kill(run.child("rtshcua.front.cli.render.live"), signal.SIGKILL)
     assert run.end().code == 74  # it flew, and nobody was told all of it
     assert run.log()[-1]["ending"] == "completed"
 
@@ -125,7 +125,7 @@ def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
 def test_a_view_that_is_stopped_stops_nothing(ground: Any) -> None:
     run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
-    view = run.child("rtshcua.front.cli.live")
+    view = run.child("rtshcua.front.cli.render.live")
     os.kill(view, signal.SIGSTOP)
     while not (run.folder / "summary.json").exists():
         assert run.process.poll() is None

@@ -11,7 +11,8 @@ from rtshcua.adapters.simulator import Simulator
 from rtshcua.adapters.store.signing import read_link_key, write_link_key
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli import app, keys
+from rtshcua.front.cli import app
+from rtshcua.front.cli.commands import keys
 
 AT = "udpin:127.0.0.1:{}"
 

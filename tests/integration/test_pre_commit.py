@@ -17,7 +17,7 @@ import pytest
 import yaml
 
 from rtshcua import library
-from rtshcua.front.cli.init import project
+from rtshcua.front.cli.commands.init import project
 
 ROOT = Path(__file__).resolve().parents[2]
 HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from rtshcua.front.cli import app
-from rtshcua.front.cli.init import project
+from rtshcua.front.cli.commands.init import project
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/ci.md").read_text(encoding="utf-8")
 

@@ -19,7 +19,7 @@ FORMATS = ("human", "json", "sarif", "github", "junit")
 
 
 class LintOptions(NamedTuple):
-    """The command line, after it was read; each is explained in `rtshcua/front/cli/lint.py`."""
+    """The command line, after it was read; each is explained in `rtshcua/front/cli/commands/lint.py`."""
 
     paths: tuple[Path, ...]
     format: str = "human"

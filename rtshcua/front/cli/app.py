@@ -78,7 +78,7 @@ def _call(row: Row, words: list[str]) -> int:
         from typer.main import get_command
 
         from rtshcua.front.cli.interrupts import breakable
-        from rtshcua.front.cli.option_groups import grouped
+        from rtshcua.front.cli.options.option_groups import grouped
 
         command = get_command(import_module(row.module).app)
     finally:
@@ -148,7 +148,7 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
         return fail(ExitCode.USAGE, f"no such command: `{path.partition(' ')[2]} {verb[1]}`", help)
     help = f"`{path} --help` explains it"
     if row.reports and "--json" in given:
-        from rtshcua.front.cli.findings import Findings
+        from rtshcua.front.cli.render.findings import Findings
 
         return Findings(json=True).refuse(ExitCode.USAGE, "usage", words, help)
     usage = None if context is None else context.get_usage().removeprefix("Usage: ")

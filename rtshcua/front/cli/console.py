@@ -9,8 +9,8 @@ import msgspec
 
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.front.cli import faults
-from rtshcua.front.cli.live.feed import Feed
-from rtshcua.front.cli.showing import log
+from rtshcua.front.cli.render.live.feed import Feed
+from rtshcua.front.cli.render.showing import log
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.front.cli.unlock import unlock
 from rtshcua.wire.keys import Duty, SigningKey

@@ -94,7 +94,7 @@ def lint(words: Sequence[str]) -> ExitCode | None:
     if found is None or not found[0]:
         return None
     from rtshcua.app.lint.scope import LintOptions
-    from rtshcua.front.cli.lint_report import run
+    from rtshcua.front.cli.render.lint_report import run
 
     return run(LintOptions(found[0], **found[1]))
 
@@ -104,7 +104,7 @@ def check(words: Sequence[str]) -> ExitCode | None:
     found = read(words, CHECK)
     if found is None or not found[0]:
         return None
-    from rtshcua.front.cli.check_report import check_sources
+    from rtshcua.front.cli.render.check_report import check_sources
 
     return check_sources(found[0], **found[1])
 

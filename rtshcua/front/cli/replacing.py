@@ -10,7 +10,7 @@ from rtshcua.app.flight_documents import bundle_in_flight, flight_id
 from rtshcua.app.signing_keys import check_trusted, strangers
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import say
-from rtshcua.front.cli.findings import Findings
+from rtshcua.front.cli.render.findings import Findings
 from rtshcua.front.cli.stdout import out
 from rtshcua.front.cli.unlock import unlock_for
 from rtshcua.model.flat.mission import Mission

@@ -2,7 +2,8 @@
 
 To add a command:
 
-- the command `verify-log` lives in `rtshcua/front/cli/verify_log.py`; nothing of it is imported before it is called;
+- the command `verify-log` lives in `rtshcua/front/cli/commands/verify_log.py`; nothing of it is imported before it is
+  called;
 - the module has `app = typer.Typer(add_completion=False)`. One `@app.command()` makes `rtshcua NAME ...`; for
   `rtshcua NAME VERB ...` give the app an `@app.callback()` too, over a function that does nothing, else a single verb
   would be swallowed;
@@ -28,7 +29,7 @@ class Row(NamedTuple):
     @property
     def module(self) -> str:
         """The module that holds the command's `app`."""
-        return f"rtshcua.front.cli.{self.name.replace('-', '_')}"
+        return f"rtshcua.front.cli.commands.{self.name.replace('-', '_')}"
 
 
 COMMANDS = (

@@ -18,11 +18,11 @@ from rtshcua.evidence.note import octets
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.front.cli.faults import fail
-from rtshcua.front.cli.showing.link import show_link
-from rtshcua.front.cli.showing.log import Names
-from rtshcua.front.cli.showing.page import TextPage
-from rtshcua.front.cli.showing.people import People
-from rtshcua.front.cli.showing.why import Case, show_why
+from rtshcua.front.cli.render.showing.link import show_link
+from rtshcua.front.cli.render.showing.log import Names
+from rtshcua.front.cli.render.showing.page import TextPage
+from rtshcua.front.cli.render.showing.people import People
+from rtshcua.front.cli.render.showing.why import Case, show_why
 from rtshcua.front.cli.subject import Subject, after, unpacked
 from rtshcua.ground.why.logged_decisions import context_of, now_of, of_contingency, state_of, trace_link
 from rtshcua.ground.why.trace import trace

@@ -11,8 +11,8 @@ from fuzz.mutation.trees import changed
 from reference import world as reference
 from rtshcua.app.documents import claimed
 from rtshcua.decision.prepare import prepare
-from rtshcua.front.cli.showing.page import TextPage
-from rtshcua.front.cli.showing.policy import show_mission, show_policy
+from rtshcua.front.cli.render.showing.page import TextPage
+from rtshcua.front.cli.render.showing.policy import show_mission, show_policy
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard.enforcement.load import Loaded

@@ -17,8 +17,8 @@ from rtshcua.app.wording import many
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.archiving.given import Skipped, VerifyingOptions
-from rtshcua.front.cli.archiving.told import code_of, counted
 from rtshcua.front.cli.faults import distrust, fail
+from rtshcua.front.cli.render.archive_tables import code_of, counted
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.wire.untrusted import Untrusted
 

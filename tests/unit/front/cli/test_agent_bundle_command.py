@@ -18,8 +18,8 @@ import pytest
 
 from rtshcua import __version__
 from rtshcua.adapters.store.folders import data_folder
-from rtshcua.front.cli.agent_bundle import COPIED, NAME, plugin
 from rtshcua.front.cli.app import main
+from rtshcua.front.cli.commands.agent_bundle import COPIED, NAME, plugin
 from rtshcua.wire.keys import Duty
 
 CHECKOUT = Path(__file__).resolve().parents[4]

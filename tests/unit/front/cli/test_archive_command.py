@@ -19,7 +19,7 @@ from reference.archived import write_fleet
 from rtshcua.adapters.store.logs import begins_as_log
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.archiving import told
+from rtshcua.front.cli.render import archive_tables
 
 ROOT = ("--root", generated_logs.ROOT_KEY.hex())
 
@@ -284,11 +284,11 @@ def test_without_the_extra_it_says_which(
     ],
 )
 def test_exit_codes_are_those_of_verify_log(status: str, finding: str | None, code: ExitCode) -> None:
-    assert told.code_of(status, finding) is code
+    assert archive_tables.code_of(status, finding) is code
 
 
 def test_text_of_the_world_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> None:
-    told.tell(("detail",), [("\033[2Jgone\n",)], told.Shape.TABLE)
+    archive_tables.tell(("detail",), [("\033[2Jgone\n",)], archive_tables.Shape.TABLE)
     assert capsys.readouterr().out == "detail\n<U+001B>[2Jgone<U+000A>\n"
 
 
@@ -387,9 +387,9 @@ def test_a_table_that_is_too_wide_is_told_row_by_row(
 ) -> None:
     rows = [["a" * 30, "b" * 30, 1], ["c", "d", 2]]
     monkeypatch.setenv("COLUMNS", "80")
-    told.tell(["one", "another", "third"], rows, told.Shape.TABLE)
+    archive_tables.tell(["one", "another", "third"], rows, archive_tables.Shape.TABLE)
     assert capsys.readouterr().out.splitlines()[0].split() == ["one", "another", "third"]
     monkeypatch.setenv("COLUMNS", "60")
-    told.tell(["first", "another", "third"], rows, told.Shape.TABLE)
+    archive_tables.tell(["first", "another", "third"], rows, archive_tables.Shape.TABLE)
     lines = ["first    " + "a" * 30, "another  " + "b" * 30, "third    1", "", "first    c", "another  d", "third    2"]
     assert capsys.readouterr().out.splitlines() == lines

@@ -94,7 +94,7 @@ def fly_one_again(line: dict[str, Any]) -> CampaignResult:
     from rtshcua.app.programs import compile_sources
     from rtshcua.campaign.drawing import FLAVOURS
     from rtshcua.campaign.rounds import CampaignOrder, drawn
-    from rtshcua.front.cli.campaign import _kinds, _space
+    from rtshcua.front.cli.commands.campaign import _kinds, _space
 
     begun = json.loads(Path("made/campaign.json").read_text())
     compiled, _ = compile_sources([Path(SHORT)], mission=None, issued_at_us=begun["issued_at_us"])

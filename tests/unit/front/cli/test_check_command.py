@@ -13,8 +13,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.findings import Findings
-from rtshcua.front.cli.progress import watched
+from rtshcua.front.cli.render.findings import Findings
+from rtshcua.front.cli.render.progress import watched
 
 AT = ["--at", "2026-01-31T08:00:00Z"]
 

@@ -49,7 +49,7 @@ def test_what_is_opened_next_is_not_taken_for_the_output(tmp_path: Path) -> None
 @pytest.mark.parametrize("style", ["lines", "json", "screen"])
 def test_the_view_of_a_run_ends_as_if_its_reader_had_left(style: str, tmp_path: Path) -> None:
     note = '{"event":"note","text":"hello"}'
-    done = shell(f"echo '{note}' | \"{sys.executable}\" -P -m rtshcua.front.cli.live {style} >&-", tmp_path)
+    done = shell(f"echo '{note}' | \"{sys.executable}\" -P -m rtshcua.front.cli.render.live {style} >&-", tmp_path)
     assert (done.returncode, done.stderr) == (1, "")
 
 

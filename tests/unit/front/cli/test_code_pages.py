@@ -13,7 +13,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.codes import REGISTRY, Code
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.render import render
-from rtshcua.front.cli.pages import HEADINGS, example, read_page
+from rtshcua.front.cli.render.pages import HEADINGS, example, read_page
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.pipeline.program import check_program, compile_program
 from rtshcua.mavlink import dialect

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rtshcua.front.cli import app
-from rtshcua.front.cli.completing.commands import parser
-from rtshcua.front.cli.completing.values import FILES, FOLDERS
+from rtshcua.front.cli.options.completing.commands import parser
+from rtshcua.front.cli.options.completing.values import FILES, FOLDERS
 from rtshcua.front.cli.table import COMMANDS
 
 Complete = Callable[..., list[str]]

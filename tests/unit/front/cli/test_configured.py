@@ -9,8 +9,8 @@ from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.app.fly.setting_notes import would_set
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.doctor import _owed
-from rtshcua.front.cli.flight_options import settings_of
+from rtshcua.front.cli.commands.doctor import _owed
+from rtshcua.front.cli.options.flight_options import settings_of
 from rtshcua.mavlink.parameters import value_of
 from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed, unsettable
 from rtshcua.simulation.process import config_of, main, parser

@@ -13,7 +13,8 @@ import pytest
 from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.adapters.vehicle.transport import SerialTransport
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import app, doctor
+from rtshcua.front.cli import app
+from rtshcua.front.cli.commands import doctor
 
 
 @pytest.fixture(autouse=True)

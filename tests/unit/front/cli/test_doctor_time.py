@@ -12,8 +12,8 @@ from reference.world import START
 from rtshcua.adapters.boundary_process import BoundaryError
 from rtshcua.adapters.utc import TimeSources
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import doctor
 from rtshcua.front.cli.app import main
+from rtshcua.front.cli.commands import doctor
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import TIME
 from rtshcua.wire.clock import ClockSource

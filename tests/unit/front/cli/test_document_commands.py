@@ -374,7 +374,7 @@ def test_whose_key_may_not_sign_for_the_role_is_told_before_they_are_asked(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["keys", "approver", "bob", "--role", "nosuch"]) == ExitCode.OK
-    monkeypatch.setattr("rtshcua.front.cli.approve.terminal", lambda: True)
+    monkeypatch.setattr("rtshcua.front.cli.commands.approve.terminal", lambda: True)
     monkeypatch.setattr("typer.confirm", lambda *_, **__: pytest.fail("it was asked"))
     capsys.readouterr()
     words = ["approve", "low.bundle", "--step", "3", "-o", "yes", "--as", "bob", *FLIGHT]

@@ -17,8 +17,8 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.live.lines import ending
-from rtshcua.front.cli.showing.log import Names, detail_of
+from rtshcua.front.cli.render.live.lines import ending
+from rtshcua.front.cli.render.showing.log import Names, detail_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Interrupted, TakenOver
 from rtshcua.wire.keys import SigningKey

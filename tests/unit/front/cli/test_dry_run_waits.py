@@ -14,7 +14,7 @@ from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.app.fly import dry_run
 from rtshcua.app.fly.stop_wishes import Wish
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.showing.rehearsed import show_rehearsal
+from rtshcua.front.cli.render.showing.rehearsed import show_rehearsal
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Event, Readings, Ready
 

@@ -10,8 +10,9 @@ from typer.main import get_command
 
 from rtshcua.app.lint.scope import LintOptions
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import check, fast_path, lint, recall
+from rtshcua.front.cli import fast_path
 from rtshcua.front.cli.app import main
+from rtshcua.front.cli.commands import check, lint, recall
 from rtshcua.front.cli.table import COMMANDS
 
 COMMAND = {"lint": (lint, fast_path.LINT), "check": (check, fast_path.CHECK), "recall": (recall, fast_path.RECALL)}

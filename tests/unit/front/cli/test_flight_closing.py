@@ -18,7 +18,7 @@ from rtshcua.app.fly.closing import close_log, keep_summary
 from rtshcua.app.fly.story import Summary
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder
-from rtshcua.front.cli.live.lines import ending
+from rtshcua.front.cli.render.live.lines import ending
 from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending

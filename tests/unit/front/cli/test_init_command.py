@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rtshcua.front.cli import app
-from rtshcua.front.cli.init import EXAMPLE, FILES, project
+from rtshcua.front.cli.commands.init import EXAMPLE, FILES, project
 from rtshcua.library import root
 
 Said = pytest.CaptureFixture[str]

@@ -16,7 +16,8 @@ from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import app, keys, unlock
+from rtshcua.front.cli import app, unlock
+from rtshcua.front.cli.commands import keys
 from rtshcua.wire import key_file
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import open_root

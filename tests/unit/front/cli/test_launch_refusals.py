@@ -26,7 +26,7 @@ from rtshcua.app.fly.link_signing import LinkSigning
 from rtshcua.app.fly.previous_log import LogBefore
 from rtshcua.app.fly.verify_bundle import may_have_flown, not_begun
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.flight_options import settings_of
+from rtshcua.front.cli.options.flight_options import settings_of
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.signal import SignalSource
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now

@@ -14,9 +14,9 @@ from reference.verifiers import ROOT_KEY
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.note import _PARTS
 from rtshcua.evidence.records import DECIDED
-from rtshcua.front.cli import log_slugs
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.verdict import MEANINGS
+from rtshcua.front.cli.render import log_slugs
+from rtshcua.front.cli.render.verdict import MEANINGS
 from rtshcua.wire.untrusted import Untrusted
 
 PACKAGE = Path(rtshcua.__file__).parent

@@ -11,8 +11,9 @@ from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.app.fly.connect import sign_link
 from rtshcua.app.fly.link_signing import LinkSigning
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import doctor, flight_options
 from rtshcua.front.cli.app import main
+from rtshcua.front.cli.commands import doctor
+from rtshcua.front.cli.options import flight_options
 from rtshcua.library import root as library
 from rtshcua.onboard.enforcement.load import EnforcementMode
 

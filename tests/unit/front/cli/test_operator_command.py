@@ -23,8 +23,8 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.records import Close, Effect, encode
 from rtshcua.front.cli.app import main
+from rtshcua.front.cli.commands.operator import OperatorConsole, Patience
 from rtshcua.front.cli.interrupts import StopRequest
-from rtshcua.front.cli.operator import OperatorConsole, Patience
 from rtshcua.front.cli.stdout import MOST_LINES, NewestLines
 from rtshcua.front.cli.unlock import unlock_person
 from rtshcua.model.decision import Decision

@@ -8,7 +8,7 @@ from typer.main import get_command
 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.option_groups import MANY, OPTION_GROUPS, grouped
+from rtshcua.front.cli.options.option_groups import MANY, OPTION_GROUPS, grouped
 from rtshcua.front.cli.table import COMMANDS
 
 #: what every command may have under `Options`

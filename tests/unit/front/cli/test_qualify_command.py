@@ -12,7 +12,7 @@ from rtshcua.adapters.qualification.sortie import BY_PILOT, SORTIES
 from rtshcua.adapters.store.vehicle_records import keep_qualification
 from rtshcua.app.fly import sorties as sorties_flown
 from rtshcua.app.fly.sorties import plan_sorties
-from rtshcua.front.cli.showing.qualification import told
+from rtshcua.front.cli.render.showing.qualification import told
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.qualification import (
     CheckOutcome,
@@ -128,7 +128,7 @@ def test_a_partial_record_replaces_no_whole_one(tmp_path: Path) -> None:
 
 
 def test_a_record_is_shown_unverified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from rtshcua.front.cli.show import show
+    from rtshcua.front.cli.commands.show import show
 
     failed = QualificationCheck("stop/fly", CheckOutcome.FAILED, "within 9.7 m", "14.3 m", advice="declare `brakes`")
     path = tmp_path / "vehicle-quad-07.cbor"

@@ -18,10 +18,10 @@ from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.showing import words
-from rtshcua.front.cli.showing.log import detail_of
-from rtshcua.front.cli.showing.page import TextPage
-from rtshcua.front.cli.showing.policy import show_policy
+from rtshcua.front.cli.render.showing import words
+from rtshcua.front.cli.render.showing.log import detail_of
+from rtshcua.front.cli.render.showing.page import TextPage
+from rtshcua.front.cli.render.showing.policy import show_policy
 from rtshcua.model.flat.contract import CHOICE, Parameter
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.policy import LeftOut, Monitor, MonitorKind, Policy

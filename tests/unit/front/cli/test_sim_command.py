@@ -10,7 +10,7 @@ import pytest
 
 from rtshcua.adapters.simulator import SimulatorError
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli import sim as command
+from rtshcua.front.cli.commands import sim as command
 from rtshcua.simulation.config import AutopilotKind
 from rtshcua.simulation.process import config_of, parser
 

@@ -15,7 +15,7 @@ from rtshcua.app.fly.story import Happened, Happening
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.live.lines import as_json, plain
+from rtshcua.front.cli.render.live.lines import as_json, plain
 from rtshcua.front.mcp.server import TOOLS
 from rtshcua.ground.audit.dispatches import ref_words
 from rtshcua.model.step_number import index_of, number_of, step_words

@@ -18,7 +18,9 @@ from rtshcua.app.logs import report_code
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import LogReport, LogVerdict
-from rtshcua.front.cli import app, verdict, verify_log
+from rtshcua.front.cli import app
+from rtshcua.front.cli.commands import verify_log
+from rtshcua.front.cli.render import verdict
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.names import LOG
 from virtual import case
@@ -399,7 +401,7 @@ def test_in_a_terminal_it_is_coloured(
 def test_every_kind_of_failure_has_its_meaning() -> None:
     slugs = set()
     for folder in ("evidence", "ground/audit", "front/cli"):
-        for file in (Path(verdict.__file__).parents[2] / folder).glob("*.py"):
+        for file in (Path(verdict.__file__).parents[3] / folder).rglob("*.py"):
             slugs |= set(re.findall(r'\b(?:Flaw|Finding)\(\s*f?"([a-z]+)/', file.read_text()))
     of_others = {"note", "proof"}  # a note's are told as those of a `seal`, a proof's by who reads proofs
     assert slugs - of_others <= set(verdict.MEANINGS)

@@ -130,7 +130,7 @@ def test_what_cannot_be_written_ends_it(log: Path, monkeypatch: pytest.MonkeyPat
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("rtshcua.front.cli.verify_log.as_text", full)
+    monkeypatch.setattr("rtshcua.front.cli.commands.verify_log.as_text", full)
     assert verify(log, log) == ExitCode.FULL
 
 

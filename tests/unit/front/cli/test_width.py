@@ -11,15 +11,15 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.evidence.finding import Claim
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.claims import listed, write
-from rtshcua.front.cli.explain import _reflowed
+from rtshcua.front.cli.commands.explain import _reflowed
 from rtshcua.front.cli.faults import fail, say
-from rtshcua.front.cli.findings import Findings
-from rtshcua.front.cli.log_slugs import every, find
-from rtshcua.front.cli.pages import read_page
-from rtshcua.front.cli.showing.page import TextPage
+from rtshcua.front.cli.render.claims import listed, write
+from rtshcua.front.cli.render.findings import Findings
+from rtshcua.front.cli.render.log_slugs import every, find
+from rtshcua.front.cli.render.pages import read_page
+from rtshcua.front.cli.render.showing.page import TextPage
+from rtshcua.front.cli.render.verdict import HELPS, MEANINGS
 from rtshcua.front.cli.stdout import out
-from rtshcua.front.cli.verdict import HELPS, MEANINGS
 
 DIGEST = "0123456789abcdef" * 4
 PATH = "/srv/flights/" + "of-a-long-day/" * 8 + "log.jsonl"

@@ -3,7 +3,7 @@
 import pytest
 import typer
 
-from rtshcua.front.cli.flight_options import _wind as wind
+from rtshcua.front.cli.options.flight_options import _wind as wind
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors
 from rtshcua.front.cli import app
-from rtshcua.front.cli import witness as command
+from rtshcua.front.cli.commands import witness as command
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import open_root

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from rtshcua.front.cli.bounds import bounds_told
+from rtshcua.front.cli.render.bounds import bounds_told
 from rtshcua.ground.pipeline.program import Checked, Compiled
 from rtshcua.ground.prove.mission_bounds import Bounds, _taken, greatest, rounded_energy, rounded_time
 

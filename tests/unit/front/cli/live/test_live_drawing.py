@@ -15,10 +15,10 @@ from rtshcua.app.fly.story import (
     Snapshot,
     Summary,
 )
-from rtshcua.front.cli.live.board import Board
-from rtshcua.front.cli.live.chart import chart
-from rtshcua.front.cli.live.lines import as_json, plain, sentence
-from rtshcua.front.cli.live.screen import picture
+from rtshcua.front.cli.render.live.board import Board
+from rtshcua.front.cli.render.live.chart import chart
+from rtshcua.front.cli.render.live.lines import as_json, plain, sentence
+from rtshcua.front.cli.render.live.screen import picture
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView, SignalReading
 
 PLAN = FlightPlanView(

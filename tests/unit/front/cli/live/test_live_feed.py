@@ -5,8 +5,8 @@ import time
 import pytest
 
 from rtshcua.app.fly.story import Happened, Happening, Note
-from rtshcua.front.cli.live import feed as feed_module
-from rtshcua.front.cli.live.feed import Feed
+from rtshcua.front.cli.render.live import feed as feed_module
+from rtshcua.front.cli.render.live.feed import Feed
 
 
 def event(number: int) -> Happened:

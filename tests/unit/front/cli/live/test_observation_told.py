@@ -9,8 +9,8 @@ from rtshcua.app.fly.dry_run import FlightRehearsal
 from rtshcua.app.fly.narrator import Teller
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
-from rtshcua.front.cli.live.lines import sentence
-from rtshcua.front.cli.showing import rehearsed
+from rtshcua.front.cli.render.live.lines import sentence
+from rtshcua.front.cli.render.showing import rehearsed
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import Monitor, MonitorKind
 from rtshcua.model.flat.situation import State

@@ -33,11 +33,11 @@ from rtshcua.app.fly.story import (
     Summary,
     tenths,
 )
-from rtshcua.front.cli.live import screen
-from rtshcua.front.cli.live.board import Board
-from rtshcua.front.cli.live.chart import FENCE, HOMEWARD, KEEP_OUT, ZONE, chart
-from rtshcua.front.cli.live.lines import as_json, plain, typed
-from rtshcua.front.cli.live.screen import picture
+from rtshcua.front.cli.render.live import screen
+from rtshcua.front.cli.render.live.board import Board
+from rtshcua.front.cli.render.live.chart import FENCE, HOMEWARD, KEEP_OUT, ZONE, chart
+from rtshcua.front.cli.render.live.lines import as_json, plain, typed
+from rtshcua.front.cli.render.live.screen import picture
 from rtshcua.onboard.ports import Presented
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView, SignalReading
 
@@ -237,7 +237,7 @@ def test_the_bell_rings_once_for_a_wait_and_only_on_a_terminal(monkeypatch: pyte
 
 def test_the_plain_view_rings_once_on_a_terminal_and_never_in_a_pipe() -> None:
     told = b"".join(msgspec.json.encode(each) + b"\n" for each in (PLAN, Happened(WAITS), Happened(WAITS)))
-    command = [sys.executable, "-P", "-m", "rtshcua.front.cli.live", "lines"]
+    command = [sys.executable, "-P", "-m", "rtshcua.front.cli.render.live", "lines"]
     piped = subprocess.run(command, input=told, capture_output=True, check=True)
     assert b"WAITS FOR A PERSON" in piped.stdout
     assert b"\a" not in piped.stdout

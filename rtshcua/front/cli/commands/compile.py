@@ -1,0 +1,169 @@
+"""`rtshcua compile`: check a mission and sign it into a bundle."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.adapters.store.writing import replace_inside
+from rtshcua.app.compile import CompileRequest, SignedBundle, claimed_pins, compile_mission, sign_bundle
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.signing_keys import another_key
+from rtshcua.app.wording import moment
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.render.bounds import bounds_dict, bounds_told
+from rtshcua.front.cli.render.findings import Findings
+from rtshcua.front.cli.replacing import Replacing, replace_with, warned
+from rtshcua.front.cli.stdout import out
+from rtshcua.front.cli.unlock import unlock, unlock_for
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.step_number import index_of
+from rtshcua.wire.bundle import policy_digest, policy_payload
+from rtshcua.wire.digest import BUNDLE, digest
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+MissionSource = Annotated[
+    Path, typer.Argument(help="a source with a mission (.rts), or a mission specification (.json)")
+]
+Output = Annotated[Path | None, typer.Option("-o", "--output", help="the bundle [default: SOURCE.bundle]")]
+MissionName = Annotated[str | None, typer.Option(help="which mission, where the source has several")]
+Parameters = Annotated[
+    list[str] | None, typer.Option("--set", help='a parameter of the mission, as in height="20 m" (repeatable)')
+]
+IssuedAt = Annotated[str | None, typer.Option(help="time of issue, such as 2026-01-31T08:00:00Z [default: now]")]
+PolicyKey = Annotated[Path | None, typer.Option(help="the policy key [default: the key store's]")]
+MissionKey = Annotated[Path | None, typer.Option(help="the mission key [default: the key store's]")]
+PassphraseFile = Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")]
+FurtherSources = Annotated[
+    list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
+]
+Proposer = Annotated[
+    str | None,
+    typer.Option("--source", metavar="agent|operator", help="who proposes it [default: its word; .json: agent]"),
+]
+Role = Annotated[str | None, typer.Option(help="the role that it is for [default: what it says]")]
+PolicyPin = Annotated[
+    str | None,
+    typer.Option(metavar="NAME[@VERSION]", help="the policy that it is under [default: its word; .json: --with]"),
+]
+Replaces = Annotated[
+    list[Path] | None,
+    typer.Option(help="the bundle that flies, then what replaced it since: make a replacement (repeatable)"),
+]
+FirstStep = Annotated[
+    int | None,
+    typer.Option("--from", min=1, help="with --replaces: the number of the first step that is another one"),
+]
+Flight = Annotated[
+    str | None, typer.Option(metavar="ID", help="with --replaces: the flight, by its id or a socket of it")
+]
+Root = Annotated[Path | None, typer.Option(help="with --replaces: the signed trust root (the key store's)")]
+DenyWarnings = Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors")]
+AsJson = Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")]
+
+
+@app.command()
+def compile(
+    source: MissionSource,
+    output: Output = None,
+    mission: MissionName = None,
+    set_: Parameters = None,
+    at: IssuedAt = None,
+    policy_key: PolicyKey = None,
+    mission_key: MissionKey = None,
+    passphrase_file: PassphraseFile = None,
+    with_: FurtherSources = None,
+    proposer: Proposer = None,
+    role: Role = None,
+    policy: PolicyPin = None,
+    replaces: Replaces = None,
+    first: FirstStep = None,
+    flight: Flight = None,
+    root: Root = None,
+    deny_warnings: DenyWarnings = False,
+    as_json: AsJson = False,
+) -> ExitCode:
+    """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors.
+
+    With --replaces it is signed for a flight that is under way, under the policy that it flies under: the steps before
+    --from stay as they are. `rtshcua replace` hands it in.
+
+    What a mission says of its own source, role and policy gives it no authority: what it claims beyond --source, --role
+    and --policy is an error. A specification (.json) is an agent's unless --source says otherwise, and its policy is
+    named by --policy or handed in by --with.
+    """
+    findings = Findings(json=as_json, deny_warnings=deny_warnings)
+    issued_at = time.time_ns() // 1_000 if at is None else moment(at)
+    if issued_at is None:
+        return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
+    pins = claimed_pins(proposer, role, policy)
+    if isinstance(pins, Refusal):
+        return findings.end(pins)
+    if len({first is None, flight is None, not replaces}) > 1:
+        return findings.refuse(ExitCode.USAGE, "usage", "`--replaces`, `--from` and `--flight` go together")
+    suffix = ".replacement" if replaces else ".bundle"
+    request = CompileRequest(source, with_ or (), output, suffix, pins, issued_at, mission, tuple(set_ or ()))
+    made = compile_mission(request)
+    if isinstance(made, Refusal):
+        return findings.end(made)
+    compiled, target = made.compiled, made.target
+    if findings.report(made.diagnostics, made.sources) or compiled.policy is None or compiled.mission is None:
+        return findings.finish(exit_code(compiled.diagnostics))
+    store = KeyStore(data_folder())
+    if replaces and first is not None and flight is not None:
+        order = Replacing(
+            replaces, index_of(first), flight, root, mission_key, passphrase_file, issued_at, deny_warnings, target
+        )  # fmt: skip
+        return replace_with(compiled.policy, compiled.mission, order, store, findings, quiet=as_json)
+    try:
+        signers = (
+            unlock(store, Duty.POLICY, path=policy_key, passphrase_file=passphrase_file),
+            unlock_for(
+                store, compiled.mission, path=mission_key, passphrase_file=passphrase_file, policy=compiled.policy
+            ),
+        )
+        signed = sign_bundle(compiled.policy, compiled.mission, signers, store, issued_at)
+    except Untrusted as error:
+        return findings.end(another_key(error, compiled.policy, compiled.mission))
+    if not warned(signed.warnings, findings, deny=deny_warnings):
+        return ExitCode.UNTRUSTED
+    replace_inside(target, signed.data)
+    if not as_json:
+        out(_told(compiled.policy, compiled.mission, target))
+        if compiled.bounds is not None:
+            out(bounds_told(compiled.bounds))
+    return findings.finish(
+        ExitCode.OK,
+        bundle=_described(compiled.policy, compiled.mission, target, signed),
+        warnings=signed.warnings,
+        bounds=None if compiled.bounds is None else bounds_dict(compiled.bounds),
+    )
+
+
+def _told(policy: Policy, mission: Mission, target: Path) -> str:
+    steps = len(mission.invocations)
+    head = f"{mission.name}: {steps} step{'s' * (steps > 1)} under {policy.name}@{policy.version}"
+    return f"{head} for {policy.vehicle.identity}, signed into {target}"
+
+
+def _described(policy: Policy, mission: Mission, target: Path, signed: SignedBundle) -> dict[str, str | int]:
+    return {
+        "path": str(target),
+        "bytes": len(signed.data),
+        "digest": digest(BUNDLE, signed.data).hex(),
+        "mission": mission.name,
+        "policy": f"{policy.name}@{policy.version}",
+        "policy_digest": policy_digest(policy_payload(policy)).hex(),
+        "vehicle": policy.vehicle.identity,
+        "steps": len(mission.invocations),
+        "policy_key": signed.signers[0].kid.hex(),
+        "mission_key": signed.signers[1].kid.hex(),
+    }

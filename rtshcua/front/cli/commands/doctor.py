@@ -1,0 +1,336 @@
+"""`rtshcua doctor`: what a vehicle supports, and what would stop a mission. It asks and listens, and moves nothing."""
+
+import os
+import pwd
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Final
+
+import msgspec
+import typer
+
+from rtshcua import library
+from rtshcua.adapters.boundary_process import (
+    MISSING,
+    UNBUILT,
+    UNBUILT_HELP,
+    BoundaryError,
+    ListeningBoundary,
+    measures_here,
+    program,
+)
+from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
+from rtshcua.adapters.doctor.examination import ExaminingDriver
+from rtshcua.adapters.doctor.identity import standing
+from rtshcua.adapters.store.folders import data_folder, state_folder
+from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.adapters.store.signing import LinkKeyError
+from rtshcua.adapters.store.vehicle_records import OwedParameters
+from rtshcua.adapters.utc import TimeSources, kernel_error_us, vehicle_counts
+from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import AddressError
+from rtshcua.adapters.vehicle.connected import ConnectedVehicle
+from rtshcua.adapters.vehicle.telemetry import UnknownSource
+from rtshcua.adapters.vehicle.transport import open_transport
+from rtshcua.app.exit_codes import code_of
+from rtshcua.app.fly.connect import record_of, unmet, unopened
+from rtshcua.app.fly.link_signing import LinkSigning
+from rtshcua.app.fly.replay_check import too_old
+from rtshcua.app.fly.verify_bundle import other_kind
+from rtshcua.app.programs import compile_sources
+from rtshcua.app.wording import many
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.faults import distrust, fail, misaddressed, refuse
+from rtshcua.front.cli.options.conflicts import conflict_of
+from rtshcua.front.cli.options.flight_options import (
+    Connect,
+    DecidesIn,
+    LinkKey,
+    MeantSettings,
+    System,
+    UnsignedRadio,
+    UtcError,
+    duration_us,
+    mode_of,
+    settings_of,
+)
+from rtshcua.front.cli.stdout import out, out_json
+from rtshcua.mavlink.parameters import shown
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.enforcement.isolated import Caller
+from rtshcua.onboard.enforcement.load import EnforcementMode
+from rtshcua.wire import cose
+from rtshcua.wire.bundle import MAX_BUNDLE, open_bundle
+from rtshcua.wire.clock import ClockSource
+from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_HEARTBEAT_S = 10.0
+_POLL_US = 50_000
+_SOFTWARE = "a run with `--mode software` decides in its own process, in reach of whoever takes it over"
+_EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
+
+
+@app.command()
+def doctor(
+    context: typer.Context,
+    connect: Connect,
+    bundle: Annotated[Path | None, typer.Argument(help="a mission that it is to fly; else the signals that ship")]
+    = None,
+    seconds: Annotated[float, typer.Option(min=3, max=600, help="how long to listen")] = 10.0,
+    signing_key: LinkKey = None,
+    unsigned_radio: UnsignedRadio = False,
+    system: System = None,
+    agent_user: Annotated[
+        str | None, typer.Option(metavar="USER", help="who the agent runs as: is it told apart from operators?")
+    ] = None,
+    set_: MeantSettings = None,
+    utc_error: UtcError = None,
+    boundary_socket: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="where a boundary listens that is to decide: look at that one")
+    ] = None,
+    mode: DecidesIn = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
+) -> ExitCode:  # fmt: skip
+    """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
+
+    Ends with 5 when something would stop a mission, with 8 when no vehicle is heard.
+    """
+    try:
+        link = address.parse(connect)
+    except AddressError as error:
+        return misaddressed("--connect", error)
+    problem = conflict_of(context)
+    if problem is not None:
+        return problem
+    decides, _ = mode_of(mode, own=False, named=boundary_socket is not None)
+    try:
+        agents = [] if agent_user is None else [told_apart(agent_user, pwd.getpwnam(agent_user).pw_uid, os.geteuid())]
+    except KeyError:
+        return fail(ExitCode.USAGE, f"there is no user `{agent_user}`")
+    clock = SystemClock()
+    try:
+        wanted = _wanted(bundle, clock.now().utc_us)
+    except Untrusted as error:
+        return distrust(error)
+    if isinstance(wanted, Refusal):
+        return refuse(wanted)
+    policy, mission, root = wanted
+    frames = FrameSession()
+    with ExitStack() as stack:
+        try:
+            signing = LinkSigning(signing_key, policy, frames, state_folder(), clock, unsigned_radio=unsigned_radio)
+        except LinkKeyError as error:
+            return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
+        stack.callback(signing.close)
+        try:
+            steps = () if mission is None else mission.invocations
+            meant = settings_of(set_)
+            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, system, steps, meant)
+        except UnknownSource as error:
+            return fail(ExitCode.REFUSED, str(error))
+        try:
+            socket = ConnectedVehicle(open_transport(link), vehicle, clock, lambda _utc_us, _frame: None)
+        except OSError as error:
+            return refuse(unopened(link, error), ExitCode.LINK)
+        stack.callback(socket.close)
+        if not _listen(socket, vehicle, clock, seconds):
+            return refuse(
+                unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
+            )
+        keyed = signing_key is not None
+        time_of_day = _time_of_day(
+            boundary_socket, duration_us(utc_error), keyed=keyed, apart=decides is EnforcementMode.PROCESS
+        )
+        findings = _boundary(decides, boundary_socket) + agents + _settle(socket, vehicle, clock)
+        findings += list(
+            diagnose(
+                vehicle, policy, mission, keyed=keyed,
+                time=time_of_day,
+                unheard=signing.unheard, named=system is not None,
+                qualified=None if root is None else partial(
+                    standing, record_of(policy.vehicle.identity, root, clock.now().utc_us)
+                ),
+            )
+        )  # fmt: skip
+    if mission is not None:
+        findings += _expired(policy, mission, clock.now(), time_of_day)
+        findings += _owed(OwedParameters(state_folder(), policy.vehicle.identity))
+    code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
+    if as_json:
+        out_json(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
+    else:
+        _print(findings)
+    return code
+
+
+def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[VehicleFinding]:
+    """Where a run in this mode decides, or one that calls the boundary at this socket, and which measures that keep
+    others out of a process of its own that would be without.
+    """
+    slug = "boundary/process"
+    if mode is EnforcementMode.NONE:
+        text, help = "a run with `--mode none` flies the simulated vehicle only", "without `--mode`"
+        return [VehicleFinding(slug, MissionVerdict.STOP, text, "a process of its own", help)]
+    if mode is EnforcementMode.SOFTWARE:
+        built = program() is not None
+        text, help = (_SOFTWARE, "without `--mode`") if built else (UNBUILT, UNBUILT_HELP)
+        return [VehicleFinding(slug, MissionVerdict.WARN, text, "a process of its own", help)]
+    try:
+        if socket is None:
+            here, where = measures_here(None), "a run decides in a process of its own (`run --mode process`)"
+        else:
+            listening = ListeningBoundary(socket)
+            listening.close()
+            here, where = listening.measures, f"a boundary listens at `{socket}`"
+    except BoundaryError as error:
+        return [VehicleFinding(slug, MissionVerdict.STOP, str(error), "a process of its own", error.help)]
+    found = [VehicleFinding(slug, MissionVerdict.OK, where)]
+    for measure, text in MISSING.items():
+        if measure not in here:
+            name = f"boundary/{str(measure.name).lower().replace('_', '-')}"
+            found.append(VehicleFinding(name, MissionVerdict.WARN, f"the boundary process would run without {text}"))
+    return found
+
+
+def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool, apart: bool) -> TimeSources:
+    """What a run would take the time of day from: one as it begins by itself, with a boundary `apart` or in its own
+    process, or one by the boundary that listens.
+    """
+    if socket is None:
+        return TimeSources(kernel_error_us(), vehicle_counts(apart=apart, keyed=keyed), stated_us)
+    try:
+        listening = ListeningBoundary(socket)
+    except BoundaryError:  # nothing flies by it, and that was said
+        return TimeSources(kernel_error_us(), listens=True)
+    try:
+        has_key = listening.link_name is not None
+        said = Caller(listening.call, signs=has_key).time(settle=True)
+    finally:
+        listening.close()
+    if isinstance(said, Refusal) or said.source is ClockSource.SHARED:  # it has none of its own: that of the run counts
+        return TimeSources(kernel_error_us(), listens=True)
+    error_us, counts = said.now.utc_error_us, vehicle_counts(apart=True, keyed=has_key)
+    return TimeSources(
+        error_us if said.source is ClockSource.KERNEL else None, counts,
+        error_us if said.source is ClockSource.OPERATOR else None, listens=True,
+    )  # fmt: skip
+
+
+def _expired(policy: Policy, mission: Mission, now: Now, time: TimeSources) -> list[VehicleFinding]:
+    """That the mission is too old, where this machine's time of day is known well enough to say so."""
+    error_us = time.stated_us if time.machine_us is None else time.machine_us
+    known = Now(now.monotonic_us, now.utc_us, UTC_UNKNOWN_US if error_us is None else error_us)
+    late = too_old(policy, mission.invocations, known)
+    if late is None:
+        return []
+    return [VehicleFinding("mission/expired", MissionVerdict.STOP, late.text, "a mission that is fresh", late.help)]
+
+
+def _owed(debts: OwedParameters) -> list[VehicleFinding]:
+    """What a run that broke off has left in the vehicle's parameters."""
+    slug = "settings/owed"
+    if debts.trouble is not None:
+        return [
+            VehicleFinding(slug, MissionVerdict.WARN, debts.trouble, "", "look at the file; without it nothing is owed")
+        ]
+    listed = ", ".join(f"{name} from {shown(each.value)} to {shown(each.before)}" for name, each in debts.left.items())
+    found = f"a run that broke off set parameters, and the next one puts them back: {listed}"
+    return [VehicleFinding(slug, MissionVerdict.WARN, found)] if listed else []
+
+
+def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, TrustRoot | None] | Refusal:
+    """The policy whose signals count, the mission to fly, and the root that it is trusted by. Raises Untrusted, and
+    OSError.
+    """
+    if bundle is None:
+        compiled, _ = compile_sources([library.root() / _EXAMPLE], mission=None, issued_at_us=utc_us)
+        assert compiled.policy is not None
+        return compiled.policy, None, None
+    data = read_regular(bundle, MAX_BUNDLE)
+    mistaken = other_kind(bundle)
+    if mistaken is not None:
+        return mistaken
+    signed = KeyStore(data_folder()).root()
+    root = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=utc_us)
+    opened = open_bundle(data, root=root, vehicle=None, now_us=utc_us)
+    return opened.policy, opened.mission, root
+
+
+#: how long a vehicle that has just been switched on is waited for, longer than was asked for
+_SETTLES_S: Final = 60.0
+
+
+def _settle(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock) -> list[VehicleFinding]:
+    """Wait for what comes by itself, such as a fix, and say so."""
+    what = settling(vehicle)
+    if what is None:
+        return []
+    if sys.stderr is not None:
+        print(f"waiting for {what}, {_SETTLES_S:.0f} s at the most", file=sys.stderr, flush=True)
+    begun = time.monotonic()
+    still: str | None = what
+    while still is not None and time.monotonic() < begun + _SETTLES_S:
+        socket.poll(clock.now().monotonic_us, _POLL_US)
+        still = settling(vehicle)
+    return [settled(what, round(time.monotonic() - begun), still)]
+
+
+def _listen(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock, seconds: float) -> bool:
+    """Wait for a heartbeat, then listen for so long; whether there was one."""
+    begun = time.monotonic()
+    until = begun + _HEARTBEAT_S
+    heard = False
+    while time.monotonic() < until:
+        socket.poll(clock.now().monotonic_us, _POLL_US)
+        if not heard and vehicle.flavour is not None:
+            heard, begun = True, time.monotonic()
+            until = begun + seconds
+        _progress(time.monotonic() - begun, seconds if heard else _HEARTBEAT_S, heard=heard)
+    _progress(None, 0, heard=heard)
+    return heard
+
+
+def _progress(passed: float | None, whole: float, *, heard: bool) -> None:
+    if sys.stderr is None or not sys.stderr.isatty():
+        return
+    what = "listening" if heard else "waiting for a heartbeat"
+    text = "" if passed is None else f"{what}: {passed:.0f} of {whole:.0f} s"
+    print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+
+_MARKS = {
+    MissionVerdict.OK: "ok",
+    MissionVerdict.WARN: "warn",
+    MissionVerdict.STOP: "STOP",
+    MissionVerdict.UNKNOWN: "?",
+}
+
+
+def _print(findings: Sequence[VehicleFinding]) -> None:
+    """A line a finding; what is wrong, with what is needed and what to do about it."""
+    width = max(len(each.slug) for each in findings)
+    for each in findings:
+        out(f"{_MARKS[each.verdict]:<5} {each.slug:<{width}}  {each.found}")
+        for label, text in (("needed", each.needed), ("help", each.advice)):
+            if text and each.verdict is not MissionVerdict.OK:
+                out(f"{'':<5} {'':<{width}}  {label}: {text}")
+    stops = sum(each.verdict is MissionVerdict.STOP for each in findings)
+    warns = sum(each.verdict is MissionVerdict.WARN for each in findings)
+    end = f"{many(stops, 'problem')} would stop a mission" if stops else "no problem would stop a mission"
+    unknown = sum(each.verdict is MissionVerdict.UNKNOWN for each in findings)
+    if unknown and not stops:
+        end = "no problem was found that would stop a mission"
+    out(f"{end}; {many(warns, 'warning')}" + (f"; {many(unknown, 'check')} without an answer" if unknown else ""))

@@ -1,0 +1,177 @@
+"""`rtshcua qualify`: a flight test of the autopilot itself, and the signed record of it."""
+
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Final
+
+import msgspec
+import typer
+
+from rtshcua.adapters.qualification.sortie import Sortie
+from rtshcua.adapters.store.folders import data_folder, state_folder
+from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import AddressError
+from rtshcua.app.exit_codes import exit_code, untrusted
+from rtshcua.app.fly.flight_request import FlightRequest
+from rtshcua.app.fly.sorties import QualificationResult, Qualifying, plan_sorties
+from rtshcua.app.fly.verify_bundle import IDENTITY_HELP
+from rtshcua.app.programs import compile_sources
+from rtshcua.app.signing_keys import check_trusted
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.console import TerminalConsole
+from rtshcua.front.cli.faults import fail, misaddressed
+from rtshcua.front.cli.options.conflicts import conflict_of
+from rtshcua.front.cli.options.flight_options import (
+    Connect,
+    LinkKey,
+    NoFence,
+    System,
+    UnsignedRadio,
+    UtcError,
+    duration_us,
+)
+from rtshcua.front.cli.render.findings import Findings
+from rtshcua.front.cli.render.refused import say_refused
+from rtshcua.front.cli.render.showing.qualification import described, told
+from rtshcua.front.cli.stdout import out, out_json
+from rtshcua.front.cli.unlock import unlock_for
+from rtshcua.onboard.enforcement.load import EnforcementMode
+from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_CONSENT_HELP: Final = (
+    "`--sitl`: it is a simulation, and a second ground station takes it over; `--pilot NAME`: it is a real vehicle, "
+    "and this pilot consents, with the mode switch in hand"
+)
+
+
+@app.command()
+def qualify(
+    context: typer.Context,
+    source: Annotated[Path, typer.Argument(help="a source with a mission (.rts): the sorties fly under its policy")],
+    connect: Connect,
+    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="who this vehicle is, as its policy says")],
+    sitl: Annotated[
+        bool, typer.Option("--sitl", help="it is a simulation: a second ground station takes it over")
+    ] = False,
+    pilot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="it is a real vehicle, and this pilot consents, switch in hand")
+    ] = None,
+    takeover: Annotated[
+        bool, typer.Option("--takeover", help="with --pilot: ask the pilot to take over, and wait for it")
+    ] = False,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="SORTIE", help="fly these sorties alone (repeatable)")
+    ] = None,
+    mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
+    speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
+    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")] = None,
+    signing_key: LinkKey = None,
+    unsigned_radio: UnsignedRadio = False,
+    system: System = None,
+    no_fence: NoFence = False,
+    utc_error: UtcError = None,
+    runs: Annotated[Path, typer.Option(help="where the folders of the sorties are made")] = Path("runs"),
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object an event, the record last")] = False,
+) -> ExitCode:  # fmt: skip
+    """Fly a short test of the autopilot: does it do what the adapters assume? Sign a record of the result.
+
+    It flies, so somebody has to consent: `--sitl` or `--pilot NAME`. Ends with 0 when every check that was made holds,
+    with 13 when one does not.
+    """
+    if sitl and pilot is not None:
+        return fail(ExitCode.USAGE, "`qualify` requires consent: `--sitl` or `--pilot NAME`, not both", _CONSENT_HELP)
+    if sitl == (pilot is not None) or (pilot is not None and not pilot.strip()):
+        return fail(ExitCode.USAGE, "`qualify` requires consent: either `--sitl` or `--pilot NAME`", _CONSENT_HELP)
+    problem = conflict_of(context)
+    if problem is not None:
+        return problem
+    try:
+        link = address.parse(connect)
+    except AddressError as error:
+        return misaddressed("--connect", error)
+    if sitl and not link.is_loopback:
+        what = f"`--sitl` requires a loopback address: the vehicle at `{link}` may be real"
+        return fail(ExitCode.USAGE, what, "forward the simulation's port to this machine, or use `--pilot NAME`")
+    if speed != 1 and not sitl:
+        return fail(ExitCode.USAGE, "`--speed` requires a simulated vehicle: `--sitl`")
+    planned, missing = plan_sorties(sitl=sitl, takeover=takeover, keyed=signing_key is not None)
+    named = {each.name: each for each in planned}
+    unknown = sorted(set(only or ()) - named.keys())
+    if unknown:
+        return fail(ExitCode.USAGE, f"unknown sortie `{unknown[0]}`", f"accepted: {', '.join(named)}")
+    if only:
+        missing |= {name: "not flown (`--only`)" for name in named if name not in only}
+        planned = [each for each in planned if each.name in only]
+    found = Findings(json=as_json)
+    compiled, sources = compile_sources([source], mission=mission, issued_at_us=time.time_ns() // 1_000)
+    if found.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
+        return found.finish(exit_code(compiled.diagnostics))
+    if compiled.policy.vehicle.identity != vehicle:
+        text = f"the policy is for `{compiled.policy.vehicle.identity}`, this vehicle is `{vehicle}`"
+        return fail(ExitCode.REFUSED, text, IDENTITY_HELP, slug="wrong-vehicle")
+    plan = Qualifying(
+        source, compiled.policy, compiled.mission, planned, missing, pilot=pilot or "", data=data_folder()
+    )
+    request = FlightRequest(
+        bundle=Path(), link=link, mode=EnforcementMode.SOFTWARE, data=data_folder(), state=state_folder(), runs=runs,
+        speed=speed, vehicle=vehicle, fence=not no_fence, signing_key=signing_key, unsigned_radio=unsigned_radio,
+        system=system, utc_error_us=duration_us(utc_error),
+    )  # fmt: skip
+    console = TerminalConsole("json" if as_json else "lines", request.data, passphrase_file)
+    result = _qualify(plan, request, console)
+    if isinstance(result, Refusal):
+        return say_refused(result, as_json=as_json)
+    _show(result, as_json=as_json)
+    return result.code
+
+
+def _qualify(plan: Qualifying, request: FlightRequest, console: TerminalConsole) -> QualificationResult | Refusal:
+    found = plan.choose_leg()
+    if isinstance(found, Refusal):
+        return found
+    if found is not None:
+        Findings(json=False).report(found.diagnostics, found.sources)
+        text = f"`{plan.policy.name}` permits none of the candidate legs; the findings on the first one are above"
+        return Refusal("not-permitted", text, _PERMIT_HELP, ExitCode.REFUSED)
+    store, keys = KeyStore(request.data), dict[Duty, SigningKey]()
+    try:
+        for duty in (Duty.POLICY, Duty.LOG):
+            keys[duty] = console.unlock(duty, None)
+        keys[Duty.MISSION] = unlock_for(store, plan.mission, passphrase_file=console.passphrase_file)
+        check_trusted(store, keys[Duty.MISSION], plan.policy, plan.mission)
+    except Untrusted as error:
+        return untrusted(error)
+
+    def announce(sortie: Sortie) -> None:
+        if console.as_json:
+            console.emit({"event": "sortie", "name": sortie.name, "about": sortie.about})
+        else:
+            out(f"sortie {sortie.name}: {sortie.about}", flush=True)
+
+    with tempfile.TemporaryDirectory(prefix="rtshcua-") as folder:
+        refusal = plan.fly(replace(request, bundle=Path(folder)), console, keys, announce)
+    return refusal or plan.judge(keys[Duty.LOG])
+
+
+def _show(result: QualificationResult, *, as_json: bool) -> None:
+    """Print the table, and where the record is."""
+    record, broken_off, path, code = result
+    if as_json:
+        about = {"record": None if path is None else str(path), "exit_code": int(code)}
+        out_json(msgspec.json.encode({"event": "qualification"} | described(record) | about).decode())
+        return
+    out(*told(record, broken_off))
+    if path is not None:
+        out(f"the record is in {path}")
+    elif broken_off is None:
+        out("no record is made of it: that of the whole qualification before stays")
+
+
+_PERMIT_HELP: Final = "permit takeoff to 6 or 10 m, goto 30 or 50 m from home at 2 to 5 m/s, hover, return and landing"

@@ -1,0 +1,87 @@
+"""`rtshcua show`: print a bundle, a document for a flight, a key, a trust root or a log for a person."""
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.store.logs import lines
+from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.runs import LOG
+from rtshcua.app.documents import kind_of
+from rtshcua.app.logs import CUT_AT_FIRST
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.faults import distrust, fail
+from rtshcua.front.cli.render.showing.bundle import show_bundle
+from rtshcua.front.cli.render.showing.document import kind_of_document, show_document
+from rtshcua.front.cli.render.showing.keys import KEY_FILE, show_key, show_root
+from rtshcua.front.cli.render.showing.log import show_log
+from rtshcua.front.cli.render.showing.page import TextPage, for_terminal
+from rtshcua.front.cli.render.showing.qualification import is_qualification, show_qualification
+from rtshcua.front.cli.stdout import out_json, out_rendered
+from rtshcua.wire import cbor, cose, names
+from rtshcua.wire.bundle import MAX_BUNDLE
+from rtshcua.wire.untrusted import Untrusted
+
+app = typer.Typer(add_completion=False)
+
+_SNIFF = 1 << 12
+_LOG = b'{"_prev":"'
+_BUNDLE = cbor.encode(names.BUNDLE.name)
+_ENVELOPE = b"\xd2"  # COSE_Sign1
+
+
+@app.command()
+def show(
+    path: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="a bundle, document, key, trust root, record or log, or a run's folder"),
+    ],
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+) -> ExitCode:
+    """Print what a file says, whatever kind it is, with nothing left unsaid. Showing is not verifying."""
+    page = for_terminal()
+    file = path / LOG if path.is_dir() else path
+    if file is not path and not file.exists():
+        return fail(
+            ExitCode.INPUT, f"there is no `{LOG}` in the folder `{path}`", "name a file, or the folder of one run"
+        )
+    try:
+        shown = _show(page, file)
+    except Untrusted as error:
+        return distrust(error, where=f"`{path}`: ")
+    if shown is None:
+        help = "sources are shown by any editor; `rtshcua check` reports on them"
+        kind = kind_of(file)
+        if kind is not None:
+            return fail(ExitCode.INPUT, f"`{path}` is {kind.name}, which is not shown", kind.help or None)
+        return fail(ExitCode.INPUT, f"`{path}` is no bundle, document, key, trust root or log of this program", help)
+    if shown["kind"] == "log" and not shown["records"]:
+        return fail(ExitCode.EVIDENCE, f"`{path}`: {CUT_AT_FIRST}", slug="genesis/missing")
+    if as_json:
+        out_json(json.dumps(shown, ensure_ascii=False))
+    else:
+        out_rendered(str(page))
+    return ExitCode.OK
+
+
+def _show(page: TextPage, path: Path) -> dict[str, object] | None:
+    """Adds what the file holds to the page; None for what nobody here knows. Raises `Untrusted`."""
+    now_us = time.time_ns() // 1000
+    with open_regular(path) as file:
+        head = file.read(_SNIFF)
+        file.seek(0)
+        if head.startswith(_LOG):
+            return show_log(page, lines(file))
+        data = file.read(MAX_BUNDLE + 1)
+    if head[1:].startswith(_BUNDLE):
+        return show_bundle(page, data, now_us)
+    if head.startswith(KEY_FILE):
+        return show_key(page, data)
+    if head.startswith(_ENVELOPE) and cose.unverified(data, limit=MAX_BUNDLE).content_type == names.ROOT.content_type:
+        return show_root(page, data, now_us)
+    if head.startswith(_ENVELOPE) and is_qualification(data):
+        return show_qualification(page, data)
+    return show_document(page, data) if kind_of_document(data) is not None else None

@@ -1,0 +1,153 @@
+"""`rtshcua sim`: the simulated vehicle alone, for any ground station that speaks MAVLink."""
+
+import json
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.simulator import Simulator, SimulatorError
+from rtshcua.adapters.store.signing import LinkKeyError, read_link_key
+from rtshcua.adapters.utc import kernel_error_us, vehicle_counts
+from rtshcua.adapters.vehicle import address
+from rtshcua.adapters.vehicle.address import AddressError, LinkCarrier
+from rtshcua.app.exit_codes import code_of
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.faults import fail, misaddressed
+from rtshcua.front.cli.options import flight_options as simulated
+from rtshcua.front.cli.stdout import out, out_json
+from rtshcua.simulation.config import Answers, AutopilotKind, Boot, Estimate
+
+PORT = 14_550
+_FIRST_STEPS = {
+    AutopilotKind.PX4: ("arm throttle", "long NAV_TAKEOFF -1 0 0 nan nan nan nan", "long NAV_RETURN_TO_LAUNCH"),
+    AutopilotKind.ARDUPILOT: ("mode GUIDED", "arm throttle", "takeoff 10", "mode RTL"),
+}
+"""What to type in MAVProxy for a first flight. For PX4, `takeoff 10` would be 10 m above the sea: no climb at all; and
+MAVProxy cannot pack PX4's modes (`mode RTL`)."""
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def sim(
+    flavour: simulated.Flavour = None,
+    port: Annotated[int | None, typer.Option(min=1, max=65_535, help=f"UDP port to send to ({PORT})")] = None,
+    connect: Annotated[str | None, typer.Option(metavar="udpout:HOST:PORT", help="the same, written as a link")] = None,
+    speed: Annotated[float, typer.Option(min=0.1, max=200, help="seconds of flight in a second")] = 1.0,
+    system: Annotated[int, typer.Option(min=1, max=255, help="its MAVLink system id")] = 1,
+    battery: simulated.Battery = None,
+    wind: simulated.Wind = None,
+    fault: simulated.Faults = None,
+    seed: simulated.Seed = None,
+    home: simulated.Home = None,
+    boot: Annotated[
+        Boot, typer.Option(help="sensors come up in a second, or as recorded: PX4 5 s, ArduCopter 42 s")
+    ] = (Boot.FAST),
+    answers: Annotated[
+        Answers, typer.Option(help="it obeys and answers at once, or after as long as was recorded")
+    ] = Answers.RECORDED,
+    estimate: Annotated[
+        Estimate, typer.Option(help="it knows where it is within centimetres, or as with a real receiver")
+    ] = Estimate.CLOSE,
+    signing_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="it obeys only what is signed with this key (keys link)")
+    ] = None,
+    stock: Annotated[
+        bool, typer.Option("--stock", help="GPS, barometer and battery alone: no radio, range finder, wind or voltage")
+    ] = False,
+    parameter: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="a parameter as its owner has set it; repeatable")
+    ] = None,
+    usb: Annotated[
+        bool, typer.Option("--usb", help="it takes this link for USB: ArduCopter obeys anyone there, key or not")
+    ] = False,
+    release: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MAJOR.MINOR",
+            callback=simulated.release,
+            help="what it says it is, and takes keys as: PX4 1.16 (no keys), 1.17 or 1.18",
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="say what was started as one JSON object")] = False,
+) -> ExitCode:
+    """Start the simulated vehicle, until Ctrl-C. It sends to a UDP port of this machine and obeys what answers."""
+    if port is not None and connect is not None:
+        return fail(ExitCode.USAGE, "`--port` and `--connect` say the same thing: give one")
+    if connect is not None:
+        try:
+            link = address.parse(connect, (LinkCarrier.UDP_OUT,))
+        except AddressError as error:
+            return misaddressed("--connect", error)
+        if not link.is_loopback:
+            return fail(
+                ExitCode.USAGE,
+                f"`{connect}` is not for the simulated vehicle",
+                "it speaks to this machine alone: `udpout:127.0.0.1:PORT`",
+            )
+        port = link.port
+    port = port or PORT
+    words = simulated.simulator_words(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
+    if home is not None:
+        words.append(f"--home={home}")
+    if signing_key is not None:
+        try:
+            read_link_key(signing_key)
+        except LinkKeyError as error:
+            return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
+        except OSError as error:
+            return fail(ExitCode.INPUT, str(error))
+        words.append(f"--signing-key={signing_key}")
+    words += [f"--parameter={each}" for each in parameter or ()]
+    words += ["--usb"] if usb else []
+    words += ["--stock"] if stock else []
+    words += [f"--release={release}"] if release is not None else []
+    words += [f"--boot={boot}", f"--answers={answers}", f"--estimate={estimate}"]
+    try:
+        vehicle = Simulator(["--port", str(port), "--speed", f"{speed:g}", "--system", str(system), *words])
+    except SimulatorError as error:
+        return fail(ExitCode.USAGE if error.usage else ExitCode.LINK, str(error))
+    with vehicle:
+        if as_json:
+            out_json(json.dumps(vehicle.ready), flush=True)
+        else:
+            out(*_introduction(vehicle.ready, port, signing_key, speed), flush=True)
+        try:
+            code = vehicle.wait()
+        except KeyboardInterrupt:
+            return ExitCode.OK
+    return fail(ExitCode.FAULT, f"the simulated vehicle ended by itself, with code {code}")
+
+
+def _options(signing_key: Path | None, speed: float) -> str:
+    """What `run` needs to fly it on this machine, besides where it is. It shares the machine's clock: no more is stated
+    of that where it lives faster, or where its time counts.
+    """
+    words = [] if signing_key is None else [f"--signing-key {shlex.quote(str(signing_key))} --unsigned-radio"]
+    if speed != 1:
+        words.append(f"--speed {speed:g}")
+    elif not vehicle_counts(apart=program() is not None, keyed=signing_key is not None) and kernel_error_us() is None:
+        words.append("--utc-error 500ms")
+    return " ".join(words)
+
+
+def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None, speed: float) -> list[str]:
+    """What was started, and what a person types to fly it."""
+    flavour = AutopilotKind(ready["flavour"])
+    more = _options(signing_key, speed)
+    finds = "start it: it listens on this port by itself"
+    adds = f"Application Settings, Comm Links, Add: type UDP, port {port}"
+    return [
+        f"a simulated {flavour} vehicle, system {ready['system']}, sends to udp port {port}",
+        f"  fly it           rtshcua run BUNDLE --connect udpin:127.0.0.1:{port} \\",
+        f"                     --vehicle IDENTITY{' ' if more else ''}{more}",
+        f"  QGroundControl   {finds if port == PORT else adds}",
+        f"  MAVProxy         mavproxy.py --master=udpin:127.0.0.1:{port}",
+        f"                   then: {', '.join(f'`{step}`' for step in _FIRST_STEPS[flavour])}",
+        f"  MAVSDK           udpin://127.0.0.1:{port}",
+        "  end it           Ctrl-C",
+    ]

@@ -1,0 +1,146 @@
+"""`rtshcua test`: run the tests of sources, say what they cover, and write tests for every limit of a policy."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtshcua.adapters.store.project import Projects
+from rtshcua.adapters.store.writing import write_out
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.files import overwriting_a_source
+from rtshcua.app.testing.generate import GenerateRequest, NotGenerated, generate
+from rtshcua.app.testing.run import least_share, run_all, select_files
+from rtshcua.app.wording import many
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.report.junit import junit
+from rtshcua.front.cli.faults import say
+from rtshcua.front.cli.render.findings import Findings
+from rtshcua.front.cli.render.progress import counting, watched
+from rtshcua.front.cli.render.test_report import TestReport
+from rtshcua.front.cli.stdout import out_source
+from rtshcua.ground.testing.reporting import (
+    case_suites,
+    coverage_json,
+    scenario_suites,
+    scenarios_json,
+    summary_json,
+    tests_json,
+)
+
+app = typer.Typer(add_completion=False)
+
+_REPORT = "a report"
+
+
+@app.command()
+def run_tests(
+    paths: Annotated[list[Path] | None, typer.Argument(help="sources (.rts), folders of them (default: here)")] = None,
+    chosen: Annotated[str, typer.Option("-k", metavar="TEXT", help="only the cases whose name has this in it")] = "",
+    coverage: Annotated[
+        bool, typer.Option("--coverage", help="say what of the policies is covered, by clause")
+    ] = False,
+    fail_under: Annotated[
+        int | None, typer.Option(min=0, max=100, metavar="N", help="fail where less than N % is covered")
+    ] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="also each row of a table, each covered clause")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    junit_file: Annotated[
+        Path | None, typer.Option("--junit", metavar="FILE", help="write a JUnit report, over an earlier one")
+    ] = None,
+    generating: Annotated[
+        bool, typer.Option("--generate", help="write tests for both sides of every limit of a policy")
+    ] = False,
+    policy: Annotated[str | None, typer.Option(help="--generate: of which policy, where there are several")] = None,
+    skill: Annotated[list[str] | None, typer.Option(help="--generate: for this skill alone (repeatable)")] = None,
+    nominal: Annotated[
+        str | None, typer.Option(help="--generate: the nominal to start from (default: the first)")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="--generate: into this file")] = None,
+    force: Annotated[bool, typer.Option("--force", help="--generate: replace the file if it exists")] = False,
+    config: Annotated[Path | None, typer.Option(help="the configuration, in place of the nearest")] = None,
+    isolated: Annotated[bool, typer.Option("--isolated", help="without any configuration")] = False,
+) -> ExitCode:
+    """Run the `test` blocks of sources, fly their scenarios in virtual time, and say what of their policies they cover.
+
+    A file's tests run where the file itself is asked for, not where it is imported. What fails is shown with the clause
+    that decided, and the nearest value that would have met what was expected. Coverage counts clauses and outcomes,
+    never lines. docs/testing.md has it all.
+
+    Ends with 0 where all passed, 13 where a test failed, none was found, or less is covered than is asked
+    (`--fail-under`, or `fail-under` of the configuration), 1 where sources have errors, 2 where the command line is
+    wrong, 3 where a file cannot be read.
+    """
+    findings = Findings(json=as_json)
+    if not generating and any([policy, skill, nominal, output, force]):
+        help = "`--policy`, `--skill`, `--nominal`, `--output` and `--force` go with `--generate`"
+        return findings.refuse(ExitCode.USAGE, "usage", "there is nothing to write without `--generate`", help)
+    projects, here = Projects(config, isolated=isolated), paths or [Path()]
+    files = select_files(here, projects, keep=generating)
+    if isinstance(files, Refusal):
+        return findings.end(files)
+    if generating:
+        request = GenerateRequest(policy, tuple(skill or ()), nominal, output, force)
+        return _generate(files, request, findings, quiet=as_json)
+    refused = None if junit_file is None else overwriting_a_source(junit_file, files, _REPORT)
+    if refused is not None:
+        return findings.end(refused)
+    whole = not chosen and all(path.is_dir() for path in here)  # of a part, nobody asked for a share
+    least = fail_under if fail_under is not None or not whole else least_share(here, projects)
+    with_coverage = coverage or least is not None
+    done = run_all(files, chosen, with_coverage=with_coverage, progress=watched, say=counting(quiet=as_json))
+    refused = None if junit_file is None else overwriting_a_source(junit_file, done.sources, _REPORT)
+    if refused is not None:
+        return findings.end(refused)
+    show = TestReport(done, chosen, verbose=verbose, quiet=as_json)
+    show.results()
+    findings.report((*done.diagnostics, *done.failures), done.sources)
+    if junit_file is not None:
+        every = (*case_suites(done.ran, done.sources, done.covered), *scenario_suites(done.flown, done.sources))
+        write_out(junit_file, junit(every).encode())
+    show.summary(least)
+    shares = None if done.covered is None else coverage_json(done.covered, done.sources)
+    return findings.finish(
+        done.code(least),
+        tests=tests_json(done.ran, done.sources),
+        scenarios=scenarios_json(done.flown, done.sources),
+        summary=summary_json(done.ran) | {"left_out": done.left_out},
+        coverage=None if shares is None else shares | {"least": least, "enough": not done.falls_short(least)},
+    )
+
+
+def _generate(files: Sequence[Path], request: GenerateRequest, findings: Findings, *, quiet: bool) -> ExitCode:
+    """Write the tests of one policy; quiet: as a field of the JSON object."""
+    done = generate(files, request)
+    if isinstance(done, Refusal):
+        return findings.end(done)
+    if isinstance(done, NotGenerated):
+        findings.report(done.diagnostics, done.sources)
+        if done.refusal is not None:
+            return findings.end(done.refusal)
+        return findings.finish(exit_code(done.diagnostics))
+    made = done.made
+    if not quiet:
+        if request.output is None:
+            out_source(done.text)
+        where = "" if request.output is None else f", in {request.output}"
+        counted = f"{many(made.cases, 'case')} on {many(len(made.limits), 'limit')} of {done.policy}"
+        say(f"{counted}{where}: read them before you keep them")  # the text may be on the standard output
+        for label in made.without:
+            say(f"nothing was found that makes `{label}` allowed; it has one case, as it is")
+        for each in made.unreached:
+            say(f"not reached: {each.words}")
+    return findings.finish(
+        ExitCode.OK,
+        policy=done.policy,
+        cases=made.cases,
+        limits=len(made.limits),
+        without=list(made.without),
+        unreached=[each._asdict() for each in made.unreached],
+        text=done.text,
+        path=None if request.output is None else str(request.output),
+    )

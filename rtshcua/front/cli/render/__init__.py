@@ -1,0 +1,1 @@
+"""How commands show results: text, JSON, tables, and the live view of a flight."""

@@ -1,0 +1,125 @@
+"""What `rtshcua check` does, however its command line was read."""
+
+import textwrap
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from rtshcua.app.check import CheckedMission, CheckRequest, CheckResult, check, draw_map, nothing_compared
+from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.files import SPECIFICATION
+from rtshcua.app.wording import many, moment, utc
+from rtshcua.diagnostics.codes import UNKNOWN_NAME
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.faults import say
+from rtshcua.front.cli.render.bounds import bounds_dict, bounds_told, steps_told
+from rtshcua.front.cli.render.findings import Findings
+from rtshcua.front.cli.render.progress import watched
+from rtshcua.front.cli.stdout import out
+from rtshcua.ground.report.report_model import ChangeView
+
+
+def check_sources(
+    paths: Sequence[Path],
+    *,
+    since: Path | None = None,
+    with_: Sequence[Path] = (),
+    map_: Path | None = None,
+    at: str | None = None,
+    deny_warnings: bool = False,
+    as_json: bool = False,
+) -> ExitCode:
+    """Report everything that is wrong with sources; see `rtshcua.front.cli.commands.check`."""
+    findings = Findings(json=as_json, deny_warnings=deny_warnings)
+    issued_at_us = 0 if at is None else moment(at)
+    if issued_at_us is None:
+        return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
+    request = CheckRequest(paths, since, with_, map_, issued_at_us, time.time_ns() // 1_000)
+    found = check(request, watched)
+    if isinstance(found, Refusal):
+        return findings.end(found)
+    code = exit_code(found.diagnostics) if findings.report(found.diagnostics, found.sources) else ExitCode.OK
+    root = found.programs[0]
+    alone = len(root.asked) == 1 and not with_ and root.name.lower().endswith(SPECIFICATION)
+    if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
+        say(" help: what a specification speaks of stands in its policy's sources: `--with FILE` names them")
+    if code is ExitCode.OK and not as_json:
+        _tell(found, since, request.now_us)
+    if map_ is not None:
+        drawn = draw_map(found, request)
+        if isinstance(drawn, Refusal):
+            return findings.end(drawn)
+        if not as_json:
+            out(f"{many(drawn, 'mission')} drawn in {map_}")
+    refused = nothing_compared(found, since) if code is ExitCode.OK and since is not None else None
+    return findings.end(refused) if refused is not None else findings.finish(code, **_as_json(found))
+
+
+def _as_json(found: CheckResult) -> dict[str, object]:
+    """What else the object of `--json` holds."""
+    versions = [
+        {
+            "policy": each.name,
+            "version": each.version,
+            "earlier": each.earlier,
+            "changes": [asdict(change) for change in each.changes],
+        }
+        for each in found.versions
+    ]
+    return {
+        "missions": [{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
+        "versions": versions,
+        "not_here": found.not_here,
+        "left_out": [each._asdict() for each in found.left_out],
+        "issued_now": [{"code": each.code.id, "message": each.message} for each in found.now],
+    }
+
+
+def _tell(found: CheckResult, since: Path | None, now_us: int) -> None:
+    """What is said of sources in which nothing is wrong."""
+    empty = [name for name, source in found.sources.items() if not source.text.strip()]
+    out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
+    for name in empty:
+        out(f"note: `{name}` is empty")
+    for mission in found.missions:
+        out(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
+        for line in steps_told(mission.bounds):
+            out(line)
+    for left_out in found.left_out:
+        out(left_out.told())
+    for refused in found.now:
+        out(f"issued now, it would be refused: {refused.code.id}, {refused.message}")
+    if found.now:
+        at = utc(now_us).replace(" ", "T")
+        out(f"the dates of zones count from the time of issue: `rtshcua check --at {at}` shows where")
+    for each in found.versions:
+        same = "" if each.changes else "; they mean the same"
+        out(f"{each.name}: version {each.version}, and {each.earlier} in {since}{same}")
+        for change in each.changes:
+            _tell_change(change)
+    for name in found.not_here if found.versions else ():
+        out(f"{name}: in {since}, and compared with no policy here")
+
+
+def _tell_change(change: ChangeView) -> None:
+    """One difference: which way it goes, and its words then and now."""
+    out_wrapped(f"  {change.direction:<11}  ", change.what)
+    for what, lines in (("before", change.before), ("now", change.after)):
+        for line in lines or ("there was none" if what == "before" else "there is none",):
+            out_wrapped(f"  {'':11}    {what:<6}  ", line)
+
+
+def out_wrapped(head: str, text: str) -> None:
+    """A line of at most 80 columns, and what does not fit beneath, under its text."""
+    body = " ".join(text.split())
+    beneath = " " * len(head)
+    for line in textwrap.wrap(body, 80, initial_indent=head, subsequent_indent=beneath, break_on_hyphens=False):
+        out(line)
+
+
+def _named(mission: CheckedMission, missions: tuple[CheckedMission, ...]) -> str:
+    """A mission's name; with its file, where another has the same."""
+    alone = sum(each.name == mission.name for each in missions) == 1
+    return mission.name if alone else f"{mission.name} ({mission.file})"

@@ -1,11 +1,11 @@
 """How the verification of a proof is told: to a person, and as JSON."""
 
 from pathlib import Path
-from typing import TypeAlias
 
 import msgspec
 
 from rtshcua.app.pin import Pin
+from rtshcua.app.proof_verification import ProofResult
 from rtshcua.app.wording import many, shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -17,13 +17,11 @@ from rtshcua.evidence.proofs.trust import LogName
 from rtshcua.evidence.records import encode
 from rtshcua.front.cli.render.claims import listed, write
 
-Told: TypeAlias = Proven | ReceiptClaim | Flaw
-
 _SHOWN = 160
 _HELPS = {"trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key"}
 
 
-def as_object(result: Told, path: Path, pinned: Pin, code: ExitCode) -> dict[str, object]:
+def as_object(result: ProofResult, path: Path, pinned: Pin, code: ExitCode) -> dict[str, object]:
     """The whole, for a program. Keys are only ever added."""
     told: dict[str, object] = {
         "proof": str(path),
@@ -54,7 +52,7 @@ def as_object(result: Told, path: Path, pinned: Pin, code: ExitCode) -> dict[str
     return told
 
 
-def as_text(result: Told, path: Path, pinned: Pin, *, kept: bool, first: bool) -> None:
+def as_text(result: ProofResult, path: Path, pinned: Pin, *, kept: bool, first: bool) -> None:
     """The whole, for a person."""
     lines: list[tuple[str, str]] = [] if first else [("", "")]
     if isinstance(result, Flaw):

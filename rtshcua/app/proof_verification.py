@@ -1,0 +1,65 @@
+"""The service `verify-proof`: a file of `rtshcua prove`, verified by a pinned root key and a kept checkpoint."""
+
+from pathlib import Path
+from typing import TypeAlias
+
+from rtshcua.adapters.store.reading import read_regular
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.kinds import PROOF, recognised
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.note import parse, split
+from rtshcua.evidence.proofs.check import Proven, check_proof
+from rtshcua.evidence.proofs.cose_receipt import TAG_18, ReceiptClaim, check_receipt
+from rtshcua.evidence.proofs.file import MAX_PROOF
+
+#: what a proof proves, or why it is refused
+ProofResult: TypeAlias = Proven | ReceiptClaim | Flaw
+
+_PROOFS = "`rtshcua prove` makes one"
+_MAX_NOTE = 1 << 16  # bytes of a file with a checkpoint
+_INPUT = {"proof/malformed", "proof/extra", "proof/too-long"}
+
+
+def read_checkpoint(path: Path | None) -> str | None:
+    """The text of the checkpoint that was kept, if one was. Raises OSError."""
+    return None if path is None else read_regular(path, _MAX_NOTE).decode("utf-8", "replace")
+
+
+def verify_proof(path: Path, key: bytes, kept: str | None) -> ProofResult:
+    """Verify a proof by a pinned key; a checkpoint that was `kept` must be the one in it. Raises OSError."""
+    data = read_regular(path, MAX_PROOF)
+    result: ProofResult = check_receipt(data, key) if data[:1] == TAG_18 else check_proof(data, key)
+    if kept is not None and not isinstance(result, Flaw):
+        result = _same(result, kept) or result
+    kind = recognised(data, path.name)
+    if isinstance(result, Flaw) and result.slug == "proof/malformed" and kind is not None and kind is not PROOF:
+        result = result._replace(text=f"it is {kind.name}, and no proof: {kind.help or _PROOFS}")
+    return result
+
+
+def exit_code(result: ProofResult) -> ExitCode:
+    """The exit code for the result of a verification."""
+    if not isinstance(result, Flaw):
+        return ExitCode.OK
+    if result.slug in _INPUT:
+        return ExitCode.INPUT
+    if result.slug.startswith("trust/"):
+        return ExitCode.UNTRUSTED
+    return ExitCode.ANCHOR if result.slug.startswith("anchor/") else ExitCode.EVIDENCE
+
+
+def _same(result: ProofResult, kept: str) -> Flaw | None:
+    """What is wrong when the checkpoint that somebody kept should be one of the proof's."""
+    text, _ = split(kept)
+    head = parse(text)
+    if isinstance(head, Flaw):
+        return Flaw("proof/malformed", f"the checkpoint that was kept is none: {head.text}")
+    heads = (result.checkpoint, result.older) if isinstance(result, Proven) else ()
+    if head in heads:
+        return None
+    for mine in heads:
+        if mine is not None and (mine.origin, mine.size) == (head.origin, head.size):
+            words = f"at {head.size} records the log that you kept the checkpoint of was another one"
+            return Flaw("anchor/root", words, mine.root.hex(), head.root.hex())
+    words = "the proof says nothing about the checkpoint that you kept"
+    return Flaw("proof/checkpoint", words, expected=f"{head.origin} at {head.size} records")

@@ -15,7 +15,7 @@ ALLOWED = {
     "front/lsp/server.py": "speaks the protocol, and logs",
     "front/cli/commands/approve.py": "asks; the question passes `visible`",
     "front/cli/app.py": "the version and the overview: our own words",
-    "front/cli/archiving/checking.py": "a count",
+    "front/cli/commands/archive.py": "a count",
     "front/cli/render/archive_tables.py": "a CSV writer; each text passed `visible`",
     "front/cli/commands/campaign.py": "counts, and slugs of ours",
     "front/cli/render/claims.py": "in colour; each line passes `visible`",

@@ -161,7 +161,7 @@ def test_a_file_that_is_changed_before_it_is_copied_is_looked_at_again(
 ) -> None:
     Path("run").mkdir()
     Path("run/log.jsonl").write_text("-----BEGIN PRIVATE KEY-----\n")
-    monkeypatch.setattr("rtshcua.front.cli.archiving.given.begins_as_log", lambda *_: True)
+    monkeypatch.setattr("rtshcua.app.log_archive.begins_as_log", lambda *_: True)
     assert archive("add", "run", *ROOT) == ExitCode.INPUT
     assert "it is not a log of this program" in capsys.readouterr().err
     assert not list(Path("archive/logs").rglob("*.jsonl"))

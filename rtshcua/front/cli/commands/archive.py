@@ -1,17 +1,21 @@
 """`rtshcua archive`: keep many logs, verified, and ask them questions."""
 
-from collections.abc import Callable
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from rtshcua.app import log_archive as service
+from rtshcua.app.log_archive import ArchiveQuery, ArchiveRequest, ArchiveResult
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.archiving.given import VerifyingOptions, logs_in, time_of, unknown, with_extra
-from rtshcua.front.cli.faults import distrust, fail
-from rtshcua.front.cli.render.archive_tables import Shape, tell
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.faults import refuse
+from rtshcua.front.cli.render.archive_tables import Shape, tell, tell_result
 from rtshcua.front.cli.stdout import out_rendered
-from rtshcua.wire.untrusted import Untrusted
+
+if TYPE_CHECKING:
+    from rtshcua.adapters.archive.asking import QueryRows
 
 app = typer.Typer(add_completion=False)
 
@@ -25,16 +29,20 @@ Cluster = Annotated[str | None, typer.Option(metavar="ADDRESS", help="verify on 
 Json = Annotated[bool, typer.Option("--json", help="JSON on the standard output")]
 Csv = Annotated[bool, typer.Option("--csv", help="CSV on the standard output")]
 Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="no more rows than this")]
+Vehicle = Annotated[str | None, typer.Option(help="decisions on this vehicle")]
+Mission = Annotated[str | None, typer.Option(help="in this mission")]
+Skill = Annotated[str | None, typer.Option(help="on this skill")]
+Outcome = Annotated[str | None, typer.Option(help="allow, deny, defer or fallback")]
+Reason = Annotated[str | None, typer.Option(help="for this reason, or its beginning: `safety`")]
+Clause = Annotated[str | None, typer.Option(help="by a clause with this in it")]
+Rule = Annotated[str | None, typer.Option(help="by this rule: integrity, authority, state, safety, ...")]
+Policy = Annotated[str | None, typer.Option(metavar="NAME[@VERSION]", help="under this policy")]
+Since = Annotated[str | None, typer.Option(metavar="TIME", help="from this day (UTC) or time on")]
+Until = Annotated[str | None, typer.Option(metavar="TIME", help="before this day (UTC) or time")]
+Witness = Annotated[str | None, typer.Option(help="witnessed or unwitnessed")]
 
-_DEFAULT = Path("archive")
-_STATUSES = ("verified", "incomplete", "failed")
-_OUTCOMES = ("allow", "deny", "defer", "fallback")
-_WITNESS = ("witnessed", "unwitnessed")
-_INPUT = frozenset({"malformed", "no-archive", "archive-version", "archive-path", "archive-index"})
-_HELPS = {
-    "archive-index": "`rtshcua archive verify --reindex` makes it anew",
-    "no-archive": "`rtshcua archive add LOG...` makes one; `--archive` says where it is",
-}
+_DEFAULT: Final = Path("archive")
+_LISTED: Final = "log, vehicle, begun_us, mission, policy, policy_version, records, anchored, status, finding"
 
 
 @app.callback()
@@ -58,18 +66,11 @@ def add(
     of the first that fails; else 9 where logs contradict each other, 3 where a folder also holds what is no log, 10
     where a log was not closed.
     """
-    found = logs_in(logs)
-    if isinstance(found, ExitCode):
-        return found
-
-    def work() -> ExitCode:
-        from rtshcua.adapters.archive import adding
-        from rtshcua.front.cli.archiving.checking import checked
-
-        how = VerifyingOptions(root, audit, jobs, cluster, as_json)
-        return checked(archive, lambda folder, check: adding.add(folder, found.logs, check), how, found.skipped)
-
-    return _answered(work)
+    found = service.logs_in(logs)
+    if isinstance(found, Refusal):
+        return refuse(found)
+    request = ArchiveRequest(archive, root, audit, jobs, cluster)
+    return _shown(service.add(request, found, _progress), as_json=as_json)
 
 
 @app.command()
@@ -86,15 +87,8 @@ def verify(
 
     The exit code is that of `add`; 4 where none rests on this root.
     """
-
-    def work() -> ExitCode:
-        from rtshcua.adapters.archive import adding
-        from rtshcua.front.cli.archiving.checking import checked
-
-        how = VerifyingOptions(root, audit, jobs, cluster, as_json)
-        return checked(archive, adding.reindex if anew else adding.verify, how)
-
-    return _answered(work)
+    request = ArchiveRequest(archive, root, audit, jobs, cluster)
+    return _shown(service.verify(request, _progress, reindex=anew), as_json=as_json)
 
 
 @app.command(name="list")
@@ -107,19 +101,9 @@ def list_(
     as_csv: Csv = False,
 ) -> ExitCode:
     """List the logs of an archive."""
-
-    def work() -> ExitCode:
-        from rtshcua.adapters.archive.asking import matching
-
-        if refused := unknown("--status", status, _STATUSES):
-            return refused
-        shape = _shape(as_json, as_csv)
-        what = "log, vehicle, begun_us, mission, policy, policy_version, records, anchored, status, finding"
-        where = matching(vehicle=vehicle, status=status)
-        columns = what if shape is Shape.TABLE else "*"
-        return _ask(archive, f"SELECT {columns} FROM logs WHERE {where} ORDER BY begun_us, log", None, limit, shape)
-
-    return _answered(work)
+    shape = _shape(as_json, as_csv)
+    columns = _LISTED if shape is Shape.TABLE else "*"
+    return _told(service.list_logs(archive, vehicle, status, limit, columns), shape)
 
 
 @app.command()
@@ -128,17 +112,17 @@ def query(
     archive: Archive = _DEFAULT,
     sql: Annotated[str | None, typer.Option(metavar="SELECT", help="a question of your own")] = None,
     show_sql: Annotated[bool, typer.Option("--show-sql", help="print the question's SQL instead")] = False,
-    vehicle: Annotated[str | None, typer.Option(help="decisions on this vehicle")] = None,
-    mission: Annotated[str | None, typer.Option(help="in this mission")] = None,
-    skill: Annotated[str | None, typer.Option(help="on this skill")] = None,
-    outcome: Annotated[str | None, typer.Option(help="allow, deny, defer or fallback")] = None,
-    reason: Annotated[str | None, typer.Option(help="for this reason, or its beginning: `safety`")] = None,
-    clause: Annotated[str | None, typer.Option(help="by a clause with this in it")] = None,
-    rule: Annotated[str | None, typer.Option(help="by this rule: integrity, authority, state, safety, ...")] = None,
-    policy: Annotated[str | None, typer.Option(metavar="NAME[@VERSION]", help="under this policy")] = None,
-    since: Annotated[str | None, typer.Option(metavar="TIME", help="from this day (UTC) or time on")] = None,
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="before this day (UTC) or time")] = None,
-    witness: Annotated[str | None, typer.Option(help="witnessed or unwitnessed")] = None,
+    vehicle: Vehicle = None,
+    mission: Mission = None,
+    skill: Skill = None,
+    outcome: Outcome = None,
+    reason: Reason = None,
+    clause: Clause = None,
+    rule: Rule = None,
+    policy: Policy = None,
+    since: Since = None,
+    until: Until = None,
+    witness: Witness = None,
     limit: Limit = None,
     as_json: Json = False,
     as_csv: Csv = False,
@@ -147,79 +131,52 @@ def query(
 
     Only logs that verified answer. Times are UTC in microseconds but in tables.
     """
-
-    def work() -> ExitCode:
-        from rtshcua.adapters.archive.asking import DecisionQuery, canned
-
-        shape, asked = _shape(as_json, as_csv), canned()
-        if sql is None and name is None:
-            tell(("question", "tells"), [(each.name, each.tells) for each in asked.values()], shape)
-            return ExitCode.OK
-        if sql is not None and name is not None:
-            return fail(ExitCode.USAGE, "either a question that ships or `--sql`, not both")
-        for option, value, known in (("--outcome", outcome, _OUTCOMES), ("--witness", witness, _WITNESS)):
-            if refused := unknown(option, value, known):
-                return refused
-        question = None if name is None else asked.get(name)
-        if name is not None and question is None:
-            return fail(ExitCode.USAGE, f"no such question: `{name}`", "`rtshcua archive query` lists them")
-        if show_sql and question is not None:
-            out_rendered(question.sql)
-            return ExitCode.OK
-        times = [None if text is None else time_of(text) for text in (since, until)]
-        for text, time in zip((since, until), times, strict=True):
-            if text is not None and time is None:
-                return fail(
-                    ExitCode.USAGE, f"`{text}` is neither a day nor a time", "`2026-03-01`, `2026-03-01T12:00Z`"
-                )
-        policy_name, _, version = (policy or "").partition("@")
-        if version and not (version.isascii() and version.isdigit()):
-            return fail(ExitCode.USAGE, f"`{policy}` names no version of a policy", "`bridge_inspection@7`")
-        conditions = DecisionQuery(
-            vehicle, mission, skill, outcome, reason, rule, clause, policy_name or None,
-            int(version) if version else None, times[0], times[1], witness,
-        )  # fmt: skip
-        if question is not None and not question.filtered and any(value is not None for value in conditions):
-            return fail(ExitCode.USAGE, f"`{question.name}` is not about decisions, and takes no conditions on them")
-        return _ask(archive, sql if question is None else question.sql, conditions, limit, shape)
-
-    return _answered(work)
+    shape = _shape(as_json, as_csv)
+    if sql is None and name is None:
+        found = service.questions()
+        if isinstance(found, Refusal):
+            return refuse(found)
+        tell(("question", "tells"), [(each.name, each.tells) for each in found], shape)
+        return ExitCode.OK
+    conditions = {
+        "vehicle": vehicle, "mission": mission, "skill": skill, "outcome": outcome, "reason": reason, "rule": rule,
+        "clause": clause, "policy": policy, "since": since, "until": until, "witness": witness,
+    }  # fmt: skip
+    asked = ArchiveQuery(archive, conditions, name, sql, limit)
+    question = service.question_of(asked) if show_sql else None
+    if isinstance(question, Refusal):
+        return refuse(question)
+    if question is not None:
+        out_rendered(question.sql)
+        return ExitCode.OK
+    return _told(service.ask(asked), shape)
 
 
 @app.command()
 def stats(archive: Archive = _DEFAULT, as_json: Json = False, as_csv: Csv = False) -> ExitCode:
     """Count what an archive holds."""
-
-    def work() -> ExitCode:
-        from rtshcua.adapters.archive.asking import STATS
-
-        return _ask(archive, STATS, None, None, _shape(as_json, as_csv))
-
-    return _answered(work)
+    return _told(service.statistics(archive), _shape(as_json, as_csv))
 
 
-def _ask(where: Path, sql: str | None, conditions: object, limit: int | None, shape: Shape) -> ExitCode:
-    from rtshcua.adapters.archive.asking import ArchiveReader, DecisionQuery
-    from rtshcua.adapters.archive.folder import ArchiveFolder
-
-    asker = ArchiveReader(ArchiveFolder(where), conditions if isinstance(conditions, DecisionQuery) else None)
-    try:
-        answer = asker.ask(sql or "", limit)
-    finally:
-        asker.close()
+def _told(answer: "QueryRows | Refusal", shape: Shape) -> ExitCode:
+    if isinstance(answer, Refusal):
+        return refuse(answer)
     tell(answer.columns, answer.rows, shape)
     return ExitCode.OK
 
 
+def _shown(result: ArchiveResult | Refusal, *, as_json: bool) -> ExitCode:
+    if isinstance(result, Refusal):
+        return refuse(result)
+    tell_result(result, as_json=as_json)
+    return result.code()
+
+
+def _progress(count: int) -> None:
+    if sys.stderr is not None and sys.stderr.isatty():
+        sys.stderr.write(f"\r\033[K{count} logs" if count else "\r\033[K")
+        sys.stderr.flush()
+
+
 def _shape(as_json: bool, as_csv: bool) -> Shape:
     return Shape.JSON if as_json else Shape.CSV if as_csv else Shape.TABLE
-
-
-def _answered(work: Callable[[], ExitCode]) -> ExitCode:
-    """What `work` says, or what stands in its way: a package, an archive that is none, a question without sense."""
-    try:
-        return with_extra(work)
-    except Untrusted as error:
-        if error.slug not in _INPUT:
-            return distrust(error)
-        return fail(ExitCode.INPUT, str(error), _HELPS.get(error.slug), slug=error.slug)

@@ -3,13 +3,15 @@
 import csv
 import json
 import sys
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
-from rtshcua.app.logs import finding_code
-from rtshcua.app.wording import shorten, utc
+from msgspec import to_builtins
+
+from rtshcua.app.log_archive import ArchiveResult
+from rtshcua.app.wording import many, shorten, utc
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.width import columns
 
@@ -20,6 +22,7 @@ _NAMES = frozenset({"log", "one", "other", "before", "last_leaf", "missing_leaf"
 _WHOLE = frozenset({"tells"})
 _NAME_SHOWN = 16  # digits of a digest
 _CELL = 48
+_TOLD = 20  # logs that are told of one by one
 
 
 class Shape(StrEnum):
@@ -65,13 +68,56 @@ def _cell(name: str, value: object) -> str:
     return text if name in _WHOLE else shorten(text, _CELL)
 
 
-def code_of(status: str, finding: str | None) -> ExitCode:
-    """The exit code for a log, as `rtshcua verify-log` has it."""
-    if status != "failed":
-        return ExitCode.OK if status == "verified" else ExitCode.INCOMPLETE
-    return finding_code(finding or "")
-
-
 def counted(counts: Mapping[str, int]) -> str:
     """Counts of logs in one line."""
     return ", ".join(f"{count} {name}" for name, count in counts.items() if count) or "none"
+
+
+def tell_result(result: ArchiveResult, *, as_json: bool) -> None:
+    """Prints what became of the logs that were added or verified."""
+    counts = Counter(each.entry.status for each in result.done)
+    if as_json:
+        out_json(json.dumps(_object(result, counts), ensure_ascii=False))
+    else:
+        _text(result, counts)
+
+
+def _object(result: ArchiveResult, counts: Mapping[str, int]) -> dict[str, object]:
+    return {
+        "archive": str(result.folder),
+        "exit_code": int(result.code()),
+        "pinned": {"key": result.pinned.key.hex(), "source": result.pinned.source},
+        "counts": dict(counts),
+        "known": sum(each.known for each in result.done),
+        "skipped": [{"path": str(each.path), "why": each.why} for each in result.skipped],
+        "logs": [{"path": str(e.path), "known": e.known, **to_builtins(e.entry)} for e in result.done],
+        "other_roots": result.others,
+        "missing": [dict(zip(result.missing.columns, row, strict=True)) for row in result.missing.rows],
+        "conflicts": [dict(zip(result.conflicts.columns, row, strict=True)) for row in result.conflicts.rows],
+    }
+
+
+def _text(result: ArchiveResult, counts: Mapping[str, int]) -> None:
+    for left in result.skipped[:_TOLD]:
+        out(f"skipped     {visible(str(left.path))}: {left.why}")
+    if len(result.skipped) > _TOLD:
+        out(f"... and {len(result.skipped) - _TOLD} more that are no logs")
+    wrong = [each for each in result.done if each.entry.status != "verified"]
+    for each in wrong[:_TOLD]:
+        what = f"{each.entry.finding}, {visible(each.entry.finding_text or '')}"
+        out(f"{each.entry.status:<10}  {visible(str(each.path))}: {what}")
+    if len(wrong) > _TOLD:
+        out(f"... and {len(wrong) - _TOLD} more: `rtshcua archive query findings`")
+    new = sum(not each.known for each in result.done)
+    source = visible(result.pinned.source)
+    out(f"{many(len(result.done), 'log')}, {new} of them verified now, under {source}: {counted(counts)}")
+    if result.others:
+        rest = "rests on another root" if result.others == 1 else "rest on other roots"
+        out(f"{many(result.others, 'log')} in the archive {rest}: `--root` takes the one that they were verified under")
+    if result.missing.rows:
+        out(f"missing: logs before {len(result.missing.rows)} of these: `rtshcua archive query missing`")
+    for one, other, seq in result.pairs[:_TOLD]:
+        two = f"`{visible(result.names[one])}` and `{visible(result.names[other])}`"
+        out(f"conflict: {two} were signed differently at record {seq}")
+    if result.pairs:
+        out(f"conflict: {many(len(result.pairs), 'pair')} of logs, told by `rtshcua archive query conflicts`")

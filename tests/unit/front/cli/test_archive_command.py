@@ -17,6 +17,7 @@ import pytest
 from reference import generated_logs
 from reference.archived import write_fleet
 from rtshcua.adapters.store.logs import begins_as_log
+from rtshcua.app.log_archive import code_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.front.cli.render import archive_tables
@@ -258,7 +259,7 @@ def test_without_the_extra_it_says_which(
     words: tuple[str, ...], runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in [*sys.modules]:
-        if name.startswith(("rtshcua.adapters.archive", "rtshcua.front.cli.archiving.checking")):
+        if name.startswith("rtshcua.adapters.archive"):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "duckdb", None)
     assert archive(*words, *((runs, *ROOT) if words == ("add",) else ())) == ExitCode.INPUT
@@ -284,7 +285,7 @@ def test_without_the_extra_it_says_which(
     ],
 )
 def test_exit_codes_are_those_of_verify_log(status: str, finding: str | None, code: ExitCode) -> None:
-    assert archive_tables.code_of(status, finding) is code
+    assert code_of(status, finding) is code
 
 
 def test_text_of_the_world_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> None:
@@ -376,7 +377,7 @@ def test_a_log_that_becomes_a_link_before_it_is_copied_is_not_taken_in(
         path.symlink_to(runs / "quad-07-0" / "log.jsonl")
         return begins
 
-    monkeypatch.setattr("rtshcua.front.cli.archiving.given.begins_as_log", looked_at_and_replaced)
+    monkeypatch.setattr("rtshcua.app.log_archive.begins_as_log", looked_at_and_replaced)
     assert archive("add", "flown", *ROOT) == ExitCode.INPUT
     assert "symbolic links are not followed here: `flown/a/log.jsonl`" in capsys.readouterr().err
     assert not list(Path("archive/logs").rglob("*.jsonl"))

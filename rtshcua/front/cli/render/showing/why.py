@@ -3,10 +3,13 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from rtshcua.app.prepared_mission import Subject
+from rtshcua.app.why import AssumedCase, decide_assumed
 from rtshcua.app.wording import utc
 from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.render.showing import words
 from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.front.cli.render.showing.people import NOBODY, People
@@ -36,6 +39,23 @@ class Case(NamedTuple):
     phases: tuple[str, ...]
     aloft: bool | None = None  # whether something had been sent that may have lifted it off; None: not known
     people: People = NOBODY
+
+
+def show_assumed(page: TextPage, subject: Subject, assumed: AssumedCase) -> dict[str, object] | Refusal:
+    """Adds the decision on an assumed state to the page, with what was assumed."""
+    found = decide_assumed(subject, assumed)
+    if isinstance(found, Refusal):
+        return found
+    shown = show_why(page, found.trace, Case(found.invocation, found.state, found.context, found.now, subject.phases))
+    page.head("Assumed")
+    page.row(
+        "state",
+        "the contract's conditions hold, for long enough; the vehicle is where the plan has it; --state overrides",
+    )
+    page.row("time", f"{utc(found.now.utc_us)}, {assumed.waited_ms} ms after the release")
+    if found.roles:
+        page.row("approvals", f"{' and '.join(found.roles)}, when the step was released")
+    return shown
 
 
 def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:

@@ -4,9 +4,7 @@ from typing import NamedTuple
 
 from rtshcua.app.documents import claimed, over, recorded_replacement
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
-from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.faults import distrust, fail
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.untrusted import Untrusted
@@ -25,16 +23,17 @@ class Subject(NamedTuple):
         return self.mission.phases
 
 
-def unpacked(data: bytes, name: str) -> Subject | ExitCode:
-    """What a bundle is about; an exit code where it is none, which was told."""
+def unpacked(data: bytes, name: str) -> Subject | Refusal:
+    """What a bundle is about; a refusal where it is no bundle."""
     try:
         bundle = claimed(data)
     except Untrusted as error:
-        return distrust(error, "accepted: a source (.rts, .json), a bundle, a log or a run's folder", where=f"{name}: ")
+        help = "accepted: a source (.rts, .json), a bundle, a log or a run's folder"
+        return Refusal(error.slug, f"{name}: {error}", help)
     return prepared(bundle.policy, bundle.mission)
 
 
-def prepared(policy: Policy, mission: Mission) -> Subject | ExitCode:
+def prepared(policy: Policy, mission: Mission) -> Subject | Refusal:
     """A policy and a mission, made ready as on board."""
     ready = prepare(policy)
     if isinstance(ready, Refusal):
@@ -42,25 +41,25 @@ def prepared(policy: Policy, mission: Mission) -> Subject | ExitCode:
     return _under(ready, mission)
 
 
-def _under(ready: PreparedPolicy, mission: Mission) -> Subject | ExitCode:
+def _under(ready: PreparedPolicy, mission: Mission) -> Subject | Refusal:
     invocations = prepare_mission(mission, ready)
     return _refused(invocations) if isinstance(invocations, Refusal) else Subject(ready, mission, invocations)
 
 
-def _refused(refusal: Refusal) -> ExitCode:
-    return fail(ExitCode.INPUT, f"this would be refused on board: {refusal.text}")
+def _refused(refusal: Refusal) -> Refusal:
+    return Refusal("input", f"this would be refused on board: {refusal.text}")
 
 
-def after(subject: Subject, detail: str) -> Subject | ExitCode:
+def after(subject: Subject, detail: str) -> Subject | Refusal:
     """The mission after a recorded replacement. The steps that stay are those that were made ready first, as on board:
     they may mean something in phases that the new mission does not have.
     """
     try:
         said = recorded_replacement(detail)
     except Untrusted as error:
-        return fail(ExitCode.INPUT, f"a replacement in the log: {error}")
+        return Refusal("input", f"a replacement in the log: {error}")
     newer = _under(subject.policy, said.mission)
-    if isinstance(newer, ExitCode):
+    if isinstance(newer, Refusal):
         return newer
     steps = (*subject.invocations[: said.kept], *newer.invocations[said.kept :])
     return Subject(subject.policy, over(said, subject.mission), steps)

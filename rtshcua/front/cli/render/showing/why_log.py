@@ -1,0 +1,90 @@
+"""`rtshcua why` on a log: a decision, or what happened, and what ended the flight, on a page."""
+
+from pathlib import Path
+
+from rtshcua.app.logged_decision import LoggedDecision, RecordLine, StepExplained, explained, read_decision
+from rtshcua.app.wording import utc
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evidence.records import Close, DecisionRecord, Effect, Genesis, Recover, Seal
+from rtshcua.front.cli.render.showing.link import show_link
+from rtshcua.front.cli.render.showing.log import Names
+from rtshcua.front.cli.render.showing.page import TextPage
+from rtshcua.front.cli.render.showing.people import People
+from rtshcua.front.cli.render.showing.why import Case, show_why
+
+_MOST = 20  # what is told of how it ended, in records
+
+
+def from_log(page: TextPage, path: Path, number: int | None) -> dict[str, object] | Refusal:
+    """Adds the record asked for to the page, and what ended the flight. Raises OSError."""
+    people = People()
+
+    def words(genesis: Genesis) -> Names:
+        nonlocal people
+        names = Names.of(genesis)
+        people = names.people
+        return names
+
+    log = read_decision(path, number, words)
+    if isinstance(log, Refusal):
+        return log
+    chosen = log.chosen
+    assert chosen is not None
+    cause = log.cause
+    if cause is not None and cause.seq != chosen.seq:
+        _list(page, "The cause: why it ended early", [cause], log.start_us)
+        denied = isinstance(chosen, DecisionRecord) and chosen.outcome != "allow"
+        page.head(f"Before that, the last decision on a step{' that was not `allow`' if denied else ''}")
+    page.text(f"record {chosen.seq} of {path}, {utc(chosen.utc_us)} (not verified)", indent=0)
+    shown = _decision(page, chosen, log, people) if isinstance(chosen, DecisionRecord) else _effect(page, chosen, log)
+    if isinstance(shown, Refusal):
+        return shown
+    allowed = [] if log.allowed is None else [log.allowed]
+    _list(page, "After it, the same step was allowed", allowed, log.start_us)
+    answers = [told for step, told in log.answers if isinstance(chosen, DecisionRecord) and step == chosen.step]
+    _list(page, "What was answered about this step", answers, log.start_us)
+    _list(page, "When the computer stood still: nothing was read, judged or sent", log.stalls, log.start_us)
+    _list(
+        page,
+        "How it ended: what ended the mission early, if anything, and the decisions after it",
+        log.ended[-_MOST:],
+        log.start_us,
+    )
+    return shown | {
+        "record": chosen.seq,
+        "cause": None if cause is None else cause._asdict(),
+        "allowed": None if log.allowed is None else log.allowed._asdict(),
+        "answers": [told._asdict() for told in answers],
+        "stalls": [told._asdict() for told in log.stalls],
+        "ended": [told._asdict() for told in log.ended],
+    }
+
+
+def _decision(
+    page: TextPage, chosen: DecisionRecord, log: LoggedDecision, people: People
+) -> dict[str, object] | Refusal:
+    subject = log.subject
+    assert subject is not None
+    found = explained(chosen, subject)
+    if isinstance(found, Refusal):
+        return found
+    if isinstance(found, StepExplained):
+        case = Case(found.invocation, found.state, found.context, found.now, subject.phases, log.aloft, people)
+        return show_why(page, found.trace, case)
+    return show_link(page, chosen, found.trace, found.of, subject.policy.policy)
+
+
+def _effect(page: TextPage, chosen: Effect | Close | Recover | Seal, log: LoggedDecision) -> dict[str, object]:
+    event = chosen.event if isinstance(chosen, Effect) else chosen.type
+    detail = chosen.detail if isinstance(chosen, Effect) else chosen.ending if isinstance(chosen, Close) else ""
+    page.head(f"{event}: something that happened, not a decision")
+    page.row("says", log.what.strip())
+    return {"kind": "why", "event": event, "detail": detail}
+
+
+def _list(page: TextPage, title: str, told: list[RecordLine], start_us: int) -> None:
+    if not told:
+        return
+    page.head(title)
+    for each in told:
+        page.text(f"{each.seq:>5} {(each.at_us - start_us) / 1_000_000:>10.3f} s  {each.what}")

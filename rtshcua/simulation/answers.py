@@ -1,7 +1,7 @@
-"""How long an autopilot takes until it gets to what it was sent: drawn from what was recorded of the real ones.
+"""The delay until an autopilot handles a message, drawn from recordings of real autopilots.
 
-From a command of ours, or a parameter that was asked for, to its answer, by the clock of who recorded it: 217 of them
-are in `tests/traces`. `docs/flying/simulated-vehicle.md` has the figures.
+The recordings in `tests/traces` hold 217 delays from a command or parameter request to its answer, by the recorder's
+clock. `docs/flying/simulated-vehicle.md` has the figures.
 """
 
 from bisect import bisect_right
@@ -15,14 +15,14 @@ from rtshcua.codec.frames import ReceivedFrame
 
 
 class Delays:
-    """A distribution of delays, from the shortest to the longest: (part of them in %, microseconds), linear between."""
+    """A cumulative distribution of delays: points (percent, microseconds), linear between them."""
 
     def __init__(self, *shape: tuple[int, int]) -> None:
         self._parts = [part for part, _ in shape]
         self._times = [time_us for _, time_us in shape]
 
     def draw(self, chance: Random) -> int:
-        """One of them."""
+        """Draw one delay, in microseconds."""
         at = chance.random() * 100
         above = bisect_right(self._parts, at)
         low, high = self._parts[above - 1], self._parts[above]
@@ -32,26 +32,26 @@ class Delays:
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """The parts of an autopilot that answer, each in order and at its own pace, so that one overtakes another."""
+    """The parts of an autopilot that answer. Each answers in order; one part may overtake another."""
 
     of: Callable[[ReceivedFrame], int]
-    """Which part a message is for."""
+    """The index of the part that handles a message."""
     delays: Sequence[Delays]
-    """How long each takes."""
+    """The delay distribution of each part."""
 
 
 class Inbox:
-    """What was sent to an autopilot and waits for it to get to it. Chance decides, from a seeded source."""
+    """Messages that wait for the autopilot to handle them. Delays come from a seeded random source."""
 
     def __init__(self, lanes: Lanes, chance: Random) -> None:
         self._lanes = lanes
         self._chance = chance
         self._waiting: list[deque[tuple[int, ReceivedFrame]]] = [deque() for _ in lanes.delays]
         self.next_us: int | None = None
-        """When the autopilot gets to the next one; None while nothing waits."""
+        """When the autopilot handles the next message; None while no message waits."""
 
     def put(self, received: ReceivedFrame, now_us: int) -> None:
-        """A message has come."""
+        """Queue a message that has arrived."""
         number = self._lanes.of(received)
         lane = self._waiting[number]
         at_us = now_us + self._lanes.delays[number].draw(self._chance)
@@ -59,7 +59,7 @@ class Inbox:
         self._look()
 
     def due(self, now_us: int) -> Iterator[tuple[int, ReceivedFrame]]:
-        """What the autopilot has got to by now, and when."""
+        """Return the messages that the autopilot has handled by now, each with its time."""
         if self.next_us is None or self.next_us > now_us:
             return iter(())
         ready: list[tuple[int, ReceivedFrame]] = []
@@ -70,7 +70,7 @@ class Inbox:
         return iter(sorted(ready, key=itemgetter(0)))
 
     def clear(self) -> None:
-        """Forgets all that waits."""
+        """Drop all waiting messages."""
         for lane in self._waiting:
             lane.clear()
         self.next_us = None

@@ -1,4 +1,4 @@
-"""The autopilot: vehicle, battery, sensors, air and settings in one place, and what a flavour makes of them."""
+"""The autopilot: vehicle, battery, sensors, air and settings, and the interface of its flavours."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -37,40 +37,40 @@ from rtshcua.simulation.vehicle import Landed, Multirotor, VehicleEvent
 TICK_US = 20_000
 _TICK_S = TICK_US / 1_000_000
 _RIPPLE = 0.01
-"""m/s by which an estimate of the wind goes up and down."""
+"""Amplitude of the variation of the wind estimate, m/s."""
 LOW_TO_ARM = 0.08
-"""The battery level at which it does not arm any more."""
+"""The battery level below which arming is refused."""
 OFF_US = 1_500_000
-"""How long an autopilot that starts again says nothing: the first frame comes one to two seconds later (recorded)."""
+"""Silence after a restart: the first frame comes one to two seconds later (recorded)."""
 _REMIND_FIRST_US, _REMIND_US = 1_200_000, 30_000_000
 SYSTEM_PARAMETERS = ("MAV_SYS_ID", "SYSID_THISMAV")
 """The parameters that hold the vehicle's own system id."""
 
 
 Handler = Callable[["Autopilot", VehicleCommand], tuple[int, ...]]
-"""Obeys a command or refuses it; the results (MAV_RESULT) to acknowledge with, usually one."""
+"""Obeys or refuses a command and returns the results (MAV_RESULT) to acknowledge with, usually one."""
 _FEEDS_MOTORS = frozenset({Purpose.FLIGHT, Purpose.PROPULSION})
 Builder = Callable[["Autopilot"], Message | None]
-"""A message with what the vehicle knows now; None if it knows nothing."""
+"""Builds a message from the current state; None if there is nothing to report."""
 
 
 class Speaker(Protocol):
-    """Who else sends frames under the vehicle's own ids, which a fault begins and ends (`voices.SecondVoice`)."""
+    """A second sender under the vehicle's ids, started and ended by a fault (`fault_effects.SecondSender`)."""
 
     def due(self, autopilot: "Autopilot", system: int, now_us: int) -> list[bytes]:
-        """What it sends by now, as frames."""
+        """Return the frames that are due by `now_us`."""
         ...
 
 
 class Taker(StrEnum):
-    """Who took the vehicle over from whoever flies it over the link."""
+    """Who took the vehicle over from the link."""
 
     PILOT = "pilot"
     FAILSAFE = "failsafe"
 
 
 class AutopilotStatus(NamedTuple):
-    """What an autopilot's reports tell of what it is about."""
+    """The mode, landed state and destination that an autopilot reports."""
 
     mode: FlightMode
     landed: Landed
@@ -78,119 +78,136 @@ class AutopilotStatus(NamedTuple):
 
 
 class Flavour(ABC):
-    """What PX4 and ArduCopter do differently."""
+    """The behaviour in which PX4 and ArduCopter differ."""
 
     autopilot: int
     """HEARTBEAT.autopilot (MAV_AUTOPILOT)."""
     modes: ModeTable
     commands: Mapping[int, Handler]
     streams: Mapping[int, int]
-    """The streams that run from boot, and their intervals in microseconds."""
+    """The intervals, in microseconds, of the streams that run from boot."""
     builders: Mapping[int, Builder]
     """Every message that can be streamed or requested."""
     constant: frozenset[int] = frozenset()
-    """The messages whose interval is refused to be changed."""
+    """The messages whose interval cannot be changed."""
     only_streamed: frozenset[int] = frozenset()
-    """The messages that REQUEST_MESSAGE is refused for."""
+    """The messages that REQUEST_MESSAGE refuses."""
     least_us: Mapping[int, int] = MappingProxyType({})
-    """The shortest interval that is delivered, whatever is asked for, where there is one."""
+    """The shortest interval of a message, where the flavour has a limit."""
     handling: Handling
-    """How it flies, unless the configuration or a parameter says otherwise."""
+    """The default handling; the configuration and parameters may change it."""
     parameters: tuple[AutopilotParameter, ...]
     bytewise: bool
-    """Whether integer parameters travel as their bytes."""
+    """Whether integer parameters are encoded bytewise in the float field."""
     texts: Mapping[VehicleEvent, str]
-    """`{speed}` is the one of touching down; `{amsl}` and `{up}` are the height of a return, above the sea and home."""
+    """Status texts. `{speed}` is the touchdown speed; `{amsl}` and `{up}` the return height above sea and home."""
     boot: BootPlan
     lanes: Lanes
     failsafes: FailsafeRules
     fix: int
     """GPS_RAW_INT.fix_type of a good fix."""
     coast_s: float
-    """How long the estimator goes on without a fix."""
+    """How long the estimator continues without a fix."""
     texts_need_ground_station: bool
-    """Whether STATUSTEXT is sent only once a ground station's heartbeat was seen."""
+    """Whether STATUSTEXT is sent only after a ground station's heartbeat."""
     check_text: str
-    """How a text begins that says what stands against arming, when only asked."""
+    """The prefix of texts that answer RUN_PREARM_CHECKS."""
     falls_back: bool
-    """Whether a switch that asks for Position without a position gets Altitude, and is not refused."""
+    """Whether selecting Position without a position enters Altitude instead of being refused."""
     status_lag_us: tuple[int, int] = (0, 0)
-    """How long after it entered a mode its reports go on telling of the one before: from, to."""
+    """How long reports show the previous mode after a mode change: shortest, longest."""
     beats_on_mode: bool
-    """Whether another mode is told by a heartbeat at once."""
+    """Whether a mode change sends a heartbeat at once."""
     reminds: bool
-    """Whether it says again and again, while disarmed, why it would not arm."""
+    """Whether it repeats failed arming checks while disarmed."""
     names_batteries: bool
-    """Whether BATTERY_STATUS says what a battery feeds, and of which type it is."""
+    """Whether BATTERY_STATUS has the function and type of a battery."""
     transfer: TransferRules
     missions: MissionRules
     fence: FenceRules
     key_ahead_us: int = 0
-    """How far ahead of the time that came with a key its time stamps begin."""
+    """How far its time stamps begin ahead of the time that came with the key."""
     target_timeout_us: int | None = None
-    """In GUIDED, how long one position target is good for; then LOITER."""
+    """How long a position target is valid in GUIDED; then the mode is LOITER. None: without limit."""
     tells_fence: bool
     """Whether SYS_STATUS has the geofence: always present, enabled if in force, healthy unless breached (recorded)."""
 
     @abstractmethod
     def arming(self, a: "Autopilot") -> tuple[str, ...]:
-        """What stands against arming, the mode apart; nothing if it would arm."""
+        """Return the failed arming checks, apart from the mode; empty if it would arm."""
 
     @abstractmethod
     def release(self, *, keyed: bool) -> tuple[int, int]:
-        """Which release it is where none is chosen; `keyed`: it has a key from the start."""
+        """Return the default release; `keyed`: it has a signing key from the start."""
 
     @abstractmethod
     def obeys_unsigned(self, a: "Autopilot", name: str) -> bool:
-        """Whether, with a key, a message of this name is obeyed without a right signature."""
+        """Return whether a message of this name is obeyed without a valid signature although a key is set."""
 
     @abstractmethod
     def on_set_mode(self, a: "Autopilot", number: int) -> tuple[int, ...]:
-        """Obeys a SET_MODE message with this `custom_mode`; the results to acknowledge with."""
+        """Handle SET_MODE with this `custom_mode`; return the results to acknowledge with."""
 
     @abstractmethod
     def on_position_target(self, a: "Autopilot", message: Message) -> None:
-        """Obeys SET_POSITION_TARGET_GLOBAL_INT, or does not; there is no answer."""
+        """Handle SET_POSITION_TARGET_GLOBAL_INT; there is no answer."""
 
     @abstractmethod
     def on_setup_signing(self, a: "Autopilot", message: Message) -> None:
-        """Obeys SETUP_SIGNING, refuses it, or does not know it; there is no answer."""
+        """Handle SETUP_SIGNING; there is no answer."""
 
     @abstractmethod
     def on_breach(self, a: "Autopilot", breach: Breach) -> None:
-        """Does what the fence's action asks for when a breach begins."""
+        """Take the fence's action when a breach begins."""
 
     @abstractmethod
     def on_sticks(self, a: "Autopilot", for_us: int) -> None:
-        """Obeys sticks that steer it east for so many microseconds, or does not mind."""
+        """Handle sticks that steer it east for so many microseconds."""
 
-    # What follows is nothing unless a flavour does something then.
+    # The hooks below do nothing unless a flavour overrides them.
 
     def home_item(self, home: HomePosition) -> PlanItem | None:
-        """What slot 0 of every mission is, where the flavour keeps it for home."""
+        """Return the item in slot 0 of every mission, if the flavour reserves it for home."""
         return None
 
     def on_data_stream(self, a: "Autopilot", stream: int, rate_hz: int) -> None:  # noqa: B027
-        """Obeys REQUEST_DATA_STREAM: (stream, rate in Hz, 0 to stop). PX4 does not know it; its streams run unasked."""
+        """Handle REQUEST_DATA_STREAM (rate in Hz, 0 to stop). PX4 ignores it: its streams run by default."""
 
     def on_local_target(self, a: "Autopilot", message: Message) -> None:  # noqa: B027
-        """Obeys SET_POSITION_TARGET_LOCAL_NED, or does not; PX4, in OFFBOARD only, is not simulated to."""
+        """Handle SET_POSITION_TARGET_LOCAL_NED. PX4, which obeys it in OFFBOARD only, is not simulated to."""
 
     def on_entered(self, a: "Autopilot") -> None:  # noqa: B027
-        """Another mode than before, whoever chose it."""
+        """React to a mode change."""
 
     def on_plan(self, a: "Autopilot", kind: int) -> None:  # noqa: B027
-        """Tells of a plan of this kind (MAV_MISSION_TYPE) that was stored."""
+        """React to a stored plan of this kind (MAV_MISSION_TYPE)."""
 
     def on_mode_in_breach(self, a: "Autopilot") -> None:  # noqa: B027
-        """Another mode while the fence is breached."""
+        """React to a mode change while the fence is breached."""
 
     def on_breach_cleared(self, a: "Autopilot") -> None:  # noqa: B027
-        """The vehicle is inside again."""
+        """React to the end of a breach."""
+
+
+def _sensors(flavour: Flavour, config: SimulationConfig) -> Sensors:
+    pace = flavour.boot.all_s / FAST_S if config.boot is Boot.FAST else 1.0
+    real = config.estimate is Estimate.REAL
+    return Sensors(
+        Random(f"{config.seed} sensors"), config.noise, flavour.coast_s, flavour.boot, pace,
+        late=real, strays=config.noise and real,
+    )  # fmt: skip
+
+
+def _handling(flavour: Flavour, config: SimulationConfig) -> Handling:
+    return replace(
+        flavour.handling, cruise=config.cruise_mm_s / 1000, max_speed=config.max_speed_mm_s / 1000,
+        return_up=config.return_mm / 1000,
+        land_speed=flavour.handling.land_speed if config.land_mm_s is None else config.land_mm_s / 1000,
+    )  # fmt: skip
 
 
 class Autopilot:
-    """One simulated vehicle. `tick` lets time pass; the face hands it messages and collects what it has to say."""
+    """One simulated autopilot. `tick` advances time; `Face` passes messages in and collects messages out."""
 
     def __init__(self, flavour: Flavour, config: SimulationConfig) -> None:
         self.flavour = flavour
@@ -202,22 +219,22 @@ class Autopilot:
         self.speed = config.speed
         self.now_us = 0
         self.since_us = 0
-        """How long ago the last tick was: messages come and are answered between ticks."""
+        """Time since the last tick: messages arrive and are answered between ticks."""
         self.off_us = 0
-        """How long it goes on saying nothing, for it starts again."""
+        """Remaining silence of a restart."""
         self.taker: Taker | None = None
-        """Who first took the vehicle over in flight, if somebody did."""
+        """Who first took the vehicle over in flight, if anyone."""
         self.voices: list[Speaker] = []
-        """Who else speaks under its ids."""
+        """Other senders under its ids."""
         self.extras = config.extras
         self.link_quality = 10_000
-        """What the radio tells of the link, in 1/10000."""
+        """The link quality that the radio reports, in 1/10000."""
         self.outbox: list[Message] = []
         self.air = Air(config.wind, Random(f"{config.seed} wind"))
         self.looked_down = False
-        """Whether the last DISTANCE_SENSOR was of the range finder that looks down, of two."""
+        """Whether the last DISTANCE_SENSOR was from the downward range finder."""
         self.battery = Battery(config.battery / 10_000, config.hover_us / 1_000_000)
-        #: what each battery feeds, by id, and the battery; and how often one was reported
+        #: by id: what a battery feeds, and the battery
         self.batteries = [
             (Purpose.FLIGHT, self.battery),
             *(
@@ -226,33 +243,25 @@ class Autopilot:
             ),
         ]
         self.battery_reports = 0
-        #: of each by id: how often it is reported at the most, and when it was last
+        #: by id: the shortest report interval, and the time of the last report
         self.battery_every_us = [0, *(other.every_us for other in config.other_batteries)]
         self.battery_told_us: dict[int, int] = {}
         self.gauge_rise = config.gauge_rise
-        """Percent more that are told in one report of five."""
+        """Percent by which every fifth report overstates the charge."""
         self._fast = config.boot is Boot.FAST
-        pace = flavour.boot.all_s / FAST_S if self._fast else 1.0
-        self.sensors = Sensors(
-            Random(f"{config.seed} sensors"), config.noise, flavour.coast_s, flavour.boot, pace,
-            late=config.estimate is Estimate.REAL, strays=config.noise and config.estimate is Estimate.REAL,
-        )  # fmt: skip
+        self.sensors = _sensors(flavour, config)
         self._phases = Random(f"{config.seed} phases") if config.answers is Answers.RECORDED else None
         self._lags = Random(f"{config.seed} lags") if config.answers is Answers.RECORDED else None
         self._lag_us = flavour.status_lag_us if config.mode_lag_us is None else (config.mode_lag_us,) * 2
         self.surroundings = Surroundings()
-        handling = replace(
-            flavour.handling, cruise=config.cruise_mm_s / 1000, max_speed=config.max_speed_mm_s / 1000,
-            return_up=config.return_mm / 1000,
-            land_speed=flavour.handling.land_speed if config.land_mm_s is None else config.land_mm_s / 1000,
-        )  # fmt: skip
+        handling = _handling(flavour, config)
         self.vehicle = Multirotor(handling, flavour.modes.start)
         self.vehicle.ceiling = inf if config.ceiling_mm is None else config.ceiling_mm / 1000
         self.parameters = Parameters(flavour.parameters, handling, flavour.bytewise)
         for name in SYSTEM_PARAMETERS:
             self.parameters.assign(name, config.system)
         if config.signing_key is not None:
-            self.parameters.assign("MAV_SIGN_CFG", 1)  # unless its owner says otherwise
+            self.parameters.assign("MAV_SIGN_CFG", 1)  # the owner's parameters below may override it
         for name, value in config.parameters:
             self.parameters.own(name, value)
         self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()}, self._time)
@@ -264,12 +273,12 @@ class Autopilot:
         self._start()
 
     def _start(self) -> None:
-        """What begins anew with each start. What outlives one is in `__init__`: all that is stored, and the world."""
+        """Initialise the state that each restart resets. Stored state and the world are in `__init__`."""
         flavour = self.flavour
         self.ground_station_seen = False
         self._wind: tuple[float, float] | None = None
         self.last_target_us: int | None = None
-        #: what a DO_REPOSITION named that changes no mode, and until when whoever enters Hold flies to it (PX4)
+        #: a DO_REPOSITION without a mode change, and until when entering Hold flies to it (PX4)
         self.kept: tuple[int, VehicleCommand] | None = None
         self._boot_texts = deque(() if self._fast else flavour.boot.texts)
         self.failsafes = Failsafes(
@@ -284,13 +293,13 @@ class Autopilot:
         self.transfer = Transfer(flavour.transfer, self.plans, self.send, self._stored, self._may_clear)
         self.plans.listeners.append(partial(flavour.on_plan, self))
         self._mode_in_breach = self.vehicle.mode
-        #: when it acts on what made it hold, and how; nothing if somebody enters another mode before
+        #: time and mode of a delayed failsafe; cancelled if another mode is entered before
         self.delayed: tuple[int, FlightMode] | None = None
         self._told_mode = self.vehicle.mode
         self._status = self._present
         self._published: deque[tuple[int, AutopilotStatus]] = (
             deque()
-        )  # until when its reports still tell of what was so
+        )  # previous states, each with the time until which reports show it
         self._told_danger = False
         self._remind_us = _REMIND_US
         self._text_id = 0
@@ -298,7 +307,7 @@ class Autopilot:
     # ----------------------------------------------------------------------------------------------- time
 
     def tick(self) -> None:
-        """Lets `TICK_US` pass."""
+        """Advance by `TICK_US`."""
         if self.off_us:
             self._stay_off()
             return
@@ -335,9 +344,9 @@ class Autopilot:
             self.say(severity, text.format(amsl=self.home.amsl_mm // 1000))
 
     def reboot(self) -> None:
-        """Starts again: the motors stop, it says nothing for a while, then it comes up with its clock at 0.
+        """Restart: the motors stop, it is silent for a while, then it boots with its clock at 0.
 
-        Asked-for streams, modes and targets are forgotten; parameters, plans and keys are stored, and stay.
+        Requested streams, modes and targets are lost; parameters, plans and keys persist.
         """
         self.off_us = OFF_US
         self.vehicle.restart(self.flavour.modes.start)
@@ -352,7 +361,7 @@ class Autopilot:
                 battery.drain(_TICK_S, load)
 
     def _stay_off(self) -> None:
-        """Lets `TICK_US` pass for the vehicle alone: in the air it falls."""
+        """Advance only the vehicle by `TICK_US`: in the air it falls."""
         self.air.step(_TICK_S)
         load = self.vehicle.step(_TICK_S, (self.air.north, self.air.east), self.sensors.error, powered=False)
         self._drain(load)
@@ -370,12 +379,12 @@ class Autopilot:
             self.outbox.clear()
 
     def _pass_away(self, time_us: int) -> None:
-        """The time of day goes on without the autopilot's clock."""
+        """Advance the time of day while the autopilot is off."""
         self.utc_us += time_us
         self.signing.restart(time_us)
 
     def _tell(self) -> None:
-        """What happened, and another mode."""
+        """Send texts for events, and report a mode change."""
         vehicle, flavour = self.vehicle, self.flavour
         if vehicle.events:
             for event in vehicle.events:
@@ -388,7 +397,7 @@ class Autopilot:
             self.tell_mode()
 
     def _remind(self) -> None:
-        """What stands against arming, once in a while."""
+        """Repeat failed arming checks from time to time."""
         if self.vehicle.armed:
             self._remind_us = self.now_us + _REMIND_FIRST_US
         elif self.now_us >= self._remind_us:
@@ -398,13 +407,13 @@ class Autopilot:
                     self.say(mavlink.MAV_SEVERITY_CRITICAL, f"PreArm: {reason}")
 
     def tell_mode(self) -> None:
-        """A heartbeat, if the mode is another one than was told, and the flavour tells at once."""
+        """Send a heartbeat if the mode changed and the flavour reports that at once."""
         if self.flavour.beats_on_mode and self.vehicle.mode is not self._told_mode:
             self.send(self.reports.message(mavlink.MAVLINK_MSG_ID_HEARTBEAT))
         self._told_mode = self.vehicle.mode
 
     def _follow_plans(self) -> None:
-        """The mission, the fence and the transfers go on."""
+        """Advance the mission, the fence and the plan transfers."""
         fence, now_us = self.fence, self.now_us
         self.transfer.step(now_us)
         self.mission.step(now_us)
@@ -413,7 +422,7 @@ class Autopilot:
             self._keep_to_fence()
 
     def _keep_to_fence(self) -> None:
-        """What a breach brings, and another mode in one."""
+        """Check the fence and react to breaches."""
         vehicle, fence = self.vehicle, self.fence
         breached, mode = fence.breach is not None, vehicle.mode
         if breached and mode is not self._mode_in_breach:
@@ -438,7 +447,7 @@ class Autopilot:
         return self.here
 
     def _stored(self, kind: int) -> tuple[PlanItem, ...]:
-        """What a download shows."""
+        """Return the items that a download shows."""
         items = self.plans.items(kind)
         if kind == MISSION and items and self._home_item is not None:
             return (self._home_item, *items[1:])
@@ -448,7 +457,7 @@ class Autopilot:
         return kind != MISSION or self._home_item is None or not self.mission.running
 
     def _keep_targets(self) -> None:
-        """Leaves GUIDED when position targets stop coming, where the flavour does."""
+        """Leave GUIDED when position targets stop, if the flavour does."""
         vehicle, last, timeout_us = self.vehicle, self.last_target_us, self.flavour.target_timeout_us
         if timeout_us is None or not vehicle.in_air or not vehicle.armed:
             return
@@ -458,7 +467,7 @@ class Autopilot:
     # ------------------------------------------------------------------------------------------- taken over
 
     def take_over(self, taker: Taker, act: Callable[[], object]) -> None:
-        """Somebody acts who does not fly it over the link: it is taken over if it is armed and obeys."""
+        """Perform an action from outside the link; it is a takeover if the vehicle is armed and obeys."""
         vehicle = self.vehicle
         armed, before = vehicle.armed, vehicle.orders
         act()
@@ -466,7 +475,7 @@ class Autopilot:
             self.taker = taker
 
     def _fail_over(self, mode: FlightMode) -> None:
-        """It enters another mode by itself."""
+        """Enter another mode as a failsafe."""
         self.take_over(Taker.FAILSAFE, partial(self.vehicle.set_mode, mode))
 
     # ---------------------------------------------------------------------------------------------- state
@@ -477,7 +486,7 @@ class Autopilot:
         return AutopilotStatus(vehicle.mode, vehicle.landed, vehicle.destination)
 
     def follow_mode(self) -> None:
-        """Notices another mode: what it is in shows in its reports some time after it entered it, as recorded."""
+        """Register a mode change; reports show it after a recorded lag."""
         vehicle, before = self.vehicle, self._status
         if vehicle.mode is not before.mode:
             shortest_us, longest_us = self._lag_us
@@ -491,41 +500,41 @@ class Autopilot:
 
     @property
     def shown(self) -> AutopilotStatus:
-        """What its reports tell now."""
+        """The status that its reports show now."""
         published, now_us = self._published, self.now_us + self.since_us
         while published and now_us >= published[0][0]:
             published.popleft()
         return published[0][1] if published else self._present
 
     def tells_danger(self, danger: bool) -> bool:
-        """Whether its state is told to be critical: with the mode that it is in, and as late."""
+        """Return whether its state is reported as critical, with the same lag as the mode."""
         if self.shown.mode is self.vehicle.mode:
             self._told_danger = danger
         return self._told_danger
 
     @property
     def ready(self) -> bool:
-        """Whether nothing stands against arming but the mode."""
+        """Whether all arming checks pass, apart from the mode."""
         return not self.flavour.arming(self)
 
     def can_enter(self, mode: FlightMode) -> bool:
-        """Whether the mode may be entered now, if the flavour has it."""
+        """Return whether the mode exists and can be entered now."""
         if mode not in self.flavour.modes.numbers or (mode is FlightMode.MISSION and not self.mission.may_enter()):
             return False
         return mode not in NEEDS_POSITION or self.sensors.has_position
 
     @property
     def here(self) -> Point:
-        """Where the vehicle believes to be, noise apart."""
+        """The estimated position, without noise."""
         body, (north, east) = self.vehicle.body, self.sensors.error
         return Point(body.north + north, body.east + east, body.up)
 
     @property
     def wind(self) -> tuple[float, float] | None:
-        """The last estimate of the wind, to the north and to the east in m/s; None where there is none yet.
+        """The last wind estimate, north and east in m/s; None before the first flight.
 
-        It is made of what the air does to the body that flies: there is none before a flight, and after one the last
-        stays (section 5 of vehicles.md). An estimate is never twice the same.
+        The estimate comes from drag in flight; after a flight the last one stays (section 5 of vehicles.md). Estimates
+        always differ.
         """
         if Equipment.WIND in self.extras and self.vehicle.in_air and self.sensors.locates:
             ripple = _RIPPLE * sin(self.now_us / 1_000_000)
@@ -543,12 +552,12 @@ class Autopilot:
     # ------------------------------------------------------------------------------------------- speaking
 
     def send(self, message: Message | None) -> None:
-        """Queues a message for the link."""
+        """Queue a message for the link."""
         if message is not None and not self.reports.is_silent(message.get_msgId()):
             self.outbox.append(message)
 
     def say(self, severity: int, text: str) -> None:
-        """Queues STATUSTEXT, in chunks if the text is long (MAVLink 2, `id` and `chunk_seq`)."""
+        """Queue a STATUSTEXT, in chunks if the text is long (MAVLink 2, `id` and `chunk_seq`)."""
         if self.flavour.texts_need_ground_station and not self.ground_station_seen:
             return
         chunks = [text[at : at + TEXT_OCTETS] for at in range(0, len(text), TEXT_OCTETS)]

@@ -1,4 +1,4 @@
-"""The battery: drained by the power that flight takes. Four cells in series; its level never rises by itself."""
+"""The battery model: four cells in series, drained by the power of flight."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -9,33 +9,33 @@ _CELLS = 4
 _CELL_MV = ((0.0, 3200), (0.1, 3500), (0.5, 3800), (1.0, 4200))
 """A cell at rest: level and voltage, linear between."""
 _SAG_MV = 300
-"""What hovering takes off the voltage: internal resistance, all cells together."""
+"""Voltage drop of all cells while hovering, from internal resistance."""
 
 REST = 0.002
-"""The load while disarmed, as a part of what hovering takes."""
+"""The load while disarmed, relative to hovering."""
 IDLE = 0.05
 """The load while the motors turn on the ground."""
 
 FAILED_CELL_SAG = 3.0
-"""How many times as much a cell that failed gives way under load: its resistance has risen."""
+"""Factor on the voltage drop of a failed cell under load: its resistance has risen."""
 
 _INDUCED = 0.7
-"""The part of hovering that moves air down; the rest turns the blades."""
+"""The part of hover power that accelerates air downwards; the rest overcomes blade drag."""
 _HOVER_AIR = 7.0
-"""m/s: about the speed through the air at which moving it down has become cheaper by a third."""
+"""Airspeed, m/s, at which induced power has fallen by about a third."""
 _DRAG_POWER = 1.75e-4
-"""What still air takes, by the cube of the speed: the body's drag over the power of hovering, 120 W/kg."""
+"""Power of the body's drag per cubed airspeed, relative to a hover power of 120 W/kg."""
 _CLIMB_POWER = 9.80665 / 120
-"""Lifting the weight, for each m/s."""
+"""Power of lifting the weight, per m/s of climb."""
 _LEAST = 0.3
-"""However fast it goes down, the blades turn."""
+"""The least load in flight: the blades turn however fast the vehicle descends."""
 
 
 def flight_load(airspeed: float, climb: float, thrust: float = 1.0) -> float:
-    """The power of flight, that of hovering being 1.
+    """Return the power of flight relative to hovering.
 
-    By the speed through the air (m/s): momentum theory for what carries it, which gets cheaper, and drag, which gets
-    dear; by climbing (m/s, down is negative); and by `thrust`, the weight being 1: leaning and accelerating.
+    Induced power falls with `airspeed` (m/s, momentum theory) and drag rises with it; `climb` in m/s, down negative;
+    `thrust` relative to the weight, more than 1 when leaning or accelerating.
     """
     slip = airspeed / _HOVER_AIR
     carried = _INDUCED * thrust * sqrt(thrust) / sqrt(1.0 + slip * slip)
@@ -53,14 +53,14 @@ class Battery:
     load: float = REST
     used_mah: float = 0.0
     forced_mv: int | None = None
-    """What is measured instead of the voltage, if a fault says so."""
+    """The measured voltage if a fault overrides it."""
     lost_mv: int = 0
-    """What failed cells do not give any more."""
+    """The voltage that failed cells no longer give."""
     failed: int = 0
-    """How many cells have failed."""
+    """The number of failed cells."""
 
     def drain(self, dt: float, load: float) -> None:
-        """Takes out what `load` needs for `dt` seconds."""
+        """Remove the energy that `load` needs for `dt` seconds."""
         level, taken = self.level, load * dt / self.hover_s
         if taken > level:
             taken = level
@@ -69,22 +69,22 @@ class Battery:
         self.used_mah += taken * CAPACITY_MAH
 
     def cap(self, level: float) -> None:
-        """Finds that no more than `level` is left."""
+        """Lower the level to at most `level`."""
         self.level = min(self.level, level)
 
     def fail_cell(self, drop_mv: int) -> None:
-        """A cell fails: less voltage from now on, and less again under load. The level says nothing of it."""
+        """Let a cell fail: the voltage falls, more so under load. The level does not change."""
         self.lost_mv += drop_mv
         self.failed = min(_CELLS, self.failed + 1)
 
     @property
     def percent(self) -> int:
-        """`battery_remaining` of BATTERY_STATUS: rounded down, so that it never promises what is not there."""
+        """`battery_remaining` of BATTERY_STATUS, rounded down so that it never overstates the charge."""
         return int(self.level * 100 + 1e-9)
 
     @property
     def millivolts(self) -> int:
-        """The voltage under the present load."""
+        """The voltage under the current load."""
         if self.forced_mv is not None:
             return self.forced_mv
         below, above = next(pair for pair in pairwise(_CELL_MV) if self.level <= pair[1][0])

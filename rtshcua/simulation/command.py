@@ -1,4 +1,4 @@
-"""COMMAND_LONG and COMMAND_INT, brought to one form."""
+"""One type for COMMAND_LONG and COMMAND_INT."""
 
 from math import isfinite
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from rtshcua.mavlink.enums import NO_PLACE
 
 
 class VehicleCommand(NamedTuple):
-    """A command: parameters 1 to 4, the place in 1e-7 degree (None if not given), the altitude in metres (or NaN)."""
+    """A command: parameters 1 to 4, latitude and longitude in 1e-7 degree (None if absent), altitude in m or NaN."""
 
     number: int
     p1: float
@@ -19,12 +19,12 @@ class VehicleCommand(NamedTuple):
     longitude: float | None
     altitude: float
     frame: int | None
-    """The frame of COMMAND_INT (MAV_FRAME); COMMAND_LONG has none."""
+    """MAV_FRAME of a COMMAND_INT; None for COMMAND_LONG."""
     sender: tuple[int, int]
 
 
 def from_message(received: ReceivedFrame) -> VehicleCommand:
-    """The command in a COMMAND_LONG or COMMAND_INT."""
+    """Return the command in a COMMAND_LONG or COMMAND_INT."""
     m: Message = received.message
     sender = (received.system, received.component)
     if received.name == "COMMAND_INT":
@@ -37,5 +37,5 @@ def from_message(received: ReceivedFrame) -> VehicleCommand:
 
 
 def whole(value: float) -> int:
-    """A parameter that holds an integer; -1, which is no id, mode or flag, if it holds none."""
+    """Return a parameter as an integer, or -1 (no valid id, mode or flag) if it is not finite or too large."""
     return int(value) if isfinite(value) and abs(value) < 2**53 else -1

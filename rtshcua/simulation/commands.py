@@ -1,4 +1,4 @@
-"""Commands that both flavours obey alike, but for the results and the words they refuse with."""
+"""Commands that both flavours handle alike, apart from the result codes and texts of a refusal."""
 
 from math import isnan
 
@@ -20,9 +20,9 @@ FORCE = 21196
 
 
 def _request_message(refused: int, needs_one: bool) -> Handler:
-    """MAV_CMD_REQUEST_MESSAGE; `refused` answers for a message that the vehicle does not have.
+    """Handle MAV_CMD_REQUEST_MESSAGE; `refused` is the result for an unknown message.
 
-    `needs_one`: for one that it has nothing to tell in, too.
+    `needs_one`: also refuse a message that has no content now.
     """
 
     def handle(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
@@ -38,7 +38,7 @@ def _request_message(refused: int, needs_one: bool) -> Handler:
 
 
 def _set_message_interval(refused: int, say_why: bool) -> Handler:
-    """MAV_CMD_SET_MESSAGE_INTERVAL; `refused` answers for a stream that the vehicle does not have."""
+    """Handle MAV_CMD_SET_MESSAGE_INTERVAL; `refused` is the result for an unknown stream."""
 
     def handle(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
         number = whole(command.p1)
@@ -56,13 +56,13 @@ def _set_message_interval(refused: int, say_why: bool) -> Handler:
 
 
 def _request_version(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
-    """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES."""
+    """Handle MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES."""
     a.send(a.flavour.builders[mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION](a))
     return (ACCEPTED,)
 
 
 def _run_checks(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
-    """MAV_CMD_RUN_PREARM_CHECKS: refused while armed; what stands against arming comes as texts."""
+    """Handle MAV_CMD_RUN_PREARM_CHECKS: refused while armed; failed checks are sent as texts."""
     if a.vehicle.armed:
         return (TEMPORARILY_REJECTED,)
     for reason in a.flavour.arming(a):
@@ -71,20 +71,20 @@ def _run_checks(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
 
 
 def _get_home(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
-    """MAV_CMD_GET_HOME_POSITION."""
+    """Handle MAV_CMD_GET_HOME_POSITION."""
     a.send(a.flavour.builders[mavlink.MAVLINK_MSG_ID_HOME_POSITION](a))
     return (ACCEPTED,)
 
 
 def _change_speed(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """MAV_CMD_DO_CHANGE_SPEED of the ground speed."""
+    """Handle MAV_CMD_DO_CHANGE_SPEED for the ground speed."""
     if command.p2 > 0:
         a.vehicle.speed = command.p2
     return (ACCEPTED,)
 
 
 def _enter(mode: FlightMode, refused: int) -> Handler:
-    """A command that changes the mode and nothing else; `refused` answers when the mode cannot be entered."""
+    """Handle a command that only changes the mode; `refused` is the result if the mode cannot be entered."""
 
     def handle(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
         if not a.can_enter(mode):
@@ -97,9 +97,10 @@ def _enter(mode: FlightMode, refused: int) -> Handler:
 
 
 def arm_disarm(refused: int, arming: str, mode: str, landing: str) -> Handler:
-    """MAV_CMD_COMPONENT_ARM_DISARM: refused with the reasons after `arming`, `mode` being what is said of a mode.
+    """Handle MAV_CMD_COMPONENT_ARM_DISARM.
 
-    `landing` is said when it is not to disarm in the air; nothing, if that is empty.
+    `arming` is the prefix of refusal texts, `mode` the text for a mode that cannot be armed in, `landing` the text for
+    a refused disarm in the air (no text if empty).
     """
 
     def handle(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
@@ -124,9 +125,9 @@ def arm_disarm(refused: int, arming: str, mode: str, landing: str) -> Handler:
 
 
 def shared(*, mode: int, stream: int, says_why: bool, message: int, needs_one: bool) -> dict[int, Handler]:
-    """The handlers, by command; `mode`, `stream` and `message` are the results when there is none such.
+    """Return the shared handlers by command. `mode`, `stream` and `message` are the results for an unknown one.
 
-    `says_why`: a text names the stream; `needs_one`: a message without anything to tell is refused, too.
+    `says_why`: send a text that names the stream; `needs_one`: also refuse a message that has no content now.
     """
     return {
         mavlink.MAV_CMD_NAV_LAND: _enter(FlightMode.LAND, mode),

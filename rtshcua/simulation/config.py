@@ -1,4 +1,4 @@
-"""What a simulation is made from. Two simulations of equal configuration that hear the same say the same."""
+"""The configuration of a simulation. Equal configurations and equal inputs give equal outputs."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -23,145 +23,143 @@ class Boot(StrEnum):
     """How long sensors and estimator take to come up."""
 
     FAST = "fast"
-    """All of it in a second, and without the texts: for tests and demonstrations."""
+    """In one second and without status texts: for tests and demonstrations."""
     RECORDED = "recorded"
-    """As the real one does: PX4 in 5 s, ArduCopter in 42 s."""
+    """As long as the real autopilot takes: PX4 5 s, ArduCopter 42 s."""
 
 
 class Answers(StrEnum):
     """How long the autopilot takes to obey and answer."""
 
     AT_ONCE = "at-once"
-    """No time: when a datagram has come it is obeyed. Streams begin together."""
+    """No delay: a datagram is obeyed when it arrives. All streams begin together."""
     RECORDED = "recorded"
-    """As the real one did: milliseconds, each time others; requests overtake commands. Streams begin at any time."""
+    """As recorded: random milliseconds; requests overtake commands. Each stream begins at a random time."""
 
 
 class Estimate(StrEnum):
-    """How near what the estimator believes is to what is."""
+    """How accurate the position estimate is."""
 
     CLOSE = "close"
-    """Centimetres."""
+    """To centimetres."""
     REAL = "real"
-    """As with a satellite receiver: a metre off, slowly straying, and late."""
+    """As with a satellite receiver: about a metre off, drifting slowly, and late."""
 
 
 class Equipment(StrEnum):
-    """What may be fitted beside GPS, barometer and battery, and what the vehicle then tells."""
+    """Optional equipment beside GPS, barometer and battery, and the messages that the vehicle then sends."""
 
     RADIO = "radio"
-    """A SiK radio in the link: RADIO_STATUS, as system 51 and component 68."""
+    """A SiK radio in the link. It sends RADIO_STATUS as system 51, component 68."""
     RANGE = "range"
     """Range finders ahead and all around: DISTANCE_SENSOR with orientation 0, OBSTACLE_DISTANCE."""
     ALTIMETER = "altimeter"
-    """A range finder that looks down, as PX4's own simulation has: DISTANCE_SENSOR with orientation 25."""
+    """A downward range finder, as in PX4's own simulation: DISTANCE_SENSOR with orientation 25."""
     WIND = "wind"
-    """It is tuned to estimate the wind by its drag, which it does in the air."""
+    """Wind estimation from drag, active in flight."""
     VOLTAGE = "voltage"
     """The battery's voltage is measured."""
 
 
 STOCK = frozenset({Equipment.VOLTAGE})
-"""A stock vehicle: GPS, barometer and battery alone, of which SYS_STATUS carries the voltage."""
+"""A stock vehicle: GPS, barometer and battery only. SYS_STATUS carries the battery's voltage."""
 EQUIPPED = frozenset({Equipment.RADIO, Equipment.RANGE, Equipment.WIND, Equipment.VOLTAGE})
 
 
 class Purpose(StrEnum):
-    """What a battery feeds, as BATTERY_STATUS says it."""
+    """What a battery feeds (`battery_function` of BATTERY_STATUS)."""
 
     FLIGHT = "flight"
-    """MAV_BATTERY_FUNCTION_ALL: drained as the first one is."""
+    """MAV_BATTERY_FUNCTION_ALL: drained like the first battery."""
     PROPULSION = "propulsion"
-    """The same of the motors alone."""
+    """The motors only: drained like the first battery."""
     AVIONICS = "avionics"
-    """Feeds no motor: its level stays."""
+    """Feeds no motor: its level does not change."""
     PAYLOAD = "payload"
-    """The same."""
+    """Feeds no motor: its level does not change."""
 
 
 @dataclass(frozen=True, slots=True)
 class OtherBattery:
-    """A battery beside the first one: what it feeds, and its level at the start, in 1/10000."""
+    """An additional battery: what it feeds, and its initial level in 1/10000."""
 
     purpose: Purpose
     level: int
     every_us: int = 0
-    """It is reported no more often than this: a smart battery on a slow bus. 0: in turn with the others."""
+    """The shortest interval between its reports, as of a smart battery on a slow bus. 0: in turn with the others."""
 
 
 @dataclass(frozen=True, slots=True)
 class SimulationConfig:
-    """All that can be chosen; integers in mm, mm/s, us, 1e-7 degree and 1/10000."""
+    """All settings of a simulation; integers in mm, mm/s, us, 1e-7 degree and 1/10000."""
 
     flavour: AutopilotKind = AutopilotKind.PX4
     system: int = 1
     home: HomePosition = HOME
     battery: int = 10_000
     other_batteries: tuple[OtherBattery, ...] = ()
-    """Those with the ids from 1 on; each is reported in turn with the first."""
+    """The batteries with ids from 1 on. All batteries are reported in turn."""
     gauge_rise: int = 0
-    """So many percent more than it has are told of the charge in one report of five, as an estimate by voltage does."""
+    """Percent by which every fifth report overstates the charge, as an estimate from the voltage does."""
     hover_us: int = 18 * 60 * 1_000_000
-    """How long a full battery hovers."""
+    """The hover time of a full battery."""
     cruise_mm_s: int = 5_000
     max_speed_mm_s: int = 12_000
     ceiling_mm: int | None = None
-    """It rises no higher above home than this: too heavy, its motors weak, or a fence above (FENCE_ALT_MAX)."""
+    """The greatest height above home that it can reach: too heavy, weak motors, or a fence (FENCE_ALT_MAX)."""
     return_mm: int = 30_000
-    """The height above home that a return climbs to, as its owner has set it; ArduCopter comes with 15 m."""
+    """The height above home of a return, as the owner has set it; ArduCopter's default is 15 m."""
     land_mm_s: int | None = None
-    """How fast the last metres of a landing are, as its owner has set it; what the autopilot comes with if None."""
+    """The speed of the last metres of a landing, as the owner has set it; None: the autopilot's default."""
     wind: Wind = Wind()
     seed: int = 1
     noise: bool = True
-    """Whether sensors have any; without it what is believed does not stray either."""
+    """Whether sensors have noise. Without noise the estimate does not drift either."""
     estimate: Estimate = Estimate.CLOSE
     answers: Answers = Answers.AT_ONCE
     mode_lag_us: int | None = None
-    """How long after it entered a mode its reports tell of the one before; None: as recorded of the flavour."""
+    """How long its reports show the previous mode after a mode change; None: as recorded for the flavour."""
     boot: Boot = Boot.FAST
     parameters: tuple[tuple[str, float], ...] = ()
-    """What its owner has set: names of parameters that the flavour has, and their values."""
+    """Parameters that the owner has set: names that the flavour has, and values."""
     extras: frozenset[Equipment] = EQUIPPED
-    """What is fitted beside GPS, barometer and battery."""
+    """Equipment beside GPS, barometer and battery."""
     faults: tuple[Fault, ...] = ()
     signing_key: bytes | None = None
-    """The key of the link from the start; else SETUP_SIGNING may bring one."""
+    """The link's initial signing key; without it, SETUP_SIGNING can set one."""
     usb: bool = False
-    """Whether the vehicle takes the link for USB, on which ArduCopter, and PX4 1.17, obey without a signature."""
+    """Whether the vehicle treats the link as USB, on which ArduCopter and PX4 1.17 accept unsigned frames."""
     release: tuple[int, int] | None = None
-    """Which release it says that it is, and takes keys as. If None, the recorded one (PX4 1.16, ArduCopter 4.7); a PX4
-    with a key is 1.18, for 1.16 has none.
+    """The release that it reports, which also decides how it handles keys. None: the recorded one (PX4 1.16, ArduCopter
+    4.7); PX4 with a key is 1.18, because 1.16 has no signing.
     """
     utc_us: int = 0
-    """The time of day at the start, for the time stamps of signing; microseconds since 1970."""
+    """UTC at the start, for signing time stamps; microseconds since 1970."""
     speed: int = 100
-    """Seconds of flight in a second outside, times 100: the time stamps of signing follow the time outside."""
+    """Simulated seconds per real second, times 100. Signing time stamps follow real time."""
 
     def __post_init__(self) -> None:
-        """Raises ValueError for what no vehicle could be."""
-        if not 1 <= self.system <= 255:
-            raise ValueError("system is an id from 1 to 255")
-        if not 0 <= self.battery <= 10_000:
-            raise ValueError("battery is from 0 to 10000, in 1/10000")
-        if not all(0 <= other.level <= 10_000 and other.every_us >= 0 for other in self.other_batteries):
-            raise ValueError("the level of another battery is from 0 to 10000, in 1/10000")
-        if self.hover_us <= 0:
-            raise ValueError("hover time is more than nothing")
-        if not 0 < self.cruise_mm_s <= self.max_speed_mm_s <= 15_000:
-            raise ValueError("cruise speed is more than 0 and at most the greatest speed, which is at most 15000 mm/s")
-        if self.signing_key is not None and len(self.signing_key) != KEY_OCTETS:
-            raise ValueError(f"a key for signing has {KEY_OCTETS} octets")
-        if self.release is not None and not all(0 <= part <= 255 for part in self.release):
-            raise ValueError("a release is two numbers from 0 to 255")
-        keyless = self.flavour is AutopilotKind.PX4 and self.release is not None and self.release < (1, 17)
-        if keyless and self.signing_key is not None:
-            raise ValueError("PX4 takes keys from release 1.17 on")
-        if self.speed <= 0:
-            raise ValueError("speed is more than nothing")
-        if not 2_000 <= self.return_mm <= 1_000_000:
-            raise ValueError("a return climbs to a height from 2000 to 1000000 mm")
-        if self.land_mm_s is not None and not 100 <= self.land_mm_s <= 2_000:
-            raise ValueError("a landing is from 100 to 2000 mm/s")
-        if not -850_000_000 <= self.home.latitude <= 850_000_000 or abs(self.home.longitude) > 1_800_000_000:
-            raise ValueError("home is between 85 degrees south and north, and 180 degrees west and east")
+        """Raise ValueError for a value out of range."""
+        key, release, home, levels = self.signing_key, self.release or (255, 255), self.home, self.other_batteries
+        for holds, message in (
+            (1 <= self.system <= 255, "system id must be from 1 to 255"),
+            (0 <= self.battery <= 10_000, "battery must be from 0 to 10000 (1/10000)"),
+            (all(0 <= each.level <= 10_000 for each in levels), "battery level must be from 0 to 10000 (1/10000)"),
+            (all(each.every_us >= 0 for each in levels), "battery report interval must not be negative"),
+            (self.hover_us > 0, "hover time must be greater than 0"),
+            (0 < self.cruise_mm_s <= self.max_speed_mm_s, "cruise speed must be positive and at most the maximum"),
+            (self.max_speed_mm_s <= 15_000, "maximum speed must be at most 15000 mm/s"),
+            (key is None or len(key) == KEY_OCTETS, f"signing key must have {KEY_OCTETS} octets"),
+            (0 <= min(release) <= max(release) <= 255, "release must be two numbers from 0 to 255"),
+            (
+                key is None or release >= (1, 17) or self.flavour is not AutopilotKind.PX4,
+                "PX4 supports signing keys from release 1.17 on",
+            ),
+            (self.speed > 0, "speed must be greater than 0"),
+            (2_000 <= self.return_mm <= 1_000_000, "return height must be from 2000 to 1000000 mm"),
+            (self.land_mm_s is None or 100 <= self.land_mm_s <= 2_000, "landing speed must be from 100 to 2000 mm/s"),
+            (abs(home.latitude) <= 850_000_000, "latitude of home must be from -85 to 85 degrees"),
+            (abs(home.longitude) <= 1_800_000_000, "longitude of home must be from -180 to 180 degrees"),
+        ):
+            if not holds:
+                raise ValueError(message)

@@ -1,7 +1,7 @@
-"""The vehicle's MAVLink face: frames in, frames out.
+"""The vehicle's MAVLink interface: frames in, frames out.
 
-What is not there (files, logs, parts of plans) is refused at once: QGroundControl asks for all of it when it connects,
-and waits seconds for each answer that does not come.
+Requests for files, logs and partial plans are refused at once: QGroundControl sends them all when it connects, and
+waits seconds for each missing answer.
 """
 
 import struct
@@ -20,7 +20,7 @@ from rtshcua.simulation.telemetry import radio_status
 
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 FENCE_PREFIXES = ("FENCE_", "GF_")
-"""How the names of the parameters begin that make the fence another one."""
+"""Name prefixes of the parameters that change the fence."""
 _RADIO_INTERVAL_US = 1_000_000
 _NEVER = 1 << 62
 
@@ -28,7 +28,7 @@ _COMMAND_ACK = maker(mavlink.MAVLink_command_ack_message)
 
 
 class Face:
-    """Answers for an autopilot as (system, 1), and for its radio, if there is one, as (51, 68)."""
+    """The MAVLink endpoint of an autopilot as (system, 1), and of its radio, if fitted, as (51, 68)."""
 
     def __init__(self, autopilot: Autopilot, system: int) -> None:
         self._autopilot = autopilot
@@ -36,23 +36,23 @@ class Face:
         self._codec = Codec(system, COMPONENT)
         self._radio = Codec(RADIO_SYSTEM, RADIO)
         self.radio_due_us = 0 if Equipment.RADIO in autopilot.extras else _NEVER
-        """When the radio sends next, by the world's time: it runs on while the autopilot's loop halts."""
+        """When the radio sends next, in simulation time: the radio runs on while the autopilot's loop is halted."""
 
     @property
     def damaged(self) -> int:
-        """How many stretches of bytes came that were no good frame."""
+        """The number of received byte sequences that were not valid frames."""
         return self._codec.damaged
 
     def parse(self, datagram: bytes) -> list[ReceivedFrame]:
-        """The good frames in a datagram, in order. Never raises, whatever the bytes."""
+        """Return the valid frames of a datagram, in order. Never raises."""
         return [] if self._autopilot.off_us else self._codec.parse(datagram)
 
     def lets_in(self, received: ReceivedFrame) -> bool:
-        """Whether a frame is to be obeyed."""
+        """Return whether a frame is to be obeyed."""
         return received.name in _HANDLERS and self._is_for_me(received.message) and self._is_trusted(received)
 
     def obey(self, received: ReceivedFrame) -> list[bytes]:
-        """Obeys a frame that was let in; those that answer it. Never raises, whatever it says."""
+        """Obey an accepted frame and return the answering frames. Never raises."""
         if self._autopilot.off_us:
             return []
         _HANDLERS[received.name](self._autopilot, received)
@@ -61,13 +61,13 @@ class Face:
         return self._collect()
 
     def restart(self) -> None:
-        """The autopilot starts again, and counts its frames from the first."""
+        """Restart the frame sequence after an autopilot restart."""
         damaged = self._codec.damaged
         self._codec = Codec(self._system, COMPONENT)
         self._codec.damaged = damaged
 
     def due(self) -> list[bytes]:
-        """The frames to send now: streams that are due, and what happened since."""
+        """Return the frames to send now: due streams and queued messages."""
         autopilot = self._autopilot
         if autopilot.off_us:
             return []
@@ -79,7 +79,7 @@ class Face:
         return self._collect() if outbox else []
 
     def radio(self, now_us: int) -> bytes:
-        """The frame that the radio sends now, from `radio_due_us` on."""
+        """Return the radio's frame, due since `radio_due_us`."""
         self.radio_due_us = now_us + _RADIO_INTERVAL_US
         return self._radio.pack(radio_status(self._autopilot))
 
@@ -166,18 +166,18 @@ def _ping(a: Autopilot, received: ReceivedFrame) -> None:
 
 
 def _transfers(step: Callable[[Transfer, Peer, Message, int], None]) -> Callable[[Autopilot, ReceivedFrame], None]:
-    """A message of the mission protocol, handed to the vehicle's end of it."""
+    """Return a handler that passes a mission protocol message to the vehicle's transfer."""
     return lambda a, received: step(a.transfer, (received.system, received.component), received.message, a.now_us)
 
 
 def _set_current(a: Autopilot, received: ReceivedFrame) -> None:
-    """MISSION_SET_CURRENT: answered with MISSION_CURRENT, or with a text."""
+    """Handle MISSION_SET_CURRENT: answer with MISSION_CURRENT, or with a text."""
     if not a.mission.select(received.message.seq):
         a.say(mavlink.MAV_SEVERITY_CRITICAL, "WPM: WP CURR CMD: Not in list")
 
 
 def _partial(a: Autopilot, received: ReceivedFrame) -> None:
-    """Parts of a plan are not read or written: refused at once."""
+    """Refuse partial reads and writes of a plan."""
     result, kind = mavlink.MAV_MISSION_UNSUPPORTED, received.message.mission_type
     a.send(mavlink.MAVLink_mission_ack_message(received.system, received.component, result, kind))
 
@@ -188,7 +188,7 @@ _FTP_SIZE = 251
 
 
 def _file(a: Autopilot, received: ReceivedFrame) -> None:
-    """FILE_TRANSFER_PROTOCOL: there are no files."""
+    """Answer FILE_TRANSFER_PROTOCOL: the vehicle has no files."""
     m = received.message
     sequence, session, opcode = struct.unpack_from("<HBB", bytes(m.payload))
     head = struct.pack("<HBBBBBBIB", (sequence + 1) % 65_536, session, _NAK, 1, opcode, 0, 0, 0, _UNKNOWN_COMMAND)
@@ -197,7 +197,7 @@ def _file(a: Autopilot, received: ReceivedFrame) -> None:
 
 
 def _logs(a: Autopilot, _: ReceivedFrame) -> None:
-    """LOG_REQUEST_LIST: there are no logs."""
+    """Answer LOG_REQUEST_LIST: the vehicle has no logs."""
     a.send(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
 
 

@@ -1,4 +1,4 @@
-"""The autopilot's own failsafes: it takes over, asked by nobody."""
+"""The autopilot's own failsafes: low battery and lost position."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from rtshcua.simulation.sensors import Sensors
 from rtshcua.simulation.vehicle import Multirotor
 
 LOW_TO_LAND = 0.04
-"""The battery level at which the autopilot lands by itself."""
+"""The battery level at which the autopilot lands."""
 _LOW_VOLTAGE_S = 10.0
-"""How long the voltage must be low."""
+"""How long the voltage must be low before the failsafe acts."""
 _MEASURES_S = 0.5
-"""How often the voltage is looked at."""
+"""How often the voltage is checked."""
 _BACK_S = 0.6
-"""How long the position must be back."""
+"""How long the position must be back before the failsafe ends."""
 
 Text = tuple[int, str]
 """Severity and text."""
@@ -24,26 +24,26 @@ Text = tuple[int, str]
 
 @dataclass(frozen=True, slots=True)
 class FailsafeRules:
-    """What a flavour says, and when it acts."""
+    """The texts and delays of a flavour."""
 
     position: tuple[Text, ...]
-    """Said when it lands because it does not know where it is."""
+    """Sent when it lands because its position is lost."""
     level: Text
-    """Said when it lands because the battery is empty."""
+    """Sent when it lands because the battery is empty."""
     position_after_s: float = 0.0
-    """How long after the estimator gave up."""
+    """The delay from the loss of the estimate to landing."""
     land_pause_s: float = 0.0
-    """How long it stays up after it decided to land."""
+    """How long it hovers before it descends."""
     position_back: Text | None = None
     low_voltage: str | None = None
-    """The parameter with the voltage below which the battery is found to be low."""
+    """The parameter that holds the low-voltage threshold."""
     low_action: str | None = None
-    """The parameter that says what happens then: 0 nothing, 1 land, 2 return."""
+    """The parameter that selects the low-voltage action: 0 none, 1 land, 2 return."""
     low_text: str = ""
 
 
 class Failsafes:
-    """Watches one vehicle. `parameter` reads one by name, `say` sends a text, `enter` enters a mode."""
+    """The failsafes of one vehicle. `parameter` reads a parameter, `say` sends a text, `enter` changes the mode."""
 
     def __init__(
         self,
@@ -65,10 +65,10 @@ class Failsafes:
         self._without_s = self._low_s = self._back_s = self._measured_s = 0.0
         self._lands_blind = False
         self.low_voltage = False
-        """Whether the battery was found to be low by its voltage."""
+        """Whether the low-voltage failsafe has triggered."""
 
     def step(self, dt: float) -> None:
-        """Lets `dt` seconds pass."""
+        """Advance by `dt` seconds."""
         vehicle, battery = self._vehicle, self._battery
         self._measured_s += dt
         if self._measured_s >= _MEASURES_S:

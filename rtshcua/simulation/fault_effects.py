@@ -1,6 +1,5 @@
-"""What faults do to a simulation, and when.
-
-A pilot's too, past the link: with switches, with sticks, from a ground station of his own.
+"""Apply faults to a simulation at their times, including the pilot's interventions by switches, sticks or another
+ground station.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,7 +21,7 @@ from rtshcua.simulation.link import FaultyLink
 from rtshcua.simulation.surroundings import Cylinder, Wind
 from rtshcua.simulation.telemetry import heartbeat
 
-#: whom the answers are for that are not for us: the component that we are, of another system
+#: the addressee of answers that are not for the runtime: the same component of another system
 _ANOTHER: Final = (77, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
 _ANSWERED: Final = (
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_DO_SET_MODE,
@@ -31,7 +30,9 @@ _ANSWERED: Final = (
 
 
 class SecondSender:
-    """One of them: says the same each `each_us`, from a time on, and counts its own frames."""
+    """A second sender under the vehicle's ids: sends the same messages every `each_us` from a time on, with its own
+    sequence numbers.
+    """
 
     def __init__(self, says: Voice, each_us: int, at_us: int) -> None:
         self._says = says
@@ -40,7 +41,7 @@ class SecondSender:
         self._codec: Codec | None = None
 
     def due(self, autopilot: Autopilot, system: int, now_us: int) -> list[bytes]:
-        """What it says by now."""
+        """Return the frames that are due by `now_us`."""
         if now_us < self._due_us:
             return []
         self._due_us = now_us + self._each_us
@@ -68,29 +69,29 @@ class SecondSender:
 
 
 Effect = tuple[int, Callable[[], object]]
-"""A time, and what happens then."""
+"""A time, and the action at that time."""
 _STATION = (255, 190)
 _EVERY_US = 100_000
-"""How often the position of the sticks is looked at."""
+"""How often the stick positions are read."""
 _STEERED_US = 100_000
-"""How often a ground station commands a velocity that it steers by, as recorded;"""
+"""How often a ground station sends the velocity that it steers by, as recorded."""
 _VELOCITY_ALONE = 0x0DC7
-"""and its `type_mask`."""
+"""The `type_mask` of that message."""
 SHUFFLED_US = 200_000
-"""How long after a stall messages wait to be shuffled."""
+"""How long messages wait after a stall to be shuffled."""
 
 
 @dataclass(frozen=True, slots=True)
 class Affected:
-    """What faults act on."""
+    """The parts of a simulation that faults act on."""
 
     autopilot: Autopilot
     up: FaultyLink
     down: FaultyLink
     halt: Callable[[bool], None]
-    """Halts the autopilot's loop, or lets it go on."""
+    """Halts or resumes the autopilot's loop."""
     reboot: Callable[[], None]
-    """Starts the autopilot again."""
+    """Restarts the autopilot."""
 
     def links(self, way: Direction) -> tuple[FaultyLink, ...]:
         """The links of a direction."""
@@ -98,7 +99,7 @@ class Affected:
 
 
 def effects(fault: Fault, on: Affected) -> Iterator[Effect]:
-    """When a fault begins, and ends if it does, and what happens then."""
+    """Yield the times at which a fault begins and ends, with the actions."""
     a = on.autopilot
     match fault:
         case faults.LinkFault():
@@ -127,7 +128,7 @@ def effects(fault: Fault, on: Affected) -> Iterator[Effect]:
         case faults.WindStep(at_us, speed_mm_s, from_deg, gust_mm_s):
             yield at_us, partial(a.air.set, Wind(speed_mm_s, from_deg, gust_mm_s))
         case faults.HostFault() | faults.AgentFault():
-            pass  # not of the vehicle
+            pass  # does not affect the vehicle
         case _:
             raise _unknown(fault)
 
@@ -148,7 +149,7 @@ def _on_receiver(fault: faults.ReceiverFault, a: Autopilot) -> Iterator[Effect]:
 
 
 def _on_link(fault: faults.LinkFault, on: Affected) -> Iterator[Effect]:
-    """On the directions that the fault names, and what the radio tells of it."""
+    """Yield effects on the link in the fault's directions, and on the radio's report."""
     radio = (on.autopilot,)
     match fault:
         case faults.LinkDelay(at_us, delay_us, for_us, way):
@@ -208,11 +209,11 @@ def _on_autopilot(fault: faults.AutopilotFault, on: Affected) -> Iterator[Effect
 
 
 def _unknown(fault: Fault) -> TypeError:
-    return TypeError(f"nobody has said what {type(fault).__name__} does to a simulated vehicle")
+    return TypeError(f"the effect of {type(fault).__name__} on the simulated vehicle is not defined")
 
 
 def _by_pilot(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
-    """When a pilot does what, and takes over if that has an effect."""
+    """Yield the pilot's actions; an action that has an effect is a takeover."""
     for at_us, act in _pilots(fault, a):
         yield at_us, partial(a.take_over, Taker.PILOT, act)
 
@@ -220,7 +221,7 @@ def _by_pilot(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
 def _pilots(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
     match fault:
         case faults.PilotMode(at_us, mode):
-            if mode in a.flavour.modes.numbers:  # the switch has no position for another flavour's mode
+            if mode in a.flavour.modes.numbers:  # the switch has no position for a mode of the other flavour
                 yield at_us, partial(_choose, a, mode)
         case faults.PilotPause(at_us):
             yield at_us, partial(_pause, a)
@@ -241,8 +242,8 @@ def _pilots(fault: faults.PilotFault, a: Autopilot) -> Iterator[Effect]:
 
 
 def _choose(a: Autopilot, mode: FlightMode) -> None:
-    """A switch of the remote control asks for a mode as a ground station does, and is refused as that is. Only PX4
-    enters Altitude where it is asked for Position and has none (`UserModeIntention::change`, `allow_fallback`).
+    """Select a mode with the remote control's switch: the autopilot refuses it like a ground station's request. Only
+    PX4 enters Altitude if Position is selected without a position (`UserModeIntention::change`, `allow_fallback`).
     """
     if mode is FlightMode.POSITION and a.flavour.falls_back and not a.can_enter(mode):
         mode = FlightMode.ALTITUDE

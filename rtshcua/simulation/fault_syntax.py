@@ -1,4 +1,4 @@
-"""How a command line writes what goes wrong: `wind,at=20s,speed=12m/s,from=270deg`."""
+"""Parse and format faults as command lines write them: `wind,at=20s,speed=12m/s,from=270deg`."""
 
 import re
 from decimal import Decimal
@@ -11,44 +11,44 @@ from rtshcua.model.faults import KINDS, UNITS, WORD_TYPES, AgentFault, Fault, Fa
 
 _QUANTITY = re.compile(r"(-?\d+(?:\.\d+)?)(\D*)", re.ASCII)
 _AT = FaultField("at", "at_us", UNITS[0], (), False, False, True)
-_COUNTED = {"shuffle": "the seed of an order"}
-#: the kinds that a simulated vehicle can have by itself
+_COUNTED = {"shuffle": "the seed of the shuffled order"}
+#: the kinds of faults that affect the simulated vehicle itself
 OF_VEHICLE = {name: kind for name, kind in KINDS.items() if not issubclass(kind, HostFault | AgentFault)}
 
 
 def parse_fault(text: str) -> Fault:
-    """The fault that a text describes. Raises ValueError, with a message for a person, if it describes none."""
+    """Return the fault that a text describes. Raise ValueError, with a message for the user, if it is malformed."""
     name, *pairs = text.split(",")
     kind = OF_VEHICLE.get(name)
     if kind is None:
         near = nearest(name, OF_VEHICLE)
-        meant = f"did you mean `{near}`?" if near else f"there are {', '.join(OF_VEHICLE)}"
-        raise ValueError(f"no such fault: `{name}`; {meant}")
+        help = f"did you mean `{near}`?" if near else f"expected one of {', '.join(OF_VEHICLE)}"
+        raise ValueError(f"no such fault: `{name}`; {help}")
     known = {each.name: each for each in (_AT, *parameters(kind))}
     values: dict[str, Any] = {}
     for pair in pairs:
         key, _, value = pair.partition("=")
         if key not in known:
-            raise ValueError(f"`{name}` has no `{key}`; it takes {', '.join(known)}")
+            raise ValueError(f"`{name}` has no parameter `{key}`; expected one of {', '.join(known)}")
         values[known[key].field] = _value(known[key], value)
     missing = [key for key, each in known.items() if each.needed and each.field not in values]
     if missing:
-        raise ValueError(f"`{name}` needs {', '.join(missing)}")
+        raise ValueError(f"`{name}` requires {', '.join(missing)}")
     return kind(**values)
 
 
-def fault_words(fault: Fault) -> str:
-    """The text that describes a fault, for `parse_fault`."""
-    words = [next(name for name, kind in OF_VEHICLE.items() if kind is type(fault)), f"at={fault.at_us}us"]
+def format_fault(fault: Fault) -> str:
+    """Return the text of a fault; the inverse of `parse_fault`."""
+    parts = [next(name for name, kind in OF_VEHICLE.items() if kind is type(fault)), f"at={fault.at_us}us"]
     for each in parameters(type(fault)):
         value = getattr(fault, each.field)
         if value is not None:
-            words.append(f"{each.name}={_written(each, value)}")
-    return ",".join(words)
+            parts.append(f"{each.name}={_written(each, value)}")
+    return ",".join(parts)
 
 
 def message_number(name: str) -> int:
-    """The number of a message. Raises ValueError if the dialect has none of this name."""
+    """Return the id of a MAVLink message. Raise ValueError if the dialect has no message of this name."""
     number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}", None)
     if not isinstance(number, int):
         raise ValueError(f"no such message: `{name}`")
@@ -60,7 +60,7 @@ def _value(parameter: FaultField, text: str) -> object:
         return _word(parameter, text)
     if parameter.is_count:
         if not text.isdecimal():
-            raise ValueError(f"`{parameter.name}` is {_COUNTED[parameter.name]}, not `{text}`")
+            raise ValueError(f"`{parameter.name}` must be a whole number ({_COUNTED[parameter.name]}), not `{text}`")
         return int(text)
     if parameter.unit is None:
         message_number(text)
@@ -68,7 +68,7 @@ def _value(parameter: FaultField, text: str) -> object:
     match = _QUANTITY.fullmatch(text)
     units = parameter.unit.words
     if match is None or match[2] not in units:
-        raise ValueError(f"`{parameter.name}` is a number with its unit ({', '.join(units)}), not `{text}`")
+        raise ValueError(f"`{parameter.name}` must be a number with a unit ({', '.join(units)}), not `{text}`")
     return round(Decimal(match[1]) * units[match[2]])
 
 
@@ -85,8 +85,8 @@ def _written(parameter: FaultField, value: object) -> str:
 def _word(parameter: FaultField, text: str) -> object:
     if parameter.name == "held":
         if text not in parameter.words:
-            raise ValueError(f"`held` is yes or no, not `{text}`")
+            raise ValueError(f"`held` must be yes or no, not `{text}`")
         return text == "yes"
     if text not in parameter.words:
-        raise ValueError(f"no such {parameter.name}: `{text}`; there are {', '.join(parameter.words)}")
+        raise ValueError(f"no such {parameter.name}: `{text}`; expected one of {', '.join(parameter.words)}")
     return WORD_TYPES[parameter.name](text)

@@ -1,7 +1,7 @@
-"""The geofence as the vehicle keeps it, and watches it in flight. Metres.
+"""The vehicle's geofence and its breach detection. Metres.
 
-Polygons and circles on the plane around home, and a ceiling. A flavour says when there is a fence, and what a breach
-brings.
+A fence has polygons and circles on the plane around home, and a ceiling. The flavour decides when the fence is in
+force and how the vehicle reacts to a breach.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +33,7 @@ class FencePolygon:
     vertices: tuple[Place, ...]
 
     def holds(self, north: float, east: float) -> bool:
-        """Whether the place is inside (even-odd rule)."""
+        """Return whether the place is inside (even-odd rule)."""
         inside = False
         (a_north, a_east) = self.vertices[-1]
         for b_north, b_east in self.vertices:
@@ -44,7 +44,7 @@ class FencePolygon:
         return inside
 
     def edge(self, north: float, east: float) -> float:
-        """How far the nearest edge is."""
+        """Return the distance to the nearest edge."""
         nearest = inf
         (a_north, a_east) = self.vertices[-1]
         for b_north, b_east in self.vertices:
@@ -59,38 +59,38 @@ class FencePolygon:
 
 @dataclass(frozen=True, slots=True)
 class FenceCircle:
-    """A circle."""
+    """A circle on the plane."""
 
     centre: Place
     radius: float
 
     def holds(self, north: float, east: float) -> bool:
-        """Whether the place is inside."""
+        """Return whether the place is inside."""
         return hypot(north - self.centre[0], east - self.centre[1]) < self.radius
 
     def edge(self, north: float, east: float) -> float:
-        """How far the edge is."""
+        """Return the distance to the edge."""
         return abs(hypot(north - self.centre[0], east - self.centre[1]) - self.radius)
 
 
 @dataclass(frozen=True, slots=True)
 class FenceArea:
-    """Where flying is allowed: inside what is included, outside of what is excluded."""
+    """The area where flying is allowed: inside the included shapes, outside the excluded ones."""
 
     included: tuple[FencePolygon | FenceCircle, ...] = ()
     excluded: tuple[FencePolygon | FenceCircle, ...] = ()
     every: bool = False
-    """Whether a place must be inside all that is included; else one is enough."""
+    """Whether a place must be inside every included shape; otherwise one is enough."""
 
     def holds(self, north: float, east: float) -> bool:
-        """Whether flying is allowed there."""
+        """Return whether flying is allowed there."""
         if any(shape.holds(north, east) for shape in self.excluded):
             return False
         inside = [shape.holds(north, east) for shape in self.included]
         return not inside or (all(inside) if self.every else any(inside))
 
     def outside_by(self, north: float, east: float) -> float:
-        """How far it is to the nearest edge of what is violated; 0 where flying is allowed."""
+        """Return the distance to the nearest violated edge; 0 where flying is allowed."""
         if self.holds(north, east):
             return 0.0
         broken = [shape.edge(north, east) for shape in self.excluded if shape.holds(north, east)]
@@ -99,7 +99,7 @@ class FenceArea:
 
     @classmethod
     def of(cls, items: Sequence[PlanItem], home: HomePosition, every: bool) -> Self:
-        """The area that uploaded items draw; the items are well formed (`problem` found none)."""
+        """Return the area of uploaded items, which must be well formed (see `draws_no_fence`)."""
         included: list[FencePolygon | FenceCircle] = []
         excluded: list[FencePolygon | FenceCircle] = []
         at = 0
@@ -121,32 +121,32 @@ class FenceArea:
 
 @dataclass(frozen=True, slots=True)
 class FenceLimits:
-    """A fence in force: an area, and how high flying is allowed, in metres above home."""
+    """A fence in force: an area, and height limits in metres above home."""
 
     area: FenceArea = FenceArea()
     ceiling: float = inf
     floor: float = -inf
-    """For targets alone: on the ground every vehicle is below it."""
+    """Applies to targets only: on the ground every vehicle is below it."""
     return_under: float = inf
-    """The height above home under which a return stays."""
+    """The greatest height above home of a return."""
     across: float = inf
-    """How far from home flying is allowed, whatever the areas say."""
+    """The greatest distance from home, in addition to the areas."""
 
     def holds(self, point: Point) -> bool:
-        """Whether flying is allowed there."""
+        """Return whether flying is allowed there."""
         near = hypot(point.north, point.east) <= self.across
         return point.up <= self.ceiling and near and self.area.holds(point.north, point.east)
 
 
 LOADED_US = 100_000
-"""How long after a change, of the upload or of a setting, there is no fence: targets that come right behind an upload
-are not checked, as recorded from both autopilots."""
+"""How long the fence is inactive after an upload or a parameter change. Targets that arrive in that time are not
+checked, as recorded from both autopilots."""
 CHECK_US = 200_000
 
 
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """What is violated: the flavour's name of it, and by how much on the plane, in metres."""
+    """A violated limit: the flavour's name of it, and the horizontal distance outside, in metres."""
 
     name: str
     by: float = 0.0
@@ -154,23 +154,22 @@ class Breach:
 
 @dataclass(frozen=True, slots=True)
 class FenceRules:
-    """What a flavour does its own way."""
+    """The fence behaviour that depends on the flavour."""
 
     limits: Callable[[Callable[[str], float], FenceArea], FenceLimits | None]
-    """From the parameters (by name) and the uploaded area: the fence in force, if there is one."""
+    """Returns the fence in force, if any, from the parameters (by name) and the uploaded area."""
     name: Callable[[FenceLimits, Point], str]
-    """What of the fence is violated there."""
+    """Returns the name of the limit that a point violates."""
     every: bool
-    """Whether every included area must be kept to."""
+    """Whether the vehicle must stay inside every included area."""
     critical: Callable[[Callable[[str], float]], bool]
-    """From the parameters (by name): whether HEARTBEAT tells of a breach (MAV_STATE_CRITICAL)."""
+    """Returns whether HEARTBEAT reports a breach (MAV_STATE_CRITICAL), from the parameters (by name)."""
 
 
 class FenceWatch:
     """The fence of one vehicle.
 
-    `value` gives a parameter's value by its name, `where` tells where the vehicle believes to be, `clock` the
-    microseconds since the start.
+    `value` returns a parameter by name, `where` the estimated position, `clock` the microseconds since the start.
     """
 
     def __init__(
@@ -187,14 +186,14 @@ class FenceWatch:
         self._area = FenceArea()
         self._limits: FenceLimits | None = None
         self.return_under = inf
-        """The height above home under which a return stays, for the fence's sake."""
+        """The greatest height above home of a return, limited by the fence."""
         self.due_us = LOADED_US
-        """When it is looked at next."""
+        """When the fence is checked next."""
         self._stale = True
         self.breach: Breach | None = None
-        """What is violated now, while armed and in the air."""
+        """The current breach, while armed and in the air."""
         self.count = 0
-        """How many breaches there were."""
+        """The number of breaches so far."""
         plans.listeners.append(self._plan_changed)
 
     def _plan_changed(self, kind: int) -> None:
@@ -203,28 +202,28 @@ class FenceWatch:
             self.settings_changed()
 
     def settings_changed(self) -> None:
-        """A parameter was set; the fence is another one a moment later."""
+        """Reload the fence, shortly after a parameter was set."""
         self._limits, self.return_under = None, inf
         self._stale = True
         self.due_us = self._clock() + LOADED_US
 
     @property
     def in_force(self) -> bool:
-        """Whether there is a fence."""
+        """Whether a fence is in force."""
         return self._limits is not None
 
     @property
     def critical(self) -> bool:
-        """Whether HEARTBEAT tells of a breach now."""
+        """Whether HEARTBEAT reports a breach now."""
         return self.breach is not None and self._rules.critical(self._value)
 
     def allows(self, point: Point) -> bool:
-        """Whether the fence that is in force now has nothing against a target there."""
+        """Return whether the fence in force allows a target at this point."""
         limits = self._limits
         return limits is None or (limits.floor <= point.up and limits.holds(point))
 
     def step(self, now_us: int, vehicle: Multirotor) -> Breach | None:
-        """Lets time pass; the breach that began now, if one did."""
+        """Advance to `now_us` and return a breach that began now, if any."""
         if now_us < self.due_us:
             return None
         if self._stale:

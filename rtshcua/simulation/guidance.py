@@ -1,4 +1,4 @@
-"""From places to velocities: what the autopilot asks of the body. Metres, seconds, radians."""
+"""Guidance: the velocities that lead to a place. Metres, seconds, radians."""
 
 from dataclasses import dataclass, field
 from math import atan2, copysign, cos, hypot, inf, sin, sqrt
@@ -8,27 +8,27 @@ from rtshcua.simulation.kinematics import Approach, Body
 from rtshcua.simulation.place import Point
 
 LEAD_S = 0.4
-"""How much earlier it begins to slow down than the plan says: what leaning back takes."""
+"""How much earlier than planned it begins to brake: the time of leaning back."""
 SPARE = 1.4
-"""How much harder than planned it may brake, to keep to the plan."""
+"""Factor by which it may brake harder than planned, to keep to the plan."""
 ARRIVED_M, ARRIVED_M_S = 0.5, 0.4
-"""Nearer and slower than this, it is there."""
+"""The vehicle has arrived when it is nearer and slower than this."""
 _NEAR_M = 0.1
-"""So near the target, speed towards it means nothing."""
+"""Below this distance the closing speed is not defined."""
 _LEVEL_M = 2.0
-"""So near, the way up or down is not tied to the way ahead any more."""
+"""Below this distance the vertical path is independent of the horizontal one."""
 _PULL = 0.5
-"""On a circle, speed towards it for each metre off it, 1/s."""
+"""On a circle: radial speed per metre of radial error, 1/s."""
 
 
 def towards(body: Body, north: float, east: float, speed: float, approach: Approach) -> tuple[float, float]:
-    """The velocity to fly to a place (north, east), at up to `speed`, so that it stops there."""
+    """Return the velocity to fly to a place (north, east) at up to `speed` and stop there."""
     north -= body.north
     east -= body.east
     distance = hypot(north, east)
     if distance == 0:
         return 0.0, 0.0
-    # Where it will be by the time that it has turned over, so that it does not slow down too late.
+    # Plan from where it will be once it has leaned back, so that it does not brake too late.
     closing = (north * body.v_north + east * body.v_east) / distance if distance > _NEAR_M else 0.0
     left = distance - closing * LEAD_S
     stops = approach.speed(left) if left > 0 else 0.0
@@ -38,29 +38,29 @@ def towards(body: Body, north: float, east: float, speed: float, approach: Appro
 
 
 _LEAST_PAST_M = 0.25
-"""What it flies past a target less than this is not told from none."""
+"""A shorter overshoot counts as none."""
 _TURNED_M_S, _TURNED_M = 0.15, 0.15
-"""So slow behind the target, or so near the furthest place, it comes back."""
+"""Below this speed, or this near the furthest point, it turns back."""
 
 
 _BACK_M_S, _BACK_M = 0.5, 2.5
-"""How fast it comes back, and from how far at most: the recorded ones took four to nine seconds."""
+"""Speed and greatest distance of the way back: the recorded ones took four to nine seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Overshoot:
-    """How far, in metres, and in which direction it flies past a target before it comes back to it."""
+    """How far past a target it flies, in metres north and east, before it turns back."""
 
     north: float
     east: float
     far: float = field(init=False, repr=False, compare=False)
-    """How far that is, whatever the direction."""
+    """The length of the overshoot."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "far", hypot(self.north, self.east))
 
     def is_over(self, body: Body, north: float, east: float) -> bool:
-        """Whether it has flown past the target (north, east) and comes back."""
+        """Return whether it has flown past the target (north, east) and turns back."""
         to_north, to_east, far = self.north, self.east, self.far
         along = ((body.north - north) * to_north + (body.east - east) * to_east) / far
         if along <= 0:
@@ -70,12 +70,12 @@ class Overshoot:
 
 
 def speed_back(body: Body, north: float, east: float) -> float:
-    """How fast it comes back to a target that it flew past; from further away, as fast as to any."""
+    """Return the speed limit of the way back to a target; unlimited from further away."""
     return _BACK_M_S if hypot(north - body.north, east - body.east) < _BACK_M else inf
 
 
 def past(here: Point, target: Point, speed: float, agility: Agility) -> Overshoot | None:
-    """How it will fly past a target on its way from here at up to `speed`; None if it will not."""
+    """Return the overshoot of a flight from here to a target at up to `speed`; None if there is none."""
     north, east = target.north - here.north, target.east - here.east
     away = hypot(north, east)
     far = agility.overshoot_s * min(speed, agility.approach.speed(away / 2))
@@ -83,19 +83,19 @@ def past(here: Point, target: Point, speed: float, agility: Agility) -> Overshoo
 
 
 def hardest(agility: Agility) -> float:
-    """The most that it may accelerate on its way to a target, in m/s^2."""
+    """Return the greatest acceleration on the way to a target, in m/s^2."""
     return max(agility.acceleration, agility.approach.braking * SPARE)
 
 
 def is_above(body: Body, north: float, east: float, within: float) -> bool:
-    """Whether it is over a place: so near, and standing unless that leaves room to stop."""
+    """Return whether it is over a place: within `within`, and nearly at rest unless `within` leaves room to stop."""
     if hypot(north - body.north, east - body.east) >= within:
         return False
     return within > ARRIVED_M or hypot(body.v_north, body.v_east) < ARRIVED_M_S
 
 
 def around(body: Body, north: float, east: float, radius: float, speed: float) -> tuple[float, float]:
-    """The velocity to circle a place at `radius`, clockwise seen from above if that is positive."""
+    """Return the velocity to circle a place at `radius`, clockwise seen from above if positive."""
     north, east = body.north - north, body.east - east
     angle = atan2(east, north)
     off = max(-speed, min(speed, (abs(radius) - hypot(north, east)) * _PULL))
@@ -104,7 +104,7 @@ def around(body: Body, north: float, east: float, radius: float, speed: float) -
 
 
 def climb_rate(up: float, target: float, handling: Handling, taking_off: bool) -> float:
-    """The rate of climb to reach a height and stop there."""
+    """Return the climb rate to reach a height and stop there."""
     away = target - up
     fastest = handling.climb if away > 0 else handling.descent
     if taking_off:
@@ -116,7 +116,7 @@ def climb_rate(up: float, target: float, handling: Handling, taking_off: bool) -
 
 
 def steepest(body: Body, north: float, east: float, up: float) -> float:
-    """The most that it climbs or sinks on its way to a place: the way is straight, as recorded from both."""
+    """Return the greatest climb or descent rate on a straight path to a place, as recorded from both autopilots."""
     north, east = north - body.north, east - body.east
     away = hypot(north, east)
     if away < _LEVEL_M:
@@ -128,6 +128,6 @@ def steepest(body: Body, north: float, east: float, up: float) -> float:
 
 
 def landing_rate(body: Body, handling: Handling) -> float:
-    """The rate of climb, below nothing, of a landing: slow enough where the last part begins."""
+    """Return the (negative) climb rate of a landing, slow enough at the start of the last part."""
     above = max(0.0, body.up + body.v_up * LEAD_S - handling.land_below)
     return -min(handling.descent, sqrt(handling.land_speed**2 + 2 * handling.agility.land_braking * above))

@@ -1,4 +1,4 @@
-"""How a flavour's vehicle flies: what parameters may change, and what they may not."""
+"""Flight characteristics of a flavour: fixed ones (`Agility`) and those that parameters change (`Handling`)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,22 +10,22 @@ from rtshcua.simulation.kinematics import Approach, Body
 
 @dataclass(frozen=True, slots=True)
 class Stopping:
-    """How it stops, from any ground speed (m/s)."""
+    """A manoeuvre that stops the vehicle from any ground speed (m/s)."""
 
     approach: Approach
     hardest: float
-    """The most that it accelerates meanwhile, in m/s^2."""
+    """The greatest acceleration, in m/s^2."""
     ahead: Callable[[float], float]
-    """How far ahead it comes to stand."""
+    """The stopping distance."""
     told: Callable[[float], float]
-    """How far ahead it says that it will."""
+    """The stopping distance that the vehicle reports."""
 
     def place(self, body: Body) -> tuple[float, float]:
-        """Where it comes to stand, in metres north and east of home."""
+        """Return the stopping point, in metres north and east of home."""
         return _in_front(body, self.ahead)
 
     def told_place(self, body: Body) -> tuple[float, float]:
-        """The target that it reports."""
+        """Return the stopping point that the vehicle reports."""
         return _in_front(body, self.told)
 
 
@@ -39,42 +39,42 @@ def _in_front(body: Body, distance: Callable[[float], float]) -> tuple[float, fl
 
 @dataclass(frozen=True, slots=True)
 class Agility:
-    """How hard the autopilot flies its vehicle. Accelerations in m/s^2, times in seconds."""
+    """Fixed characteristics. Accelerations in m/s^2, times in seconds."""
 
     acceleration: float
     approach: Approach
-    """How it slows down in front of a target."""
+    """The speed profile before a target."""
     stop: Stopping
-    """How it stops when told to stay."""
+    """How it stops to hold a place."""
     brake: Stopping
-    """The same in BRAKE."""
+    """How it stops in BRAKE."""
     land: Stopping
-    """The same when told to land."""
+    """How it stops to land."""
     climb_acceleration: float
     climb_approach: Approach
-    """How it slows down in front of a height."""
+    """The speed profile before a target height."""
     takeoff_acceleration: float
     takeoff_within: float
-    """So near its height, in metres, a takeoff is over."""
+    """A takeoff ends within this distance of its height, in metres."""
     spool_s: float
-    """How long after arming it does not lift off, whatever it is told."""
+    """The time after arming before it can lift off."""
     ramp_s: float
-    """From there, or from the command, to lifting off."""
+    """From the end of that time, or from the command, to lift-off."""
     land_detect_s: float
-    """How long it stands before it knows that it has landed."""
+    """How long it stands before it detects the landing."""
     land_braking: float
-    """How it slows down above the height where the last part of a landing begins."""
+    """The deceleration before the last part of a landing."""
     overshoot_s: float = 0.0
-    """How far it flies past a target before it comes back, by the speed that it flew there with."""
+    """Overshoot past a target, in metres per m/s of speed."""
     home_within: float = 0.5
-    """So near home, in metres, a return has come home."""
+    """A return has reached home within this distance, in metres."""
     return_wait_s: float = 0.0
     """How long it hovers over home before it descends."""
 
 
 @dataclass(slots=True)
 class Handling:
-    """How it flies; parameters may change it. Speeds in m/s, heights in metres above home, times in seconds."""
+    """Characteristics that parameters change. Speeds in m/s, heights in metres above home, times in seconds."""
 
     agility: Agility
     climb: float
@@ -86,37 +86,37 @@ class Handling:
     max_speed: float = 12.0
     descent: float = 1.5
     return_height: Callable[["Handling", float, float], float] = lambda handling, _away, _up: handling.return_up
-    """How high above home a return flies that begins so far from home, and so high, where the fence lets it."""
+    """The height of a return by its distance from home and its height at the start, before the fence's limit."""
     return_up: float = 30.0
-    """The height of the way home, but for one that begins near home."""
+    """The height of the way home, unless it begins near home."""
     near_m: float = 10.0
-    """PX4 (RTL_MIN_DIST): from no further away than this the way home is flown inside of the cone."""
+    """PX4 (RTL_MIN_DIST): within this distance the way home is flown inside the cone."""
     cone_deg: float = 45.0
-    """PX4 (RTL_CONE_ANG): half the angle at the tip of that cone, which stands on it over home; 0: there is none."""
+    """PX4 (RTL_CONE_ANG): half the opening angle of the cone, whose tip is at home; 0: no cone."""
     acceptance_m: float = 2.0
-    """PX4 (NAV_ACC_RAD): nearer than this, it counts as there."""
+    """PX4 (NAV_ACC_RAD): the acceptance radius of a place."""
     cone_slope: float = 3.0
-    """ArduCopter (RTL_CONE_SLOPE): how many metres higher the way home may be for each metre to fly; 0: any."""
+    """ArduCopter (RTL_CONE_SLOPE): the greatest climb in metres per metre of distance; 0: no limit."""
     climb_least: float = 0.0
-    """ArduCopter (RTL_CLIMB_MIN): how much higher than before the way home is at least."""
+    """ArduCopter (RTL_CLIMB_MIN): the least climb before the way home."""
     return_speed: float = 0.0
-    """The speed of the way home; 0: as it flies else."""
+    """The speed of the way home; 0: the usual speed."""
     acceleration: float = 3.0
-    """The most that it gains and loses of its speed in a second, m/s, where it flies to a target."""
+    """The greatest acceleration towards a target, m/s^2."""
     takeoff_up: float = 2.5
-    """The height of a takeoff that names none."""
+    """The default takeoff height."""
     idle_disarm_s: float = 10.0
     landed_disarm_s: float = 2.0
-    """From knowing that it has landed."""
+    """From the detected landing to disarming."""
     after_takeoff: FlightMode | None = None
     after_landing: FlightMode | None = None
     forgets_speed: bool = False
-    """Whether another mode flies at the cruise speed again."""
+    """Whether a mode change resets the speed to cruise speed."""
     forgets_at_first_target: bool = False
-    """Whether so does the first target in GUIDED: a speed that was set before it is lost, as recorded."""
+    """Whether the first target in GUIDED does the same, as recorded."""
     lifts_to_targets: bool = False
-    """Whether a target makes it lift off when it stands armed."""
+    """Whether a target makes an armed vehicle on the ground lift off."""
     crash_disarm_s: float | None = None
-    """How long it lies after a crash until it disarms; never if None."""
+    """From a crash to disarming; None: never."""
     comes_back: bool = False
-    """Whether it comes back to where it was when it was told to return (the place), or to hold (the height)."""
+    """Whether it flies back to where a return (place) or a hold (height) was commanded."""

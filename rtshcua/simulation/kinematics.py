@@ -1,7 +1,7 @@
-"""How the vehicle moves: a body that leans to accelerate, in moving air, and tracks a target. Metres, seconds, radians.
+"""The vehicle's motion: a body that leans to accelerate, in moving air. Metres, seconds, radians.
 
-It plans its speed so that it can stop at the target, leans towards the speed it wants, no faster than it can turn and
-no further than it may lean, and learns from where it drifts how much it must lean against the wind.
+The body plans its speed so that it can stop at the target, leans towards the wanted velocity within limits of turn
+rate and lean angle, and learns from its drift how far to lean against the wind.
 """
 
 from dataclasses import dataclass, field
@@ -9,48 +9,48 @@ from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt, tan
 
 GRAVITY = 9.80665
 MAX_AIRSPEED = 18.0
-"""More wind than this carries the vehicle away: then it leans as far as it may, and that is not enough."""
+"""Stronger wind than this carries the vehicle away, even at the greatest lean."""
 MAX_LEAN = 35 * pi / 180
 _MOST = GRAVITY * tan(MAX_LEAN)
 _ROTOR_DRAG = 0.15
-"""Deceleration of still air by the speed through it, 1/s: what the blades meet."""
+"""Rotor drag: deceleration per airspeed, 1/s."""
 _BODY_DRAG = (_MOST / MAX_AIRSPEED - _ROTOR_DRAG) / MAX_AIRSPEED
-"""The same by its square, 1/m: what the body meets."""
+"""Body drag: deceleration per squared airspeed, 1/m."""
 JERK = 12.0
-"""How fast acceleration changes, m/s^3: what turning the body takes."""
+"""The rate of change of acceleration, m/s^3, limited by turning the body."""
 _CLIMB_JERK = 12.0
 _LEARN_S = 1.0
-"""How long it takes to learn what the wind does."""
+"""Time constant of learning the wind's effect."""
 _FOLLOW = 2.0
-"""Acceleration asked for by speed that is missing, 1/s."""
+"""Wanted acceleration per missing speed, 1/s."""
 MAX_FALL = 15.0
 YAW_RATE = pi / 2
 TUMBLE_RATE, TIPPED = pi, 80 * pi / 180
-"""How fast what falls tips over, and how far: it comes to lie on its side."""
+"""How fast a falling vehicle tips over, and how far: it ends on its side."""
 
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """How speed is planned in front of a place: a root of the distance, as for an even deceleration; linear near it.
+    """The speed profile before a place: square root of the distance (constant deceleration), linear near the place.
 
-    `braking` in m/s^2; near the place speed is `gain` (1/s) times the distance.
+    `braking` in m/s^2; near the place the speed is `gain` (1/s) times the distance.
     """
 
     braking: float
     gain: float
     linear: float = field(init=False, repr=False, compare=False)
-    """From this distance on, in m, it is linear."""
+    """The distance below which it is linear, in m."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "linear", self.braking / self.gain**2)
 
     def speed(self, distance: float) -> float:
-        """The greatest speed from which the vehicle still stops at `distance`."""
+        """Return the greatest speed from which the vehicle stops within `distance`."""
         linear = self.linear
         return distance * self.gain if distance <= linear else sqrt(2 * self.braking * (distance - linear / 2))
 
     def distance(self, speed: float) -> float:
-        """The inverse of `speed`: how far ahead the place is where a vehicle of that speed can stop."""
+        """Return the stopping distance from `speed`; the inverse of `speed`."""
         if speed <= self.braking / self.gain:
             return speed / self.gain
         return speed * speed / (2 * self.braking) + self.linear / 2
@@ -70,15 +70,15 @@ class Body:
     _roll: float = 0.0
     _pitch: float = 0.0
     _leans_at: float | None = None
-    """The yaw of the last step that it flew, while roll and pitch were not worked out since; else None."""
+    """The yaw of the last step in flight if roll and pitch are not computed yet, otherwise None."""
     a_up: float = 0.0
-    """The present acceleration upwards."""
+    """The current upward acceleration."""
     lean_north: float = 0.0
     lean_east: float = 0.0
-    """The acceleration that leaning gives."""
+    """The acceleration from leaning."""
     _trim_north: float = 0.0
     _trim_east: float = 0.0
-    """The part of it that is to hold against the wind."""
+    """The part of it that compensates the wind."""
 
     def track(
         self,
@@ -89,9 +89,9 @@ class Body:
         climb_most: float,
         wind: tuple[float, float],
     ) -> None:
-        """One step towards the ground velocity `want` (north, east), accelerating by at most `most`.
+        """Advance one step towards the ground velocity `want` (north, east), accelerating by at most `most`.
 
-        `climb` is the wanted speed upwards, reached by at most `climb_most`; `wind` is the velocity of the air.
+        `climb` is the wanted upward speed, reached with at most `climb_most`; `wind` is the velocity of the air.
         """
         want_north, want_east = want
         ask_north = (want_north - self.v_north) * _FOLLOW
@@ -103,27 +103,27 @@ class Body:
         self._fly(dt, ask_north + self._trim_north, ask_east + self._trim_east, climb, climb_most, wind)
 
     def drift(self, dt: float, climb: float, climb_most: float, wind: tuple[float, float]) -> None:
-        """One step held level: without a position the vehicle goes where the air goes."""
+        """Advance one step held level: without a position the vehicle drifts with the air."""
         self._fly(dt, 0.0, 0.0, climb, climb_most, wind)
 
     def thrust(self) -> float:
-        """What the motors carry, the weight being 1."""
+        """Return the thrust relative to the weight."""
         return sqrt((GRAVITY + self.a_up) ** 2 + self.lean_north**2 + self.lean_east**2) / GRAVITY
 
     @property
     def roll(self) -> float:
-        """How far it leans to its right."""
+        """The roll angle, positive to the right."""
         self._work_out_attitude()
         return self._roll
 
     @property
     def pitch(self) -> float:
-        """How far its nose is up."""
+        """The pitch angle, positive nose up."""
         self._work_out_attitude()
         return self._pitch
 
     def _work_out_attitude(self) -> None:
-        """Of the last step that it flew: only when it is asked for, or before something else changes it."""
+        """Compute roll and pitch of the last step in flight: only on demand, or before they change otherwise."""
         yaw = self._leans_at
         if yaw is not None:
             north, east = cos(yaw), sin(yaw)
@@ -132,7 +132,7 @@ class Body:
             self._leans_at = None
 
     def fall(self, dt: float) -> None:
-        """One step without thrust; it tips over."""
+        """Advance one step without thrust: the body falls and tips over."""
         roll = self.roll
         self._roll = roll + copysign(min(TUMBLE_RATE * dt, max(0.0, TIPPED - abs(roll))), roll)
         v_up = self.v_up
@@ -143,12 +143,12 @@ class Body:
         self.v_up = v_up + a_up * dt
 
     def crash(self) -> None:
-        """What it flew into stops it."""
+        """Stop at an obstacle."""
         self._work_out_attitude()
         self.v_north = self.v_east = self.lean_north = self.lean_east = 0.0
 
     def stop(self, upright: bool = True) -> None:
-        """Standing on the ground, or lying there as it came down."""
+        """Come to rest on the ground, upright or as it fell."""
         self.up = self.v_north = self.v_east = self.v_up = self.a_up = 0.0
         self._work_out_attitude()
         if upright:
@@ -156,7 +156,7 @@ class Body:
         self.lean_north = self.lean_east = self._trim_north = self._trim_east = 0.0
 
     def turn(self, dt: float, yaw: float) -> None:
-        """Turns the nose towards `yaw`, as fast as it goes."""
+        """Turn the nose towards `yaw` at the yaw rate."""
         away = (yaw - self.yaw + pi) % (2 * pi) - pi
         self.yaw = (self.yaw + within(away, YAW_RATE * dt) + pi) % (2 * pi) - pi
 
@@ -183,7 +183,7 @@ class Body:
         self._trim_north += (-drag_north - self._trim_north) * learn
         self._trim_east += (-drag_east - self._trim_east) * learn
         d_north, d_east = (lean_north + drag_north) * dt, (lean_east + drag_east) * dt
-        # The mean of old and new velocity: exact while the acceleration is constant.
+        # The mean of the old and the new velocity is exact for constant acceleration.
         self.north += (v_north + d_north / 2) * dt
         self.east += (v_east + d_east / 2) * dt
         self.v_north, self.v_east = v_north + d_north, v_east + d_east
@@ -196,7 +196,7 @@ class Body:
 
 
 def within(value: float, most: float) -> float:
-    """A value, or what is nearest to it from -`most` to `most`: in half the time of `max` and `min`."""
+    """Clamp a value to -`most` .. `most`; takes half the time of `max` and `min`."""
     if value > most:
         return most
     if value < -most:
@@ -205,5 +205,5 @@ def within(value: float, most: float) -> float:
 
 
 def heading(north: float, east: float) -> float:
-    """The direction of a velocity, as a yaw."""
+    """Return the direction of a velocity, as a yaw."""
     return atan2(east, north)

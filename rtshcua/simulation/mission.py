@@ -1,4 +1,4 @@
-"""Flies an uploaded mission, item by item, while the mode is MISSION; and what a flavour decides about missions."""
+"""Fly an uploaded mission item by item while the mode is MISSION, and the mission rules of a flavour."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -33,32 +33,32 @@ class MissionState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class MissionRules:
-    """What a flavour does its own way."""
+    """The mission behaviour that depends on the flavour."""
 
     judge: Callable[[tuple[PlanItem, ...], Multirotor, HomePosition, Callable[[Point], bool]], bool]
-    """Whether a mission can be flown; the last argument says what the fence allows."""
+    """Returns whether a mission can be flown; the last argument checks points against the fence."""
     first: int = 0
     """The slot of the first item that is flown."""
     may_enter: Callable[[tuple[PlanItem, ...], Multirotor], bool] = lambda _items, _vehicle: True
-    """Whether the mode may be entered, the mission being one that can be flown."""
+    """Returns whether the mode may be entered with a valid mission."""
     judged_us: int = 0
-    """How long after an upload the judgement comes; until then the one before stands."""
+    """The delay from an upload to its check; until then the previous result holds."""
     waits_for_start: bool = False
-    """Whether on the ground only MISSION_START begins it, not the mode alone."""
+    """Whether on the ground only MISSION_START begins the mission, not the mode alone."""
     return_is_mode: bool = False
-    """Whether an item that returns changes the mode."""
+    """Whether a return item changes the mode."""
     after: FlightMode | None = None
     """The mode after the last item, in the air; None keeps the mode and holds."""
     accept_m: float = 2.0
-    """How near a waypoint counts as reached, if it does not say so itself."""
+    """The acceptance radius of a waypoint that does not name one."""
     tells_all: bool = False
-    """Whether MISSION_ITEM_REACHED is sent for items too that take no time."""
+    """Whether MISSION_ITEM_REACHED is also sent for items that take no time."""
     text: Callable[[int, PlanItem], str | None] = lambda _number, _item: None
-    """What is said when an item that takes time begins."""
+    """Returns the text that is sent when a navigation item begins."""
 
 
 class MissionProgress:
-    """The mission of one vehicle, and how far it is. `where` tells where the vehicle believes to be."""
+    """The mission of one vehicle and its progress. `where` returns the estimated position."""
 
     def __init__(
         self,
@@ -87,9 +87,9 @@ class MissionProgress:
         self._entered = False
         self._jumps: dict[int, int] = {}
         self.current = 0
-        """The item that is flown, or would be next."""
+        """The current item."""
         self.valid = False
-        """Whether the vehicle would fly it."""
+        """Whether the mission passed the vehicle's check."""
         self.state = MissionState.NO_MISSION
         stored.listeners.append(self._plan_changed)
 
@@ -97,20 +97,20 @@ class MissionProgress:
 
     @property
     def items(self) -> tuple[PlanItem, ...]:
-        """All items, home in slot 0 included where the flavour has it."""
+        """All items, including home in slot 0 if the flavour has it."""
         return self._stored.items(MISSION)
 
     @property
     def running(self) -> bool:
-        """Whether it is flown now."""
+        """Whether the mission is being flown."""
         return self._vehicle.mode is FlightMode.MISSION and self.state is MissionState.ACTIVE
 
     def may_enter(self) -> bool:
-        """Whether the mode may be entered now."""
+        """Return whether MISSION may be entered now."""
         return self.valid and self._rules.may_enter(self.items, self._vehicle)
 
     def start(self, first: int | None = None) -> bool:
-        """MISSION_START: lets it leave the ground, from item `first`, if given. False if there is none to start."""
+        """Handle MISSION_START, from item `first` if given. Return False if there is nothing to start."""
         if not self.valid or (first is not None and not self.select(first)):
             return False
         if self.state is MissionState.COMPLETE:
@@ -119,7 +119,7 @@ class MissionProgress:
         return True
 
     def select(self, number: int) -> bool:
-        """MISSION_SET_CURRENT: another item is the current one. False if there is no such item."""
+        """Handle MISSION_SET_CURRENT: make another item the current one. Return False if there is no such item."""
         if not 0 <= number < len(self.items):
             return False
         self.current = max(number, self._rules.first)
@@ -130,14 +130,14 @@ class MissionProgress:
         return True
 
     def message(self) -> Message:
-        """MISSION_CURRENT. `total` counts the items that are flown, home left out; PX4 tells no `mission_mode`."""
+        """Return MISSION_CURRENT. `total` counts the items without home; PX4 sends no `mission_mode`."""
         first = self._rules.first
         mode = (_IN_MISSION if self._vehicle.mode is FlightMode.MISSION else _SUSPENDED) if first else 0
         total = max(0, len(self.items) - first)
         return _MISSION_CURRENT(self.current, total, self.state, mode)
 
     def tell_current(self) -> None:
-        """Says which item begins, if it is one that takes time and the flavour says so."""
+        """Send a text for the current item if it is a navigation item and the flavour has a text."""
         item = self.items[self.current]
         text = self._rules.text(self.current, item) if item.command in mission_protocol.NAVIGATION else None
         if text is not None:
@@ -173,38 +173,41 @@ class MissionProgress:
     # ------------------------------------------------------------------------------------------------- in time
 
     def step(self, now_us: int) -> None:
-        """Goes on with the mission if the mode is MISSION."""
+        """Continue the mission if the mode is MISSION."""
         self._now_us = now_us
         if self._judge_at_us is not None and now_us >= self._judge_at_us:
             self._judge()
-        vehicle = self._vehicle
-        if vehicle.mode is not FlightMode.MISSION:
+        if self._vehicle.mode is not FlightMode.MISSION:
             self._entered = False
             if self.state is MissionState.ACTIVE:
-                self.state = MissionState.PAUSED
                 self._begun, self._arrived_us = False, None
-                self._send(self.message())
+                self._report(MissionState.PAUSED)
             return
         if not self._entered:
             self._entered = True
             if self.state is MissionState.COMPLETE:
                 self._rewind()
-        if not vehicle.armed or self.state is MissionState.COMPLETE:
-            return
-        if not self.valid:
-            return
-        if not vehicle.in_air and not self._begun and self._rules.waits_for_start and not self._started:
+        if not self._may_fly():
             return
         if self.state is not MissionState.ACTIVE:
-            self.state = MissionState.ACTIVE
-            self._send(self.message())
+            self._report(MissionState.ACTIVE)
         here = self._where()
         for _ in range(len(self.items)):
             if not self._step_item(self.items[self.current], here):
                 return
 
+    def _may_fly(self) -> bool:
+        vehicle = self._vehicle
+        if not vehicle.armed or not self.valid or self.state is MissionState.COMPLETE:
+            return False
+        return vehicle.in_air or self._begun or self._started or not self._rules.waits_for_start
+
+    def _report(self, state: MissionState) -> None:
+        self.state = state
+        self._send(self.message())
+
     def _step_item(self, item: PlanItem, here: Point) -> bool:
-        """Begins the current item, or looks whether it is done; whether the next may be looked at already."""
+        """Begin the current item or check whether it is done; return whether the next item may begin now."""
         if not self._begun:
             self._begun, self._arrived_us = True, None
             self.tell_current()
@@ -269,7 +272,7 @@ class MissionProgress:
             if climbing:
                 return False
             place = self._place(item, here)
-            if vehicle.target != place:  # on the ground it had to climb first
+            if vehicle.target != place:  # from the ground it climbs first
                 vehicle.go_to(place)
             return (
                 self._has_arrived(item, place, here)
@@ -285,7 +288,7 @@ class MissionProgress:
         return command != mission_protocol.RETURN or self._rules.return_is_mode or not vehicle.in_air
 
     def _has_arrived(self, item: PlanItem, place: Point, here: Point) -> bool:
-        """Whether it is there, or was: gusts may carry it off while it waits."""
+        """Return whether it has arrived, now or earlier: gusts may carry it away while it waits."""
         if self._arrived_us is not None:
             return True
         accept = item.p2 if item.command == mission_protocol.WAYPOINT and item.p2 > 0 else self._rules.accept_m
@@ -301,7 +304,7 @@ class MissionProgress:
         return not seconds > 0 or self._now_us - self._arrived_us >= seconds * 1_000_000
 
     def _place(self, item: PlanItem, here: Point) -> Point:
-        """Where an item is; without a place it is here, over the ground."""
+        """Return the place of an item; an item without a place is at the current target."""
         up = self._up(item, here)
         if not item.has_place:
             return Point(self._vehicle.target.north, self._vehicle.target.east, up)

@@ -1,8 +1,7 @@
-"""The MAVLink mission protocol of the simulated vehicle: items of missions, fences and rally points, and their
-transfer.
+"""The vehicle's side of the MAVLink mission protocol: items of missions, fences and rally points, and their transfer.
 
-Uploads, downloads and clearing, one at a time, as (system, component) of the vehicle. `TransferRules` holds what PX4
-and ArduCopter do differently. An upload takes effect as a whole when its last item has come.
+One upload, download or clearing at a time. `TransferRules` holds the differences of PX4 and ArduCopter. An upload takes
+effect as a whole when its last item has arrived.
 https://mavlink.io/en/services/mission.html
 """
 
@@ -35,9 +34,9 @@ DELAY = mavlink.MAV_CMD_NAV_DELAY
 SPEED = mavlink.MAV_CMD_DO_CHANGE_SPEED
 JUMP = mavlink.MAV_CMD_DO_JUMP
 WAYPOINTS = frozenset({WAYPOINT, LOITER, LOITER_TIME})
-"""Items that fly to a place."""
+"""The items that fly to a place."""
 NAVIGATION = WAYPOINTS | frozenset({RETURN, LAND, TAKEOFF, DELAY})
-"""Items that take time."""
+"""The items that take time."""
 PASSED_BY = frozenset(
     {
         mavlink.MAV_CMD_CONDITION_YAW,
@@ -59,7 +58,7 @@ PASSED_BY = frozenset(
         mavlink.MAV_CMD_SET_CAMERA_FOCUS,
     }
 )
-"""Items for cameras and gimbals, of which this vehicle has none: they are done at once."""
+"""Items for cameras and gimbals, which this vehicle lacks: they complete at once."""
 FLOWN = NAVIGATION | PASSED_BY | {SPEED, JUMP}
 
 INCLUDED = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
@@ -75,7 +74,7 @@ _FEWEST_VERTICES = 3
 
 @dataclass(frozen=True, slots=True)
 class PlanItem:
-    """One item; the place in 1e-7 degree, the altitude `z` in metres above what `frame` (MAV_FRAME) says."""
+    """One item: the place in 1e-7 degree, the altitude `z` in metres above the datum of `frame` (MAV_FRAME)."""
 
     command: int
     frame: int
@@ -90,12 +89,12 @@ class PlanItem:
 
     @property
     def has_place(self) -> bool:
-        """Whether it names a place: latitude and longitude of nothing mean none."""
+        """Whether it names a place: latitude and longitude 0 mean none."""
         return self.frame != PLACELESS_FRAME and (self.x, self.y) != (0, 0)
 
 
 def from_message(message: Message) -> PlanItem | None:
-    """The item in a MISSION_ITEM_INT, or in a MISSION_ITEM with its degrees; None if its place is no place."""
+    """Return the item of a MISSION_ITEM_INT or MISSION_ITEM; None if its place is invalid."""
     m = message
     if m.get_type() == "MISSION_ITEM":
         scale = 1.0 if m.frame == PLACELESS_FRAME else 1e7
@@ -112,7 +111,7 @@ def from_message(message: Message) -> PlanItem | None:
 
 
 def to_message(item: PlanItem, sequence: int, kind: int, to: tuple[int, int], whole: bool) -> Message:
-    """The item as MISSION_ITEM_INT if `whole`, else as the older MISSION_ITEM; `to` is (system, component)."""
+    """Return the item as MISSION_ITEM_INT if `whole`, otherwise as MISSION_ITEM; `to` is (system, component)."""
     parts = (item.p1, item.p2, item.p3, item.p4)
     head = (*to, sequence, item.frame, item.command, 0, item.autocontinue, *parts)
     if whole:
@@ -122,7 +121,7 @@ def to_message(item: PlanItem, sequence: int, kind: int, to: tuple[int, int], wh
 
 
 def draws_no_fence(items: Sequence[PlanItem]) -> bool:
-    """Whether the items draw no fence: vertices too few or of mixed count, a circle without a radius."""
+    """Return whether the items are no valid fence: too few vertices, mixed counts, or a circle without a radius."""
     at = 0
     while at < len(items):
         item = items[at]
@@ -145,7 +144,7 @@ def draws_no_fence(items: Sequence[PlanItem]) -> bool:
 
 
 class Plans:
-    """What is stored of each kind. Whoever wants to know of changes adds itself to `listeners`."""
+    """The stored plan of each kind. `listeners` are notified of changes."""
 
     def __init__(self) -> None:
         self._items: dict[int, tuple[PlanItem, ...]] = dict.fromkeys(KINDS, ())
@@ -153,16 +152,16 @@ class Plans:
         """Called with the kind after each change."""
 
     def items(self, kind: int) -> tuple[PlanItem, ...]:
-        """The items of a kind, in order."""
+        """Return the items of a kind, in order."""
         return self._items[kind]
 
     def replace(self, kind: int, items: Sequence[PlanItem]) -> None:
-        """Stores other items in place of all of that kind."""
+        """Replace all items of a kind."""
         self._items[kind] = tuple(items)
         self._tell(kind)
 
     def read_again(self) -> None:
-        """Tells of each kind that is stored, as after a start."""
+        """Notify the listeners of each stored kind, as after a restart."""
         for kind, items in self._items.items():
             if items:
                 self._tell(kind)
@@ -184,29 +183,29 @@ Peer = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class TransferRules:
-    """How a flavour speaks the protocol."""
+    """The behaviour of a flavour in the protocol."""
 
     retry_us: int
     abort_us: int
     busy: int
-    """What it answers a second upload with, by another sender."""
+    """The result for an upload by another sender during an upload."""
     capacity: tuple[int, int, int]
-    """How many items of each kind there is room for: missions, fences, rally points."""
+    """The greatest number of items: missions, fences, rally points."""
     fence_items: frozenset[int]
-    """The commands that a fence may be made of."""
+    """The allowed commands of fence items."""
     on_abort: int | None = None
-    """What it acknowledges an upload with that it gives up; None for silence."""
+    """The result when it abandons an upload; None: no message."""
     out_of_order: int | None = None
-    """What it answers an item that it did not ask for; None for silence."""
+    """The result for an unexpected item; None: no message."""
     learns_int: bool = False
-    """Whether it asks with MISSION_REQUEST_INT once it has seen an item of that form; else always the legacy way."""
+    """Whether it requests with MISSION_REQUEST_INT after the first item of that form; else with MISSION_REQUEST."""
     opens_downloads: bool = False
-    """Whether items can be asked for only after MISSION_REQUEST_LIST, and are then sent again unasked if need be."""
+    """Whether items can be requested only after MISSION_REQUEST_LIST; it then repeats unacknowledged items."""
     keeps_home: bool = False
-    """Whether slot 0 of a mission is home, and not looked at."""
+    """Whether slot 0 of a mission is home and is not checked."""
 
     def check(self, kind: int, number: int, item: PlanItem) -> int:
-        """MAV_MISSION_RESULT: what it says to an item."""
+        """Return the MAV_MISSION_RESULT of an item."""
         if item.frame not in _FRAMES:
             return UNSUPPORTED_FRAME
         if self.keeps_home and kind == MISSION and number == 0:
@@ -238,7 +237,7 @@ class _Download:
 
 
 class Transfer:
-    """One vehicle's end. `stored` gives what a download of a kind shows; `may_clear` whether a kind may be emptied."""
+    """The vehicle's side. `stored` returns the items of a download, `may_clear` whether a kind may be cleared."""
 
     def __init__(
         self,
@@ -260,7 +259,7 @@ class Transfer:
     # --------------------------------------------------------------------------------------------- upload
 
     def count(self, peer: Peer, message: Message, now_us: int) -> None:
-        """MISSION_COUNT: an upload begins."""
+        """Handle MISSION_COUNT: begin an upload."""
         upload, rules, kind, count = self._upload, self._rules, message.mission_type, message.count
         if kind not in KINDS:
             return self._ack(peer, UNSUPPORTED, kind)
@@ -276,7 +275,7 @@ class Transfer:
         return self._ask(self._upload, now_us)
 
     def item(self, peer: Peer, message: Message, now_us: int) -> None:
-        """MISSION_ITEM or MISSION_ITEM_INT: the one asked for is kept, and the next one asked for."""
+        """Handle MISSION_ITEM or MISSION_ITEM_INT: keep the requested item and request the next."""
         upload, rules, kind = self._upload, self._rules, message.mission_type
         expected = upload is not None and (upload.peer, upload.kind) == (peer, kind)
         if upload is None or not expected or message.seq != len(upload.items):
@@ -305,7 +304,7 @@ class Transfer:
             self._plans.replace(kind, items)
 
     def clear_all(self, peer: Peer, message: Message, now_us: int) -> None:
-        """MISSION_CLEAR_ALL."""
+        """Handle MISSION_CLEAR_ALL."""
         kind = message.mission_type
         if kind != ALL and kind not in KINDS:
             return self._ack(peer, UNSUPPORTED, kind)
@@ -329,7 +328,7 @@ class Transfer:
     # ------------------------------------------------------------------------------------------- download
 
     def request_list(self, peer: Peer, message: Message, now_us: int) -> None:
-        """MISSION_REQUEST_LIST: how many items there are."""
+        """Handle MISSION_REQUEST_LIST: send the number of items."""
         kind = message.mission_type
         if self._upload is not None:
             return self._ack(peer, self._rules.busy, kind)
@@ -340,7 +339,7 @@ class Transfer:
         return self._send(mavlink.MAVLink_mission_count_message(*peer, len(self._stored(kind)), kind))
 
     def request(self, peer: Peer, message: Message, now_us: int) -> None:
-        """MISSION_REQUEST or MISSION_REQUEST_INT: one item, in the form that was asked for."""
+        """Handle MISSION_REQUEST or MISSION_REQUEST_INT: send one item in the requested form."""
         kind, number = message.mission_type, message.seq
         whole = message.get_type() == "MISSION_REQUEST_INT"
         items = self._stored(kind) if kind in KINDS else ()
@@ -354,7 +353,7 @@ class Transfer:
         return self._send_item(peer, kind, number, whole)
 
     def acknowledged(self, peer: Peer, message: Message, now_us: int) -> None:
-        """MISSION_ACK: the other end has what it wanted, or gives up, or wants to be asked in the other form."""
+        """Handle MISSION_ACK: the peer is done, gives up, or requires the other form of request."""
         result = message.type
         if self._download is not None and self._download.peer == peer:
             self._download = None
@@ -373,7 +372,7 @@ class Transfer:
     # ----------------------------------------------------------------------------------------------- time
 
     def step(self, now_us: int) -> None:
-        """Asks again for what did not come, and gives up what came to nothing."""
+        """Repeat overdue requests and abandon transfers that timed out."""
         rules, upload, download = self._rules, self._upload, self._download
         if upload is not None:
             if now_us - upload.heard_us > rules.abort_us:

@@ -1,4 +1,4 @@
-"""The flight modes that the simulated vehicle has, whatever number the flavour gives them."""
+"""The flight modes of the simulated vehicle, and how a flavour numbers them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ NEEDS_POSITION = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class ModeTable:
-    """How a flavour numbers the modes that it has."""
+    """The numbers and names of a flavour's modes."""
 
     numbers: Mapping[FlightMode, int]
     """`custom_mode` of HEARTBEAT."""
@@ -33,16 +33,16 @@ class ModeTable:
     armable: frozenset[FlightMode]
     """The modes in which arming is not refused."""
     names: Mapping[int, str]
-    """What the flavour calls them in its texts, by number."""
+    """The names in the flavour's texts, by number."""
     blind: int = 0
-    """What `base_mode` loses while the vehicle lands without a position."""
+    """The bits that `base_mode` loses while the vehicle lands without a position."""
     stands_by: bool = False
-    """Whether HEARTBEAT tells that it stands by until it lifts off, armed or not."""
+    """Whether HEARTBEAT reports standby until lift-off, even if armed."""
 
     def name(self, mode: FlightMode) -> str:
-        """What the flavour calls a mode that it has."""
+        """Return the flavour's name of a mode."""
         return self.names[self.numbers[mode]]
 
     def mode(self, number: int) -> FlightMode | None:
-        """The mode with this `custom_mode`, if the flavour has one."""
+        """Return the mode with this `custom_mode`, if any."""
         return next((mode for mode, own in self.numbers.items() if own == number), None)

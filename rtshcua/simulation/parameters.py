@@ -1,4 +1,4 @@
-"""The few parameters that the simulated vehicle has, and how each flavour puts integers on the wire."""
+"""The parameters of the simulated vehicle, and how each flavour encodes integers."""
 
 import struct
 from collections.abc import Iterator
@@ -16,25 +16,25 @@ INT32 = mavlink.MAV_PARAM_TYPE_INT32
 REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
 _UNNUMBERED = 65_535
 _LEAST = 0.1
-"""No speed or height is set lower than this: the model has no vehicle that stands still in the air or dives."""
+"""The least speed or height that can be set: the model does not support 0."""
 _MAY_BE_ZERO = frozenset({"return_speed", "near_m", "cone_deg", "cone_slope", "climb_least"})
-"""Of these, nothing at all means something."""
+"""The attributes for which 0 has a meaning."""
 
 
 @dataclass(frozen=True, slots=True)
 class AutopilotParameter:
-    """A parameter: its type, and what it sets in `Handling`, if anything, in how many parts of a metre or second."""
+    """A parameter: its type, and the attribute of `Handling` that it sets, if any, in 1/`scale` metres or seconds."""
 
     name: str
     type: int = REAL32
     attribute: str | None = None
     scale: int = 1
     value: float = 0.0
-    """What it is if it sets nothing."""
+    """The initial value if it sets no attribute."""
 
 
 class Parameters:
-    """The parameters of one vehicle. `bytewise`: integers travel as their bytes in the float, else cast to float."""
+    """The parameters of one vehicle. `bytewise`: integers are encoded bytewise in the float field, otherwise cast."""
 
     def __init__(self, table: tuple[AutopilotParameter, ...], handling: Handling, bytewise: bool) -> None:
         self._table = {parameter.name: parameter for parameter in table}
@@ -49,31 +49,31 @@ class Parameters:
         }
 
     def all(self) -> Iterator[Message]:
-        """PARAM_VALUE of each."""
+        """Return PARAM_VALUE of each parameter."""
         return (self._message(name, listed=True) for name in self._names)
 
     def read(self, name: str, index: int) -> Message | None:
-        """PARAM_VALUE of the one at `index`, or of that name if `index` is -1; None if there is none."""
+        """Return PARAM_VALUE of the parameter at `index`, or by name if `index` is -1; None if there is none."""
         if index >= 0:
             name = self._names[index] if index < len(self._names) else ""
         return self._message(name, listed=index >= 0) if name in self._table else None
 
     def value(self, name: str) -> float:
-        """What one is now; it is in the table."""
+        """Return the value of a parameter of the table."""
         return self._values[name]
 
     def assign(self, name: str, value: float) -> Message | None:
-        """The vehicle itself sets one, if it has it; PARAM_VALUE with what it is now."""
+        """Set a parameter from inside the vehicle, if it exists; return PARAM_VALUE."""
         if name not in self._table:
             return None
         self._values[name] = value
         return self._message(name)
 
     def write(self, name: str, raw: float, type_: int) -> Message | None:
-        """Sets one, and gives PARAM_VALUE with what it is now; None for what is passed over without an answer.
+        """Handle PARAM_SET; return PARAM_VALUE, or None if the autopilot does not answer.
 
-        PX4 does so with a type that is not the parameter's ("param types mismatch", on its console alone), ArduPilot
-        with NaN and infinity, and both with a name that they do not have (`mavlink_parameters.cpp`, `GCS_Param.cpp`).
+        PX4 ignores a wrong type ("param types mismatch", on its console only), ArduPilot NaN and infinity, and both an
+        unknown name (`mavlink_parameters.cpp`, `GCS_Param.cpp`).
         """
         parameter = self._table.get(name)
         if parameter is None or (self._bytewise and type_ != parameter.type):
@@ -86,7 +86,7 @@ class Parameters:
         return self._message(name)
 
     def own(self, name: str, value: float) -> None:
-        """The vehicle's owner has set one. Raises ValueError if there is none of that name."""
+        """Set a parameter as the vehicle's owner. Raise ValueError if there is no parameter of this name."""
         if name not in self._table:
             raise ValueError(f"this vehicle has no parameter `{name}`")
         self._store(self._table[name], value)
@@ -103,7 +103,7 @@ class Parameters:
         return raw
 
     def _message(self, name: str, listed: bool = False) -> Message:
-        """PARAM_VALUE. ArduCopter tells a parameter's number only in a list."""
+        """Return PARAM_VALUE. ArduCopter sends a parameter's index only in a list."""
         value, parameter = self._values[name], self._table[name]
         if parameter.type != REAL32 and self._bytewise:
             value = struct.unpack("<f", struct.pack("<i", int(value)))[0]

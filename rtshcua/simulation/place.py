@@ -1,10 +1,10 @@
-"""Where things are: local metres around home, and latitude and longitude in 1e-7 degree (WGS 84)."""
+"""Positions: local metres around home, and latitude and longitude in 1e-7 degree (WGS 84)."""
 
 from dataclasses import dataclass, field
 from math import copysign, cos, pi, radians
 
 _METRES_PER_E7 = 6_378_137 * pi / 180e7
-"""Metres of one 1e-7 degree of latitude, on a sphere of the equatorial radius: 0.5 % off at most."""
+"""Metres per 1e-7 degree of latitude, on a sphere of the equatorial radius: error at most 0.5 %."""
 _HALF_TURN_E7 = 1_800_000_000
 _MOST_E7 = 2**31 - 1
 
@@ -20,7 +20,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class HomePosition:
-    """Where the vehicle starts: degrees times 1e7, and millimetres above mean sea level."""
+    """The start position: degrees times 1e7, and millimetres above mean sea level."""
 
     latitude: int
     longitude: int
@@ -31,15 +31,15 @@ class HomePosition:
         object.__setattr__(self, "_shrink", cos(radians(self.latitude / 1e7)))
 
     def local(self, latitude: float, longitude: float) -> tuple[float, float]:
-        """Metres north and east of home; the plane is tangent at home, good for some kilometres."""
+        """Return metres north and east of home, on the tangent plane, accurate within some kilometres."""
         north = (latitude - self.latitude) * _METRES_PER_E7
         east = longitude - self.longitude
-        if abs(east) > _HALF_TURN_E7:  # longitude 180 lies between
+        if abs(east) > _HALF_TURN_E7:  # crosses longitude 180
             east -= copysign(2 * _HALF_TURN_E7, east)
         return north, east * _METRES_PER_E7 * self._shrink
 
     def globe(self, north: float, east: float) -> tuple[int, int]:
-        """Latitude and longitude in 1e-7 degree: the inverse of `local`, as far as the 32 bits of messages hold it."""
+        """Return latitude and longitude in 1e-7 degree, limited to 32 bits; the inverse of `local`."""
         longitude = self.longitude + round(east / _METRES_PER_E7 / self._shrink)
         if abs(longitude) > _HALF_TURN_E7:
             longitude -= 2 * _HALF_TURN_E7 if longitude > 0 else -2 * _HALF_TURN_E7

@@ -1,10 +1,9 @@
 """The simulated vehicle as a process: `python -m rtshcua.simulation --port 14550`.
 
-A thin loop around `world.Simulation`: one UDP socket on the loopback interface, real time times `--speed`. It sends to
-one peer and hears only that one, as a real link does. When it is up it prints one line of JSON. It ends on SIGTERM,
-and, if its standard input is a pipe, when the other end of that closes, so that it never outlives who started it. Each
-line that comes from there is a fault as `--fault` has it, its time counted from then on, or says `heard` and the time
-since boot, in us, of the position that was heard last (`Pace`).
+A loop around `world.Simulation`: one UDP socket on the loopback interface, one peer, real time multiplied by `--speed`.
+The process prints one line of JSON when it is ready. It ends on SIGTERM, and, if its standard input is a pipe, when the
+pipe closes, so that it does not outlive its parent. Each line of standard input is a fault in the syntax of `--fault`,
+with its time counted from now, or `heard` and the time since boot, in us, of the last received position (`Pace`).
 """
 
 import argparse
@@ -44,51 +43,54 @@ from rtshcua.simulation.world import Simulation
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options; each is checked on its own, with a message for a person."""
+    """Return the parser; each option is checked on its own."""
     options = argparse.ArgumentParser(prog="python -m rtshcua.simulation", description="A simulated multirotor.")
     add = options.add_argument
-    add("--port", type=_number(int, 1, 65_535), required=True, help="UDP port on loopback that is sent to, and heard")
-    add("--bind", type=_number(int, 0, 65_535), default=0, help="own UDP port; 0 (default) takes a free one")
+    add("--port", type=_number(int, 1, 65_535), required=True, help="the peer's UDP port on the loopback interface")
+    add("--bind", type=_number(int, 0, 65_535), default=0, help="own UDP port; 0 (default): any free port")
     add("--flavour", choices=list(AutopilotKind), default=AutopilotKind.PX4)
     add("--system", type=_number(int, 1, 255), default=1, help="MAVLink system id")
-    add("--speed", type=_number(float, 0.01, 200), default=1.0, help="seconds of flight in a second")
+    add("--speed", type=_number(float, 0.01, 200), default=1.0, help="simulated seconds per second")
     add("--seed", type=int, default=1)
     add(
         "--home",
         type=_listed("LAT,LON,AMSL", 3, 3),
-        help="degrees, degrees, metres above the sea; south: --home=-35.3,149.1,584",
+        help="degrees, degrees, metres above sea level; southern latitude: --home=-35.3,149.1,584",
     )
-    add("--battery", type=_number(float, 0, 100), default=100.0, help="%% at the start")
+    add("--battery", type=_number(float, 0, 100), default=100.0, help="initial level, %%")
     add(
         "--other-battery",
         type=_other_battery,
         action="append",
         default=[],
         metavar="PURPOSE,LEVEL[,SECONDS]",
-        help=f"another battery: {', '.join(Purpose)}, %% at the start, and how seldom it is reported; may be repeated",
+        help=f"another battery: {', '.join(Purpose)}, initial level in %%, report interval; repeatable",
     )
-    add("--hover", type=_number(float, 0.1, 600), default=18.0, help="minutes that a full battery hovers")
+    add("--hover", type=_number(float, 0.1, 600), default=18.0, help="hover time of a full battery, minutes")
     add("--cruise", type=_number(float, 0.1, 12), default=5.0, help="m/s")
-    add("--return-at", type=_number(float, 2, 1000), default=30.0, help="metres above home that a return climbs to")
+    add("--return-at", type=_number(float, 2, 1000), default=30.0, help="height of a return, metres above home")
     add("--wind", type=_listed("SPEED,FROM[,GUST]", 2, 3), default=[0.0, 0.0], help="m/s, degrees, m/s")
-    add("--no-noise", action="store_true", help="sensors without noise")
-    add("--estimate", choices=list(Estimate), default=Estimate.CLOSE, help="how near it is to what is: cm, or as real")
-    add("--answers", choices=list(Answers), default=Answers.RECORDED, help="how long each takes: none, or as recorded")
-    add("--boot", choices=list(Boot), default=Boot.FAST, help="how sensors come up: in a second, or as recorded")
-    add("--stock", action="store_true", help="GPS, barometer and battery alone: nothing else is fitted")
+    add("--no-noise", action="store_true", help="no sensor noise")
     add(
-        "--extra", choices=list(Equipment), action="append", help="what is fitted instead of the usual; may be repeated"
+        "--estimate",
+        choices=list(Estimate),
+        default=Estimate.CLOSE,
+        help="accuracy of the position estimate: centimetres, or realistic",
     )
-    add("--signing-key", type=_key, metavar="FILE", help="the link's key: 32 octets, or as many in hexadecimal")
-    add("--parameter", type=_parameter, action="append", default=[], metavar="NAME=VALUE", help="as its owner set it")
-    add("--usb", action="store_true", help="the vehicle takes the link for USB")
-    add("--release", type=_release, metavar="MAJOR.MINOR", help="what it says it is, and takes keys as")
-    add("--fault", type=_fault, action="append", default=[], metavar="KIND,at=TIME,...", help="may be repeated")
+    add("--answers", choices=list(Answers), default=Answers.RECORDED, help="delay of answers: none, or as recorded")
+    add("--boot", choices=list(Boot), default=Boot.FAST, help="boot time: one second, or as recorded")
+    add("--stock", action="store_true", help="GPS, barometer and battery only")
+    add("--extra", choices=list(Equipment), action="append", help="equipment instead of the default; repeatable")
+    add("--signing-key", type=_key, metavar="FILE", help="the link's signing key: 32 octets, raw or hexadecimal")
+    add("--parameter", type=_parameter, action="append", default=[], metavar="NAME=VALUE", help="set a parameter")
+    add("--usb", action="store_true", help="the vehicle treats the link as USB")
+    add("--release", type=_release, metavar="MAJOR.MINOR", help="the firmware release to report")
+    add("--fault", type=_fault, action="append", default=[], metavar="KIND,at=TIME,...", help="repeatable")
     return options
 
 
 def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
-    """The configuration that the options ask for; `utc_us` is the present. Raises ValueError where they do not fit."""
+    """Return the configuration of the options; `utc_us` is the current time. Raise ValueError if they conflict."""
     speed, from_deg, *gust = options.wind
     home = HOME
     if options.home is not None:
@@ -141,7 +143,7 @@ def _other_battery(text: str) -> OtherBattery:
     purpose, _, rest = text.partition(",")
     level, _, every = rest.partition(",")
     if purpose not in set(Purpose):
-        raise argparse.ArgumentTypeError(f"`{purpose}` is none of {', '.join(Purpose)}")
+        raise argparse.ArgumentTypeError(f"no such purpose: `{purpose}`; expected one of {', '.join(Purpose)}")
     percent, seconds = _number(float, 0, 100)(level), _number(float, 0, 3_600)(every or "0")
     return OtherBattery(Purpose(purpose), round(percent * 100), round(seconds * 1_000_000))
 
@@ -162,7 +164,7 @@ def _listed(shape: str, least: int, most: int) -> Callable[[str], list[float]]:
 def _release(text: str) -> tuple[int, int]:
     major, _, minor = text.partition(".")
     if not (text.isascii() and major.isdigit() and minor.isdigit()):
-        raise argparse.ArgumentTypeError(f"`{text}` is no release, such as 1.18")
+        raise argparse.ArgumentTypeError(f"`{text}` is not a release such as 1.18")
     return int(major), int(minor)
 
 
@@ -177,7 +179,7 @@ def _key(text: str) -> bytes:
         except ValueError:
             data = b""
     if len(data) != KEY_OCTETS:
-        raise argparse.ArgumentTypeError(f"`{text}` holds no key of {KEY_OCTETS} octets")
+        raise argparse.ArgumentTypeError(f"`{text}` does not hold a key of {KEY_OCTETS} octets")
     return data
 
 
@@ -186,7 +188,7 @@ def _parameter(text: str) -> tuple[str, float]:
     try:
         return name, float(value)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"`{text}` is not NAME=VALUE, with a number") from None
+        raise argparse.ArgumentTypeError(f"`{text}` is not NAME=VALUE with a number") from None
 
 
 def _fault(text: str) -> object:
@@ -198,20 +200,20 @@ def _fault(text: str) -> object:
 
 EXIT_OK = 0
 EXIT_USAGE = 2
-"""A bad option, from argparse."""
+"""An invalid option, as of argparse."""
 EXIT_PORT = 3
-"""The port cannot be had."""
+"""The port is not available."""
 
 _LEAP_US = 250_000
-"""The simulation never catches up by more than this at once: a process that was stopped loses the time."""
+"""The most that the simulation catches up at once: a stopped process loses the time."""
 HEARD = b"heard "
-"""What a line begins with that tells the time since boot, in us, of the position that was heard last."""
+"""The prefix of a line with the time since boot, in us, of the last received position."""
 _SHORTEST_SLEEP_S, _LONGEST_SLEEP_S = 0.001, 0.05
 _LARGEST_DATAGRAM = 65_535
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the simulated vehicle until it is told to end; the exit code."""
+    """Run the simulated vehicle until it is stopped; return the exit code."""
     options = parser().parse_args(arguments)
     try:
         config = config_of(options, time.time_ns() // 1000)
@@ -245,11 +247,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class Pace:
-    """Whether time waits for whoever started the simulation, faster than life: a computer that is busy would fall
-    behind for good, and fly what was long ago. It tells what it has heard; one that tells nothing is not waited for.
+    """Pauses simulated time while the parent is behind. At high speed a busy parent would otherwise fall behind for
+    good and act on old positions. The parent reports what it has received; without reports there is no pause.
     """
 
-    #: us of the vehicle's time by which what was said may be ahead of what was heard, and s of the machine's
+    #: how far sent positions may be ahead of received ones, us; and how long a report is valid, s of real time
     AHEAD_US: Final = 1_000_000
     PATIENCE_S: Final = 0.5
     _POSITION: Final = (33).to_bytes(3, "little")  # GLOBAL_POSITION_INT begins with the time since boot, in ms
@@ -259,16 +261,16 @@ class Pace:
         self._told_s: float | None = None
 
     def says(self, frame: bytes) -> None:
-        """This frame goes out."""
+        """Record a frame that is sent."""
         if frame[7:10] == self._POSITION:
             self._said_us = int.from_bytes(frame[10 : 10 + min(4, frame[1])], "little") * 1_000
 
     def hears(self, boot_us: int, at_s: float) -> None:
-        """It was told that a position of this time since boot was heard."""
+        """Record the parent's report of a received position."""
         self._heard_us, self._told_s = boot_us, at_s
 
     def waits(self, at_s: float) -> bool:
-        """Whether time stands still now."""
+        """Return whether simulated time is paused now."""
         if self._told_s is None or at_s - self._told_s > self.PATIENCE_S:
             return False
         return self._said_us - self._heard_us > self.AHEAD_US
@@ -285,18 +287,18 @@ class _Loop:
         self._pace = Pace()
 
     def listen(self, selector: selectors.BaseSelector) -> None:
-        """Begins to listen to the peer, and to whoever may end the process."""
+        """Listen to the peer, signals and standard input."""
         selector.register(self._link, selectors.EVENT_READ)
         signal.signal(signal.SIGTERM, self._end)
         if _stdin_is_a_pipe():
             selector.register(sys.stdin, selectors.EVENT_READ)
-            # Ctrl-C in a terminal goes to the whole group; the vehicle flies on while its parent brings it home.
+            # Ctrl-C reaches the whole process group; the vehicle must fly on while its parent brings it home.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         else:
             signal.signal(signal.SIGINT, self._end)
 
     def follow(self, selector: selectors.BaseSelector) -> None:
-        """Lets the simulation follow real time until it is told to end."""
+        """Let the simulation follow real time until it is stopped."""
         sleep = min(max(TICK_US / 1_000_000 / self._speed, _SHORTEST_SLEEP_S), _LONGEST_SLEEP_S)
         last, now_us = time.monotonic(), 0.0
         while not self._ended:
@@ -312,7 +314,7 @@ class _Loop:
             self._send(self._simulation.advance(int(now_us)))
 
     def _until_next(self, sleep: float, now_us: float) -> float:
-        """How long to sleep: less if the vehicle answers before."""
+        """Return how long to sleep; less if the vehicle answers before."""
         next_us = self._simulation.next_us
         if next_us is None:
             return sleep
@@ -328,7 +330,7 @@ class _Loop:
                 self._send(self._simulation.receive(data, at_us))
 
     def _told(self, data: bytes, at_us: int) -> bool:
-        """Takes in what came from who started it; whether that goes on."""
+        """Process input from the parent; return whether standard input is still open."""
         *lines, self._unread = (self._unread + data).split(b"\n")
         for line in lines:
             if line.startswith(HEARD) and line[len(HEARD) :].isdigit():
@@ -348,7 +350,7 @@ class _Loop:
             try:
                 self._link.sendto(frame, self._peer)
             except BlockingIOError:
-                return  # the send buffer is full: what does not fit is lost, as on a radio
+                return  # the send buffer is full: the remaining frames are lost, as on a radio
 
     def _end(self, *_: object) -> None:
         self._ended = True

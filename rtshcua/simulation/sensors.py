@@ -1,6 +1,6 @@
-"""What the vehicle believes of itself: the receiver's fix, and the estimate of position; and how both come up.
+"""The vehicle's sensors: the receiver's fix, the position estimate, and their boot sequence.
 
-What is ahead: `surroundings`.
+Range finders are in `surroundings`.
 """
 
 from dataclasses import dataclass
@@ -11,38 +11,38 @@ from rtshcua.simulation.kinematics import Body
 from rtshcua.simulation.place import Point
 
 FAST_S = 1.0
-"""All that a fast boot takes."""
+"""The duration of a fast boot."""
 
 
 @dataclass(frozen=True, slots=True)
 class BootPlan:
-    """When what is there, in seconds from the start, as recorded. A text is (time, severity, text), and `{amsl}` in it
-    home's height.
+    """The recorded times of the boot sequence, in seconds from the start. A text is (time, severity, text), where
+    `{amsl}` stands for the height of home.
     """
 
     answers_s: float
-    """Sensors answer: SYS_STATUS, and a position if only of zeros."""
+    """SYS_STATUS begins, and a position, possibly of zeros."""
     standby_s: float
-    """The heartbeat leaves `booting`."""
+    """The heartbeat's status leaves `booting`."""
     booting: int
-    """HEARTBEAT.system_status (MAV_STATE) up to then."""
+    """HEARTBEAT.system_status (MAV_STATE) until then."""
     initialised_s: float
     attitude_s: float
     receiver_s: float
     """The receiver has a fix."""
     origin_s: float
-    """There is a home, and with it a height above it."""
+    """Home is set, and with it the height above home."""
     checks_s: float
-    """Nothing is inconsistent any more: without a position, the modes that need none can be armed in."""
+    """Consistency checks pass: modes that need no position can be armed in."""
     position_s: float
-    """The estimator vouches for its position."""
+    """The position estimate is valid."""
     tells_early: bool
-    """Whether GLOBAL_POSITION_INT comes before that: zeros, then what the receiver says."""
+    """Whether GLOBAL_POSITION_INT is sent before that: zeros, then the receiver's position."""
     texts: tuple[tuple[float, int, str], ...] = ()
 
     @property
     def all_s(self) -> float:
-        """How long all of it takes."""
+        """The total duration."""
         return max(
             self.answers_s, self.standby_s, self.initialised_s, self.attitude_s, self.receiver_s, self.origin_s,
             self.checks_s, self.position_s, *(at_s for at_s, _, _ in self.texts),
@@ -50,22 +50,22 @@ class BootPlan:
 
 
 _DRIFT = 0.2
-"""How fast the estimate strays in each axis while there is no good fix, m/s."""
+"""Drift of the estimate per axis without a good fix, m/s."""
 _ESTIMATE_NOISE, _FIX_NOISE = 0.03, 0.3
 
 LATE_S = 0.1
-"""How late position and velocity of a real estimate are. Chosen: the recordings do not hold what really was."""
+"""The delay of a realistic estimate. Chosen: the recordings do not contain the true position."""
 FIX_LATE_S = 0.16
-"""The same of the receiver's fix: ArduCopter's was 58 to 64 ms behind the estimate on all three recorded flights."""
+"""The delay of the receiver's fix: ArduCopter's was 58 to 64 ms behind the estimate on all three recorded flights."""
 WANDER_M, WANDER_S, WANDER_STEP_S = 0.7, 60.0, 1.0
-"""How far a receiver strays in each axis (1 m in the plane; standard deviation), and how long an error lasts."""
+"""Receiver error per axis (standard deviation; 1 m in the plane), its correlation time, and the step."""
 
 
 class Sensors:
     """Sensors with noise from a seeded source.
 
-    `coast_s`: how long the estimator goes on without a fix that it believes. `pace`: how much faster than `plan` they
-    come up. `late`: whether what is believed lags behind what is; `strays`: whether the receiver wanders.
+    `coast_s`: how long the estimate stays valid without a trusted fix. `pace`: speed of the boot relative to `plan`.
+    `late`: whether the estimate lags behind the truth; `strays`: whether the receiver's error wanders.
     """
 
     def __init__(
@@ -77,32 +77,32 @@ class Sensors:
         self._velocity = (0.0, 0.0, 0.0)
         self._wander = (0.0, 0.0)
         self._wandering = (0.0, 0.0)
-        self._turns_s = 0.0  # until it wanders elsewhere
+        self._turns_s = 0.0  # until the next direction of wandering
         self._chance = chance
         self._noisy = noisy
         self._coast_s = coast_s
         self._without_fix_s = 0.0
         self._jump = (0.0, 0.0)
         self.glitch = (0.0, 0.0)
-        """How far the receiver alone is off, metres north and east: the estimator does not believe it."""
+        """Receiver error, metres north and east, that the estimator rejects."""
         self.stray = (0.0, 0.0)
-        """How fast the receiver strays, m/s north and east: slowly enough to be believed."""
+        """Receiver drift, m/s north and east, slow enough for the estimator to follow."""
         self.unhealthy = False
-        """Whether the estimator says that it cannot be trusted, and goes on estimating."""
+        """Whether the estimator reports itself unhealthy; it continues to estimate."""
         self._drift = 0.0
         self.error = (0.0, 0.0)
-        """How far the estimate is off, north and east, noise apart. The vehicle steers by the estimate."""
+        """Error of the estimate, north and east, without noise. The vehicle steers by the estimate."""
         self._last_fix: Point | None = None
         self._plan = plan
         self._pace = pace
         self.age_s = 0.0
-        """Seconds since the start, as the plan counts them, until all is up."""
+        """Seconds since the start, in the plan's time, until the boot is complete."""
         self.lost = False
-        """Whether the receiver has lost its fix; when it has found it again the estimate is right again."""
+        """Whether the receiver has lost its fix; the estimate is correct again after it recovers."""
         self._come_up()
 
     def step(self, dt: float) -> None:
-        """Lets `dt` seconds pass."""
+        """Advance by `dt` seconds."""
         if not self._is_up:
             self.age_s += dt * self._pace
             self._come_up()
@@ -120,7 +120,7 @@ class Sensors:
             self.jump(self.stray[0] * dt, self.stray[1] * dt)
 
     def _stray(self, dt: float) -> None:
-        """An Ornstein-Uhlenbeck process in each axis, in steps of a second and straight between."""
+        """Advance an Ornstein-Uhlenbeck process in each axis, in steps of a second and linear between."""
         self._turns_s -= dt
         if self._turns_s <= 0:
             self._turns_s += WANDER_STEP_S
@@ -133,7 +133,7 @@ class Sensors:
         self._sum()
 
     def follow(self, dt: float, body: Body) -> None:
-        """Lets the estimate of the velocity follow, as late as it is."""
+        """Let the velocity estimate follow the true velocity, with its delay."""
         part = dt / LATE_S
         north, east, up = self._velocity
         self._velocity = (
@@ -141,7 +141,7 @@ class Sensors:
         )  # fmt: skip
 
     def restart(self) -> None:
-        """The autopilot starts again: sensors and estimator come up anew. What is wrong with the receiver stays."""
+        """Restart sensors and estimator. Faults of the receiver persist."""
         self.age_s = self._without_fix_s = self._drift = 0.0
         self._sum()
         self._come_up()
@@ -150,28 +150,28 @@ class Sensors:
         plan, age_s = self._plan, self.age_s
         self._is_up = age_s >= plan.all_s
         self.answers = age_s >= plan.answers_s
-        """Whether there is telemetry of sensors at all."""
+        """Whether sensor telemetry is sent."""
         self.booting = plan.booting if age_s < plan.standby_s else None
-        """HEARTBEAT.system_status while it comes up."""
+        """HEARTBEAT.system_status while booting."""
         self.initialised = age_s >= plan.initialised_s
         """Whether the estimator runs."""
         self.has_attitude = age_s >= plan.attitude_s
-        """Whether the estimator knows attitude and height, if not yet where it is."""
+        """Whether attitude and height are estimated."""
         self.receives = age_s >= plan.receiver_s
         """Whether the receiver was found."""
         self.has_origin = age_s >= plan.origin_s
-        """Whether there is a home."""
+        """Whether home is set."""
         self.consistent = age_s >= plan.checks_s
-        """Whether the checks of the sensors against each other pass."""
+        """Whether the consistency checks of the sensors pass."""
         self.locates = age_s >= plan.position_s
-        """Whether the estimator has come up far enough to vouch for a position."""
+        """Whether the boot has reached a valid position."""
         self.estimates = self._without_fix_s < self._coast_s and self.locates
-        """Whether the estimator has a position, whatever it says of it."""
+        """Whether there is a position estimate, healthy or not."""
         self.tells_position = self.answers if plan.tells_early else self.locates
-        """Whether GLOBAL_POSITION_INT is sent, whatever it is worth."""
+        """Whether GLOBAL_POSITION_INT is sent, valid or not."""
 
     def jump(self, north_m: float, east_m: float) -> None:
-        """From now on the receiver, and with it the estimate, is off by this much more."""
+        """Add a lasting error to the receiver and the estimate."""
         self._jump = (self._jump[0] + north_m, self._jump[1] + east_m)
         self._sum()
 
@@ -179,17 +179,17 @@ class Sensors:
 
     @property
     def has_fix(self) -> bool:
-        """Whether the receiver has a fix now."""
+        """Whether the receiver has a fix."""
         return self.receives and not self.lost
 
     @property
     def glitching(self) -> bool:
-        """Whether the estimator does not believe the receiver."""
+        """Whether the estimator rejects the receiver's position."""
         return self.glitch != (0.0, 0.0)
 
     @property
     def has_position(self) -> bool:
-        """Whether the estimator vouches for its position."""
+        """Whether the position estimate is valid."""
         return self.estimates and not self.unhealthy
 
     def _sum(self) -> None:
@@ -198,11 +198,11 @@ class Sensors:
         self.estimates = self._without_fix_s < self._coast_s and self.locates
 
     def velocity(self, body: Body) -> tuple[float, float, float]:
-        """The velocity that GLOBAL_POSITION_INT reports: north, east and up."""
+        """Return the velocity that GLOBAL_POSITION_INT reports: north, east and up."""
         return self._velocity if self.late else (body.v_north, body.v_east, body.v_up)
 
     def estimate(self, body: Body) -> Point:
-        """The position that GLOBAL_POSITION_INT reports."""
+        """Return the position that GLOBAL_POSITION_INT reports."""
         north, east = self.error
         up = body.up
         if self.late:
@@ -216,7 +216,7 @@ class Sensors:
         )
 
     def fix(self, body: Body) -> Point:
-        """The position that GPS_RAW_INT reports; the last one over again while there is no fix."""
+        """Return the position that GPS_RAW_INT reports; the last one while there is no fix."""
         if self.has_fix or self._last_fix is None:
             late_s = FIX_LATE_S if self.late else 0.0
             north, east, up = self._velocity

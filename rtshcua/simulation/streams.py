@@ -1,4 +1,4 @@
-"""What an autopilot sends unasked, and what faults make of its messages: old values, or none."""
+"""The message streams of an autopilot, and faults in its messages: old values, or silence."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -10,9 +10,9 @@ from rtshcua.codec.frames import Message
 
 
 class Streams:
-    """The intervals of a vehicle's streams, in microseconds. `default` holds those that run from boot.
+    """The intervals of a vehicle's streams, in microseconds. `default` holds the streams that run from boot.
 
-    `phases` draws when each of them begins, within its interval; without it all begin together.
+    `phases` draws the start of each stream within its interval; without it all start together.
     """
 
     def __init__(self, default: Mapping[int, int], phases: Random | None = None) -> None:
@@ -20,12 +20,12 @@ class Streams:
         self._interval = dict(default)
         self._due = {number: phases.randrange(every) if phases else 0 for number, every in default.items()}
         self.next_us = 0
-        """Nothing is due before."""
+        """No stream is due before this time."""
 
     def set(self, message_id: int, interval_us: int) -> None:
-        """Sets an interval as SET_MESSAGE_INTERVAL means it: 0 is the default one, negative is never.
+        """Set an interval as in SET_MESSAGE_INTERVAL: 0 is the default, negative is never.
 
-        One that it has already changes nothing, not even when the next message is due.
+        Setting the current interval changes nothing, not even when the next message is due.
         """
         if interval_us == 0:
             interval_us = self._default.get(message_id, -1)
@@ -37,17 +37,17 @@ class Streams:
             self._due[message_id] = self.next_us = 0
 
     def interval(self, message_id: int) -> int:
-        """The interval of a message, -1 if it is not streamed."""
+        """Return the interval of a message, -1 if it is not streamed."""
         return self._interval.get(message_id, -1)
 
     def due(self, now_us: int) -> list[int]:
-        """The messages to send now; each is due again an interval later."""
+        """Return the ids of the messages to send now; each is due again an interval later."""
         if now_us < self.next_us:
             return []
         due_us = self._due
         due = [message_id for message_id, at_us in due_us.items() if at_us <= now_us]
         for message_id in due:
-            # From when it was due, so that the mean rate is right; but what was missed is not made up for.
+            # Count from the due time to keep the mean rate, but do not catch up on missed messages.
             interval = self._interval[message_id]
             following = due_us[message_id] + interval
             due_us[message_id] = following if following > now_us else now_us + interval
@@ -56,16 +56,15 @@ class Streams:
 
 
 ALWAYS = frozenset({"HEARTBEAT", "SYSTEM_TIME", "TIMESYNC"})
-"""What does not hold a measurement, and goes on when the others are frozen."""
+"""Messages without measurements, which continue while the others are frozen."""
 _STAMPS: Mapping[str, int] = {"time_boot_ms": 1_000, "time_usec": 1}
-"""The fields that tell when, since the start, and how many microseconds one of each is."""
+"""The time stamp fields, and their units in microseconds."""
 
 
 class Reports:
-    """Builds the messages of one autopilot by their numbers. A fault may silence one, or let it stick, or freeze all,
-    or delay all at the source.
+    """Builds the messages of one autopilot by id. Faults can silence or stick one message, or freeze or delay all.
 
-    `clock` tells the microseconds since the start.
+    `clock` returns the microseconds since the start.
     """
 
     def __init__(self, build: Mapping[int, Callable[[], Message | None]], clock: Callable[[], int]) -> None:
@@ -77,13 +76,13 @@ class Reports:
         self._delay_us = 0
         self._made: dict[int, deque[tuple[int, Message | None]]] = {}
         self.builders = self._build
-        """What builds each message as it is told now; what it gives is None if there is nothing to tell."""
+        """The current builder of each message, with faults applied."""
 
     def __contains__(self, number: int) -> bool:
         return number in self._build
 
     def message(self, number: int) -> Message | None:
-        """The message of this number with what is known now; None if there is nothing to tell."""
+        """Build the message of this id; None if there is nothing to report."""
         return self.builders[number]()
 
     def _faulty(self, number: int) -> Message | None:
@@ -98,16 +97,16 @@ class Reports:
         return self._build[number]()
 
     def is_silent(self, number: int) -> bool:
-        """Whether a fault keeps this message from coming, as a report or as an answer."""
+        """Return whether a fault suppresses this message, as a stream or as an answer."""
         return number in self._silent
 
     def silence(self, number: int, silent: bool) -> None:
-        """From now on this message does not come, or comes again."""
+        """Suppress a message from now on, or send it again."""
         (self._silent.add if silent else self._silent.discard)(number)
         self._choose()
 
     def stick(self, number: int, stuck: bool) -> None:
-        """From now on this message keeps its values, with new time stamps; or tells what is again."""
+        """Let a message keep its values with new time stamps from now on, or update again."""
         if stuck:
             self._stuck[number] = self._build[number]() if number in self._build else None
         else:
@@ -115,23 +114,23 @@ class Reports:
         self._choose()
 
     def freeze(self, frozen: bool) -> None:
-        """From now on all measurements are those of now, time stamps included; or fresh ones again."""
+        """Freeze all measurements, time stamps included, or update again."""
         self._old = self._measured() if frozen else None
         self._choose()
 
     def delay(self, delay_us: int) -> None:
-        """From now on all measurements are as old as this when they are sent, and say so; or fresh ones again, at 0."""
+        """Delay all measurements by this long at the source, with their old time stamps; 0 ends the delay."""
         self._delay_us = delay_us
         now_us = self._clock()
         self._made = {number: deque([(now_us, m)]) for number, m in self._measured().items()} if delay_us else {}
         self._choose()
 
     def restart(self) -> None:
-        """The clock begins anew: what was made before is not known any more."""
+        """Forget delayed messages after a restart of the clock."""
         self.delay(self._delay_us)
 
     def _choose(self) -> None:
-        """A fault has begun or ended: as long as there is none, messages are built without asking for one."""
+        """Choose the builders after a fault began or ended. Without faults there is no overhead."""
         faults = self._silent or self._stuck or self._old is not None or self._delay_us
         self.builders = {number: partial(self._faulty, number) for number in self._build} if faults else self._build
 

@@ -1,6 +1,6 @@
-"""The world around: the wind, what stands there, and what the vehicle's sensors see of it. Metres, radians.
+"""The surroundings: wind, obstacles, and the range finders' view of them. Metres, radians.
 
-The wind is a mean that faults may step, and gusts about it, drawn from a seeded source.
+The wind is a mean, which faults may change, with gusts from a seeded source.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from random import Random
 from rtshcua.simulation.kinematics import Body
 
 _GUST_SECONDS = 4.0
-"""How long a gust keeps its direction (the correlation time of the process)."""
+"""The correlation time of gusts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,20 +28,20 @@ class Air:
     def __init__(self, wind: Wind, chance: Random) -> None:
         self._chance = chance
         self._gust_north = self._gust_east = 0.0
-        self._dt = 0.0  # the last step, and for that, for 1 m/s of gusts,
-        self._keep, self._spread = 1.0, 0.0  # what stays of a gust and how far it strays
+        self._dt = 0.0  # the last step; the factors below are for this step
+        self._keep, self._spread = 1.0, 0.0  # decay, and spread for 1 m/s of gusts
         self.set(wind)
 
     def set(self, wind: Wind) -> None:
-        """Another mean wind from now on."""
+        """Change the mean wind."""
         speed, towards = wind.speed_mm_s / 1000, radians(wind.from_deg + 180)
         self._mean = (speed * cos(towards), speed * sin(towards))
         self.gusts = wind.gust_mm_s / 1000
-        """Their standard deviation; 0: the air moves evenly, and no step changes that."""
+        """The standard deviation of gusts; 0: steady wind."""
         self._sum()
 
     def step(self, dt: float) -> None:
-        """Lets `dt` seconds pass: an Ornstein-Uhlenbeck process in each axis."""
+        """Advance by `dt` seconds: an Ornstein-Uhlenbeck process in each axis."""
         if not self.gusts:
             return
         if dt != self._dt:
@@ -58,14 +58,14 @@ class Air:
 
 RANGE_MIN_M, RANGE_MAX_M = 0.2, 40.0
 SECTORS = 72
-"""OBSTACLE_DISTANCE looks all around, in sectors of 5 degrees."""
+"""The sectors of OBSTACLE_DISTANCE, 5 degrees each."""
 _BEAM = radians(2.5)
-"""Half of what the sensor that looks ahead sees at once, and of a sector."""
+"""Half the beam width of the forward range finder, and of a sector."""
 
 
 @dataclass(eq=False, slots=True)
 class Cylinder:
-    """A tree, a mast, a house, a crane that drives: round, from the ground up. The place is that of its middle."""
+    """A cylindrical obstacle from the ground up, such as a tree, a mast or a moving crane. The place is its centre."""
 
     north: float
     east: float
@@ -75,7 +75,7 @@ class Cylinder:
     v_east: float = 0.0
 
     def seen_from(self, body: Body, bearing: float) -> float | None:
-        """How far away it is at this bearing from north; None if it is not there, or the vehicle is above it."""
+        """Return its distance at this bearing from north; None if it is elsewhere or below the vehicle."""
         if body.up > self.height:
             return None
         north, east = self.north - body.north, self.east - body.east
@@ -89,58 +89,58 @@ class Cylinder:
         return away * cos(off) - sqrt(max(0.0, self.radius**2 - (away * sin(off)) ** 2))
 
     def is_hit(self, body: Body) -> bool:
-        """Whether the vehicle is where this is."""
+        """Return whether the vehicle is inside it."""
         return body.up < self.height and hypot(self.north - body.north, self.east - body.east) < self.radius
 
     def distance(self, body: Body) -> float:
-        """How far it is from the vehicle, over the ground or through the air above it; 0 inside."""
+        """Return its distance from the vehicle; 0 inside."""
         across = hypot(self.north - body.north, self.east - body.east) - self.radius
         return hypot(max(0.0, across), max(0.0, body.up - self.height))
 
 
 class Surroundings:
-    """All that stands around, and what is said to be ahead though it stands nowhere."""
+    """All obstacles, and a simulated range finder reading without an obstacle."""
 
     def __init__(self) -> None:
         self.pillars: list[Cylinder] = []
         self.moving = False
-        """Whether one of them moves."""
+        """Whether any obstacle moves."""
         self._ahead: float | None = None
 
     def put(self, pillar: Cylinder) -> None:
-        """Something stands there from now on, or moves from there."""
+        """Add an obstacle."""
         self.pillars.append(pillar)
         self.moving = self.moving or (pillar.v_north, pillar.v_east) != (0.0, 0.0)
 
     def take(self, pillar: Cylinder) -> None:
-        """It is gone."""
+        """Remove an obstacle."""
         self.pillars.remove(pillar)
 
     def step(self, dt: float) -> None:
-        """Lets `dt` seconds pass for what moves."""
+        """Move the obstacles by `dt` seconds."""
         for pillar in self.pillars:
             pillar.north += pillar.v_north * dt
             pillar.east += pillar.v_east * dt
 
     def distance(self, body: Body) -> float | None:
-        """How far the nearest thing is; None if nothing stands there."""
+        """Return the distance of the nearest obstacle; None if there is none."""
         return min((pillar.distance(body) for pillar in self.pillars), default=None)
 
     def see(self, distance_m: float | None) -> None:
-        """Something stays ahead at this distance, wherever the vehicle goes; or does no more."""
+        """Set a constant reading ahead at this distance, or None to end it."""
         self._ahead = distance_m
 
     def ahead(self, body: Body) -> float | None:
-        """How far it is to what is ahead, within the range of the sensor."""
+        """Return the distance ahead, within the sensor's range; None if nothing is in range."""
         return self._nearest(body, body.yaw, self._ahead)
 
     def around(self, body: Body) -> list[float | None]:
-        """The same for each sector, the first ahead, then clockwise."""
+        """Return the distance in each sector, from ahead clockwise."""
         step = 2 * pi / SECTORS
         return [self._nearest(body, body.yaw + n * step, self._ahead if n == 0 else None) for n in range(SECTORS)]
 
     def is_hit(self, body: Body) -> bool:
-        """Whether the vehicle has flown into something."""
+        """Return whether the vehicle is inside an obstacle."""
         return bool(self.pillars) and any(pillar.is_hit(body) for pillar in self.pillars)
 
     def _nearest(self, body: Body, bearing: float, least: float | None) -> float | None:

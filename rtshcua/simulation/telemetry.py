@@ -1,4 +1,4 @@
-"""The messages that both flavours stream or list alike, built from what the autopilot knows."""
+"""The messages that both flavours send alike, built from the autopilot's state."""
 
 import struct
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ _EXTENDED_SYS_STATE = maker(mavlink.MAVLink_extended_sys_state_message)
 _SYSTEM_TIME = maker(mavlink.MAVLink_system_time_message)
 
 GOOD_FLAGS, LOST_FLAGS = 0x33F, 0x025
-"""ESTIMATOR_STATUS_FLAGS and EKF_STATUS_FLAGS share these bits: all well; only attitude and height (as recorded)."""
+"""Bits that ESTIMATOR_STATUS_FLAGS and EKF_STATUS_FLAGS share: all valid; only attitude and height (as recorded)."""
 
 _SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -53,7 +53,7 @@ _CAPABILITIES = (
 
 
 def heartbeat(a: Autopilot) -> Message:
-    """HEARTBEAT: mode, armed or not, and state."""
+    """HEARTBEAT: mode, armed flag and state."""
     vehicle, modes, mode = a.vehicle, a.flavour.modes, a.shown.mode
     base = modes.base[mode] | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0)
     if vehicle.blind and mode is FlightMode.LAND:
@@ -74,7 +74,7 @@ def _in_danger(a: Autopilot) -> bool:
 
 
 def sys_status(a: Autopilot) -> Message | None:
-    """SYS_STATUS: which sensors are healthy, and the battery."""
+    """SYS_STATUS: sensor health and the battery."""
     if not a.sensors.answers:
         return None
     present = _SENSORS | (mavlink.MAV_SYS_STATUS_GEOFENCE if a.flavour.tells_fence else 0)
@@ -101,7 +101,7 @@ def _millivolts(a: Autopilot, battery: Battery) -> int:
 
 
 def gps_raw_int(a: Autopilot) -> Message:
-    """GPS_RAW_INT: what the receiver measures, with its noise; the last place again while there is no fix."""
+    """GPS_RAW_INT: the receiver's measurement with noise; the last position while there is no fix."""
     sensors, body = a.sensors, a.vehicle.body
     if not sensors.receives:
         return _GPS_RAW_INT(a.now_us, 0, 0, 0, 0, 65_535, 65_535, 65_535, 65_535, 0)
@@ -117,7 +117,7 @@ def gps_raw_int(a: Autopilot) -> Message:
 
 
 def global_position_int(a: Autopilot) -> Message | None:
-    """GLOBAL_POSITION_INT: the estimate. It goes on as if nothing had happened when the fix is lost, as recorded."""
+    """GLOBAL_POSITION_INT: the estimate. It continues unchanged when the fix is lost, as recorded."""
     body, sensors = a.vehicle.body, a.sensors
     if not sensors.tells_position:
         return None
@@ -147,7 +147,7 @@ def attitude(a: Autopilot) -> Message:
 
 
 def vfr_hud(a: Autopilot) -> Message:
-    """VFR_HUD."""
+    """VFR_HUD: speeds, heading, throttle and altitude."""
     body = a.vehicle.body
     throttle = round(min(100.0, 45 * a.battery.load)) if a.vehicle.in_air else 0
     v_north, v_east, v_up = a.sensors.velocity(body)
@@ -171,14 +171,14 @@ _FUNCTIONS = {
 
 
 def battery_status(a: Autopilot) -> Message:
-    """BATTERY_STATUS of each battery in turn, and of the first one in place of one whose report is not due."""
+    """BATTERY_STATUS of each battery in turn; the first one replaces a battery whose report is not due."""
     number = a.battery_reports % len(a.batteries)
     a.battery_reports += 1
     if number in a.battery_told_us and a.now_us - a.battery_told_us[number] < a.battery_every_us[number]:
         number = 0
     a.battery_told_us[number] = a.now_us
     purpose, battery = a.batteries[number]
-    told = a.flavour.names_batteries  # ArduPilot says of no battery what it feeds (recorded)
+    told = a.flavour.names_batteries  # ArduPilot does not report what a battery feeds (recorded)
     if battery.level <= 0.07:
         charge = mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL
     elif battery.level <= 0.15:
@@ -203,7 +203,7 @@ def battery_status(a: Autopilot) -> Message:
 
 
 def home_position(a: Autopilot) -> Message | None:
-    """HOME_POSITION, once there is one."""
+    """HOME_POSITION; None until home is set."""
     if not a.sensors.has_origin:
         return None
     home = a.home
@@ -213,7 +213,7 @@ def home_position(a: Autopilot) -> Message | None:
 
 
 def distance_sensor(a: Autopilot) -> Message | None:
-    """DISTANCE_SENSOR of what looks ahead or down, of both in turn; its greatest distance if nothing is there."""
+    """DISTANCE_SENSOR of the forward or downward range finder, in turn; the maximum range if nothing is there."""
     ahead, down = Equipment.RANGE in a.extras, Equipment.ALTIMETER in a.extras
     a.looked_down = down and not (ahead and a.looked_down)
     if a.looked_down:
@@ -222,7 +222,7 @@ def distance_sensor(a: Autopilot) -> Message | None:
 
 
 def _looks_down(a: Autopilot) -> Message:
-    """As recorded from PX4's simulation."""
+    """DISTANCE_SENSOR of the downward range finder, as recorded from PX4's simulation."""
     return _DISTANCE_SENSOR(
         a.boot_ms, 0, 10_000, round(a.vehicle.body.up * 100), mavlink.MAV_DISTANCE_SENSOR_LASER, 0,
         mavlink.MAV_SENSOR_ROTATION_PITCH_270, 0,
@@ -244,7 +244,7 @@ def _looks_ahead(a: Autopilot) -> Message:
 
 
 def obstacle_distance(a: Autopilot) -> Message | None:
-    """OBSTACLE_DISTANCE all around, from ahead clockwise; a centimetre more than its greatest distance is nothing."""
+    """OBSTACLE_DISTANCE from ahead clockwise; a centimetre more than the maximum range means no obstacle."""
     if Equipment.RANGE not in a.extras:
         return None
     furthest = int(RANGE_MAX_M * 100)
@@ -263,7 +263,7 @@ def obstacle_distance(a: Autopilot) -> Message | None:
 
 
 def radio_status(a: Autopilot) -> Message:
-    """RADIO_STATUS, from the radio: signal strength of 254 when all is well, and `txbuf` as the link's quality in %."""
+    """RADIO_STATUS of the radio: signal strength 254 at full quality, and `txbuf` as the link quality in %."""
     percent = a.link_quality // 100
     rssi = 254 * percent // 100
     return _RADIO_STATUS(rssi, rssi, percent, 30, 30, 0, 0)
@@ -289,27 +289,27 @@ def autopilot_version(capabilities: int, kind: int, numbered: int) -> Builder:
 
 
 def system_time(a: Autopilot) -> Message:
-    """SYSTEM_TIME: the time of day, once the receiver told it (0 before, as recorded), and since the start."""
+    """SYSTEM_TIME: UTC once the receiver has it (0 before, as recorded), and the time since the start."""
     return _SYSTEM_TIME(a.utc_us + a.now_us if a.sensors.receives else 0, a.boot_ms)
 
 
 AVAILABLE_MODES = 435
-"""The message is not in the dialect: https://mavlink.io/en/messages/common.html#AVAILABLE_MODES."""
+"""Not in the pymavlink dialect: https://mavlink.io/en/messages/common.html#AVAILABLE_MODES."""
 _LAYOUT = struct.Struct("<IIBBB35s")
 
 CURRENT_MODE = 436
-"""Neither is this one: https://mavlink.io/en/messages/common.html#CURRENT_MODE."""
+"""Not in the pymavlink dialect: https://mavlink.io/en/messages/common.html#CURRENT_MODE."""
 _CURRENT_MODE_LAYOUT = struct.Struct("<IIB")
 
 _STANDARD: Mapping[FlightMode, int] = {
     FlightMode.POSITION: 1, FlightMode.ALTITUDE: 4, FlightMode.RETURN: 5, FlightMode.MISSION: 6, FlightMode.LAND: 7,
     FlightMode.TAKEOFF: 8
 }  # fmt: skip
-"""MAV_STANDARD_MODE; others have none (0)."""
+"""MAV_STANDARD_MODE of a mode; 0 for the others."""
 
 
 class _Packed(mavlink.MAVLink_message):  # type: ignore[misc]
-    """A message that the dialect does not have, packed by hand."""
+    """A message that the dialect lacks, with its payload already packed."""
 
     id: int
     name: str
@@ -320,7 +320,7 @@ class _Packed(mavlink.MAVLink_message):  # type: ignore[misc]
         self._bytes = payload
 
     def pack(self, mav: Message, force_mavlink1: bool = False) -> Message:
-        """The frame."""
+        """Return the frame."""
         return self._pack(mav, self.extra, self._bytes, force_mavlink1=force_mavlink1)
 
 
@@ -333,7 +333,7 @@ class _CurrentMode(_Packed):
 
 
 def available_modes(a: Autopilot, number: int) -> bool:
-    """Queues the mode of this number, counted from 1, or all of them for 0; False if there is none of that number."""
+    """Queue the mode of this number from 1, or all modes for 0; return False if there is no such mode."""
     modes = a.flavour.modes
     listed = list(modes.numbers.items())
     if not 0 <= number <= len(listed):
@@ -347,7 +347,7 @@ def available_modes(a: Autopilot, number: int) -> bool:
 
 
 def current_mode(a: Autopilot) -> Message:
-    """CURRENT_MODE."""
+    """CURRENT_MODE of the reported mode."""
     mode = a.shown.mode
     number = a.flavour.modes.numbers[mode]
     payload = _CURRENT_MODE_LAYOUT.pack(number, number, _STANDARD.get(mode, 0))
@@ -368,4 +368,4 @@ COMMON: dict[int, Builder] = {
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: system_time,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda a: a.mission.message(),
 }
-"""Those that both flavours stream alike, by number."""
+"""The shared message builders, by id."""

@@ -1,6 +1,6 @@
-"""The vehicle's state machine: armed or not, on the ground or in the air, and what it may be told. Metres, seconds.
+"""The vehicle's state machine: armed or disarmed, on the ground or in the air, and its commands. Metres, seconds.
 
-It is the same for both flavours; `Handling` and the mode table hold what differs.
+Both flavours share it; `Handling` and the mode table hold the differences.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ class Landed(IntEnum):
 
 
 class VehicleEvent(Enum):
-    """What happened that the autopilot has a text for."""
+    """An event for which the autopilot has a text."""
 
     ARMED = auto()
     DISARMED = auto()
@@ -41,8 +41,8 @@ class VehicleEvent(Enum):
 
 
 class Activity(Enum):
-    """What it does at present; `REST` is to stand on the ground, `TOUCHED` not to know it yet, `WRECK` to lie there,
-    `CRUISE` to fly at a velocity that somebody commands.
+    """The current activity. `REST`: on the ground; `TOUCHED`: on the ground, landing not yet detected; `WRECK`: crashed
+    on the ground; `CRUISE`: flying at a commanded velocity.
     """
 
     REST = auto()
@@ -59,87 +59,87 @@ class Activity(Enum):
     CRUISE = auto()
 
 
-_FACING_M_S = 1.0  # from this speed on the nose turns to where it goes
+_FACING_M_S = 1.0  # above this speed the nose turns towards the direction of flight
 
 _DOWN = (Activity.REST, Activity.TOUCHED, Activity.WRECK)
 _STEADY = (Activity.TRACK, Activity.DESCEND, Activity.CIRCLE, Activity.CRUISE)
-"""Activities that go on until something else is asked for, or the ground comes."""
+"""Activities that continue until another command, or touchdown."""
 _VELOCITY_S = 3.0
-"""A velocity that is not commanded again holds for so long (GUID_TIMEOUT); then it stands."""
+"""How long a commanded velocity holds without renewal (GUID_TIMEOUT); then the vehicle stops."""
 _HARD_M_S = 4.0
-"""Who comes down faster than this breaks."""
+"""A faster touchdown is a crash."""
 
 
 class Multirotor:
-    """A multirotor, at first on the ground at home and disarmed; what it was told, and how it goes on from that."""
+    """A multirotor, initially disarmed on the ground at home, with its commands and their execution."""
 
     def __init__(self, handling: Handling, mode: FlightMode) -> None:
         self.handling = handling
         self.return_under = inf
-        """The height above home that a return does not climb over, for the fence's sake."""
+        """The greatest height above home of a return, limited by the fence."""
         self.body = Body()
         self.mode = mode
         self.armed = False
         self.landed = Landed.ON_GROUND
         self.target = Point(0.0, 0.0, 0.0)
         self.destination: Point | None = None
-        """What it was told to fly to, or chose as the place to stop at: the target that it reports."""
+        """The target that it reports: the commanded place, or its own stopping point."""
         self.sent = False
-        """Whether somebody named that place: no stopping point, no takeoff."""
+        """Whether the destination was commanded, not a stopping point or a takeoff."""
         self.takeoff_up: float | None = None
-        """The height that the takeoff climbs to; kept while disarmed, for arming in TAKEOFF starts it, until that mode
-        is left (PX4: `Takeoff::set_takeoff_position` takes what NAV_TAKEOFF named once).
+        """The height of the takeoff. Kept while disarmed, because arming in TAKEOFF starts it, until that mode is left
+        (PX4: `Takeoff::set_takeoff_position` takes what NAV_TAKEOFF named once).
         """
         self.events: list[VehicleEvent] = []
-        self.blind = False  # flies level, for it has no position to hold
+        self.blind = False  # flies level because it has no position to hold
         self.crashed = False
-        self.touched_m_s = 0.0  # how fast it last came down on the ground
+        self.touched_m_s = 0.0  # the speed of the last touchdown
         self.paused = False
+        """Whether it is paused on its way to a target (ArduCopter)."""
         self.ceiling = inf
-        """It rises no higher, in m."""
-        """Whether it stands still on its way to a target, until told to go on (ArduCopter)."""
-        self._stood_s = 0.0  # since it was armed, or came down
-        self._lifting_s: float | None = None  # until the motors carry it, if it is to lift off
-        self._has_flown = False  # since it was armed
+        """The greatest height that it can reach, in m."""
+        self._stood_s = 0.0  # since arming or touchdown
+        self._lifting_s: float | None = None  # until lift-off, if one is commanded
+        self._has_flown = False  # since arming
         self._activity = Activity.REST
-        self._error = (0.0, 0.0)  # how far its estimate is off
+        self._error = (0.0, 0.0)  # the error of its position estimate
         self._speed: float | None = None
         self._waiting_s = 0.0
         self._nose: float | None = None
         self._radius = 0.0
         self._velocity = (0.0, 0.0, 0.0)
         self._past: guidance.Overshoot | None = None
-        self._comes_back = False  # from behind its target
+        self._comes_back = False  # from an overshoot
         self._steer_to_target()
 
     @property
     def in_air(self) -> bool:
-        """Whether it has left the ground, and does not know that it came down."""
+        """Whether it has left the ground and no landing is detected."""
         return self._activity is not Activity.REST
 
     @property
     def flies(self) -> bool:
-        """Whether it is in the air and obeys."""
+        """Whether it is in the air and controllable."""
         return self._activity not in (Activity.REST, Activity.FALL, Activity.WRECK)
 
     @property
     def lies(self) -> bool:
-        """Whether it lies on the ground as it came down."""
+        """Whether it lies crashed on the ground."""
         return self._activity is Activity.WRECK
 
     @property
     def descends(self) -> bool:
-        """Whether it is on its way down to land, or has come down."""
+        """Whether it descends to land, or has touched down."""
         return self._activity in (Activity.DESCEND, Activity.TOUCHED)
 
     @property
     def orders(self) -> tuple[object, ...]:
-        """What it is about: another one when somebody told it something that it obeys."""
+        """The commanded state; it changes when the vehicle obeys a command."""
         return self.mode, self.armed, self._activity, self.target, self.destination, self.paused
 
     @property
     def speed(self) -> float:
-        """The ground speed that it flies to a target with."""
+        """The ground speed towards a target."""
         handling, speed = self.handling, self._speed
         if self.mode is FlightMode.RETURN and handling.return_speed > 0:
             speed = handling.return_speed
@@ -154,7 +154,7 @@ class Multirotor:
     # ------------------------------------------------------------------------------------------- what it is told
 
     def arm(self) -> None:
-        """Starts the motors; in TAKEOFF mode the climb follows."""
+        """Start the motors; in TAKEOFF mode, begin the climb."""
         if self.armed:
             return
         self.armed = True
@@ -164,7 +164,7 @@ class Multirotor:
             self.climb()
 
     def disarm(self, event: VehicleEvent = VehicleEvent.DISARMED) -> None:
-        """Stops the motors, wherever it is: in the air it falls."""
+        """Stop the motors; in the air the vehicle falls."""
         if not self.armed:
             return
         self.armed = False
@@ -176,13 +176,13 @@ class Multirotor:
             self._activity, self.landed = Activity.REST, Landed.ON_GROUND
         else:
             self._activity = Activity.FALL
-            self.landed = Landed.ON_GROUND  # autopilots call a vehicle landed that is disarmed, wherever it is
+            self.landed = Landed.ON_GROUND  # autopilots report a disarmed vehicle as landed, even in the air
         self.events.append(event)
         if self.handling.after_landing is not None and not self.in_air:
             self.mode = self.handling.after_landing
 
     def restart(self, mode: FlightMode) -> None:
-        """The autopilot starts again, and comes up in this mode: the motors stop, and all that it was told is gone."""
+        """Restart in this mode: the motors stop, and all commands are lost."""
         self.disarm()
         self.events.clear()
         self.mode = mode
@@ -190,17 +190,17 @@ class Multirotor:
         self.blind = self.sent = self.paused = False
 
     def crash(self) -> None:
-        """Has flown into something: it falls. The motors are on, for all that the autopilot knows."""
+        """Hit an obstacle and fall. The autopilot does not notice: the motors stay on."""
         if not self.crashed:
             self.crashed = True
             self._activity = Activity.FALL
             self.body.crash()
 
     def set_mode(self, mode: FlightMode) -> None:
-        """Enters a mode and begins what it does; every mode but TAKEOFF, RETURN and LAND holds the place.
+        """Enter a mode and begin its activity; every mode but TAKEOFF, RETURN and LAND holds the place.
 
-        The mode that it is in already changes nothing: neither autopilot enters it again, and PX4 in Hold flies on to
-        the target of a DO_REPOSITION (recorded). PX4: `UserModeIntention::change`; ArduCopter: `Copter::set_mode`
+        Selecting the current mode has no effect: neither autopilot enters it again, and PX4 in Hold flies on to the
+        target of a DO_REPOSITION (recorded). PX4: `UserModeIntention::change`; ArduCopter: `Copter::set_mode`
         returns at once.
         """
         if mode is self.mode:
@@ -228,7 +228,7 @@ class Multirotor:
             self.hold()
 
     def climb(self) -> None:
-        """Takes off to `takeoff_up` if armed, and if that is above where it is."""
+        """Take off to `takeoff_up` if armed and below that height."""
         up = self.takeoff_up
         if not self.armed or up is None or up <= self.body.up or self._activity is Activity.FALL:
             return
@@ -240,45 +240,45 @@ class Multirotor:
         self.sent = False
 
     def _lift(self, target: Point) -> None:
-        """Runs up the motors; when they carry, it flies to `target`, straight up first if that is a takeoff."""
+        """Spool up the motors, then fly to `target`, straight up first for a takeoff."""
         if not self.crashed:
             self.target = self.destination = target
-            if self._lifting_s is None:  # motors that run up already go on
+            if self._lifting_s is None:  # motors that spool up already continue
                 agility = self.handling.agility
                 self._lifting_s = max(agility.spool_s - self._stood_s, 0.0) + agility.ramp_s
 
     def hold(self, up: float | None = None) -> None:
-        """Stops as soon as it can and stays there, or goes to another height."""
+        """Stop as soon as possible and hold, optionally at another height."""
         if self.flies:
             self._hold(up=up)
 
     def pause(self) -> None:
-        """Stops on its way; the target stays what it is, and so does one that comes meanwhile, until `go_on`."""
+        """Stop on the way to a target. The target, or a later one, is kept until `go_on`."""
         if self.flies and not self.paused:
             self._cruise(0.0, 0.0, 0.0)
             self.paused = True
 
     def go_on(self) -> None:
-        """Goes on to the target after a pause."""
+        """Continue to the target after a pause."""
         if self.paused:
             self.paused = False
             if self.sent and self.destination is not None:
                 self.go_to(self.destination)
 
     def turn_to(self, nose: float) -> None:
-        """Points the nose there, in radians from north, until the mode or the target changes."""
+        """Point the nose in a direction, radians from north, until the mode or the target changes."""
         self._nose = nose
 
     def land_here(self) -> None:
-        """Descends and lands, whatever the mode."""
+        """Descend and land, in any mode."""
         if self.flies:
             self._hold(Activity.DESCEND, self.body.up)
             self._waiting_s = 0.0
             self.landed = Landed.LANDING
 
     def return_home(self) -> None:
-        """Climbs to the height of the way home, flies home and lands, whatever the mode. Both autopilots count that
-        height once, from the place above which they climb.
+        """Climb to the return height, fly home and land, in any mode. Both autopilots compute that height once, where
+        they begin to climb.
         """
         if self.flies:
             body = self.body
@@ -293,13 +293,13 @@ class Multirotor:
                 self.destination = replace(self.destination, up=up)
 
     def wait(self, seconds: float) -> None:
-        """Keeps its height for so long before it goes on landing."""
+        """Hold the height for so long before the landing continues."""
         self._waiting_s = seconds
 
     def go_to(self, target: Point, *, past: bool = True) -> None:
-        """Flies straight to `target`; on the ground it does nothing, or lifts off if armed, as the flavour does.
+        """Fly straight to `target`; on the ground, do nothing, or lift off if armed, depending on the flavour.
 
-        `past`: whether it may fly past it, and come back.
+        `past`: whether it may overshoot the target and come back.
         """
         if self.flies:
             if self.handling.forgets_at_first_target and self.mode is FlightMode.GUIDED and not self.sent:
@@ -320,7 +320,7 @@ class Multirotor:
             self._lift(target)
 
     def fly_at(self, north: float, east: float, up: float) -> None:
-        """Flies at a velocity, for a while after it was last told to, and then stands; it names no target."""
+        """Fly at a velocity for a limited time, then stop; no target is reported."""
         if self.flies:
             self.destination, self.sent, self._nose = None, False, None
             if self.paused:
@@ -334,12 +334,12 @@ class Multirotor:
         self.landed = Landed.IN_AIR
 
     def shift_east(self, metres: float) -> None:
-        """Moves the place that it holds, or lands at."""
+        """Move the place that it holds or lands at."""
         if self.flies:
             self.target = Point(self.target.north, self.target.east + metres, self.target.up)
 
     def circle(self, centre: Point, radius: float) -> None:
-        """Flies around a place, clockwise seen from above if the radius is positive, until told otherwise."""
+        """Circle a place until the next command, clockwise seen from above if the radius is positive."""
         if self.flies:
             self.target, self._radius = centre, radius
             self._past = None
@@ -351,9 +351,9 @@ class Multirotor:
     def step(
         self, dt: float, wind: tuple[float, float], error: tuple[float, float], powered: bool, sees: bool = True
     ) -> float:
-        """Lets `dt` seconds pass, in this wind, steering by a position that is off by `error`, or by none (`sees`).
+        """Advance by `dt` seconds in this wind, steering by a position with `error`, or without one (`sees`).
 
-        Returns the load on the battery, hovering being 1.
+        Return the load on the battery relative to hovering.
         """
         activity, body = self._activity, self.body
         self._error = error
@@ -374,18 +374,18 @@ class Multirotor:
         return battery.flight_load(airspeed, body.v_up, body.thrust())
 
     def _believed(self, north: float, east: float, up: float) -> Point:
-        """A place as it takes it to be: it steers by its estimate, which may be off."""
+        """Return a true place as the vehicle estimates it."""
         return Point(north + self._error[0], east + self._error[1], up)
 
     def _hold(self, activity: Activity = Activity.TRACK, up: float | None = None) -> None:
-        """Stops where it can, at the height `up`, or where it can stop climbing as well."""
+        """Stop as soon as possible, at the height `up`, or where the climb ends."""
         body, agility = self.body, self.handling.agility
         stop = agility.brake if self.mode is FlightMode.BRAKE else agility.stop
         if self.mode is FlightMode.LAND:
             stop = agility.land
         self._approach, self._hardest = stop.approach, stop.hardest
         if up is None:
-            # PX4 comes back to the height where it was told to hold (recorded); ArduCopter stops ahead of it.
+            # PX4 returns to the height where hold was commanded (recorded); ArduCopter stops beyond it.
             ahead = 0.0 if self.handling.comes_back else body.v_up**2 / (2 * agility.climb_acceleration)
             up = body.up + copysign(ahead, body.v_up)
         self.target = self._believed(*stop.place(body), up)
@@ -396,7 +396,7 @@ class Multirotor:
         self.landed = Landed.IN_AIR
 
     def _fly_past(self, target: Point) -> None:
-        """It will fly past a place that it flies to from here, and come back to it."""
+        """Plan the overshoot past a target."""
         here = self._believed(self.body.north, self.body.east, self.body.up)
         self._past = guidance.past(here, target, self.speed, self.handling.agility)
         self._comes_back = False
@@ -443,7 +443,7 @@ class Multirotor:
             body.turn(dt, heading(body.v_north, body.v_east))
 
     def _advance(self, error: tuple[float, float]) -> None:
-        """Goes on to the next part of a takeoff or a return when the present one is done."""
+        """Begin the next part of a takeoff or a return when the current one is done."""
         activity, body = self._activity, self.body
         away = abs(self.target.up - body.up)
         if activity is Activity.CLIMB:
@@ -471,7 +471,7 @@ class Multirotor:
             self.events.append(VehicleEvent.HOME)
 
     def _climb_rate(self, north: float, east: float) -> float:
-        """Upwards, as far as it can; (north, east) is the target as it is steered to."""
+        """Return the climb rate, limited by the ceiling; (north, east) is the target that it steers to."""
         return min(self._wanted_climb(north, east), max(self.ceiling - self.body.up, 0.0))
 
     def _wanted_climb(self, north: float, east: float) -> float:

@@ -1,7 +1,7 @@
-"""The simulation as a whole, sans I/O: time and datagrams in, datagrams out.
+"""The whole simulation without I/O: time and datagrams in, datagrams out.
 
-Time moves in ticks of 20 ms, however it is asked to advance, so that the same configuration and the same datagrams at
-the same times give the same bytes.
+Time always advances in ticks of 20 ms, so that the same configuration and the same datagrams at the same times give
+the same bytes.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,7 +26,7 @@ FLAVOURS: Mapping[AutopilotKind, Flavour] = {AutopilotKind.PX4: Px4(), Autopilot
 
 
 class Truth(NamedTuple):
-    """Where the vehicle really is and what it does, whatever it reports; mm and mm/s from home, battery in 1/10000."""
+    """The true state of the vehicle, whatever it reports; mm and mm/s from home, battery in 1/10000."""
 
     north_mm: int
     east_mm: int
@@ -40,19 +40,19 @@ class Truth(NamedTuple):
     mode: FlightMode
     battery: int
     crashed: bool
-    """Whether it flew into something, or came down too hard."""
+    """Whether it hit an obstacle or touched down too hard."""
     distance_to_obstacle_mm: int | None
-    """How far the nearest thing is that stands around or moves there, through the air; 0 in contact, None for none."""
+    """Distance to the nearest obstacle; 0 in contact, None without obstacles."""
     wind_north_mm_s: int
-    """Where the air goes now, gusts included."""
+    """The velocity of the air, gusts included."""
     wind_east_mm_s: int
     taken_over_us: int | None
-    """When a pilot or a failsafe first took over in flight, or while it was armed, so that it obeyed; None before."""
+    """When a pilot or a failsafe first took over the armed vehicle with effect; None before."""
     taken_over_by: Taker | None
 
 
 class Simulation:
-    """A vehicle, the air around it, and the link to it. Times are microseconds since its start."""
+    """A vehicle, the air around it, and its link. Times are microseconds since the start."""
 
     def __init__(self, config: SimulationConfig) -> None:
         flavour, recorded = FLAVOURS[config.flavour], config.answers is Answers.RECORDED
@@ -66,9 +66,9 @@ class Simulation:
         self._taken_over_us: int | None = None
         self._inbox = Inbox(flavour.lanes, Random(f"{config.seed} answers")) if recorded else None
         self.heard: Callable[[int, bytes], None] | None = None
-        """Is given each good frame that comes to the vehicle, and when, if somebody wants to know."""
+        """Optional callback for each valid frame that reaches the vehicle, with its time."""
         self.obeyed: Callable[[int, bytes], None] | None = None
-        """And this, when the autopilot gets to it."""
+        """Optional callback for each frame that the autopilot obeys, with its time."""
         self._events: list[tuple[int, int, Callable[[], object]]] = []
         self._order = count()
         for fault in config.faults:
@@ -76,57 +76,31 @@ class Simulation:
 
     @property
     def now_us(self) -> int:
-        """How far time has come."""
+        """The current time."""
         return self._now_us
 
     @property
     def next_us(self) -> int | None:
-        """When the vehicle gets to what it was sent, if that waits for it: the time to advance to for its answer."""
+        """When the vehicle handles the next waiting message, and so answers it; None if none waits."""
         return None if self._inbox is None else self._inbox.next_us
 
     @property
     def damaged(self) -> int:
-        """How many stretches of bytes the vehicle received that were no good frame."""
+        """The number of received byte sequences that were not valid frames."""
         return self._face.damaged
 
     def advance(self, to_us: int) -> list[bytes]:
-        """Lets time pass until `to_us`; the datagrams that arrive at the other end meanwhile, one frame in each."""
-        autopilot, face, up, down, inbox = self._autopilot, self._face, self._up, self._down, self._inbox
-        surroundings, events = autopilot.surroundings, self._events
-        at_us = self._ticked_us + TICK_US
-        while at_us <= to_us:
-            if inbox is not None and inbox.next_us is not None:
-                self._obey(inbox, at_us - 1)
-            self._ticked_us = at_us
-            if surroundings.moving:
-                surroundings.step(TICK_US / 1_000_000)
-            if events:
-                self._happen(at_us)
-            if up.under_way:
-                self._deliver(at_us)
-            if inbox is not None and inbox.next_us is not None:
-                self._obey(inbox, at_us)
-            if not self._halted:
-                autopilot.tick()
-                if autopilot.outbox or autopilot.now_us >= autopilot.streams.next_us:
-                    down.send(face.due(), at_us)
-            if autopilot.taker is not None and self._taken_over_us is None:
-                self._taken_over_us = at_us
-            if at_us >= face.radio_due_us:
-                down.send((face.radio(at_us),), at_us)
-            for voice in autopilot.voices:
-                if said := voice.due(autopilot, self._system, at_us):
-                    down.send(said, at_us)
-            at_us += TICK_US
-        now_us = self._now_us
-        if to_us > now_us:
-            self._now_us = now_us = to_us
-        if inbox is not None and inbox.next_us is not None:
-            self._obey(inbox, now_us)
-        return down.due(now_us) if down.under_way else []
+        """Advance to `to_us`; return the datagrams that arrive at the other end meanwhile, one frame in each."""
+        for at_us in range(self._ticked_us + TICK_US, to_us + 1, TICK_US):
+            self._tick(at_us)
+        if to_us > self._now_us:
+            self._now_us = to_us
+        if self._inbox is not None and self._inbox.next_us is not None:
+            self._obey(self._inbox, self._now_us)
+        return self._down.due(self._now_us) if self._down.under_way else []
 
     def receive(self, data: bytes, at_us: int) -> list[bytes]:
-        """The other end sends a datagram at `at_us`: lets time pass until then, and gives what `advance` would.
+        """Send a datagram to the vehicle at `at_us`; advance until then and return datagrams as `advance` does.
 
         On a link without delay the vehicle has obeyed when this returns, and its answers are among the datagrams.
         """
@@ -138,13 +112,13 @@ class Simulation:
         return before + self._down.due(self._now_us)
 
     def inject(self, fault: Fault) -> None:
-        """Adds a fault; one whose time is over happens at the next tick."""
+        """Add a fault; a fault whose time has passed takes effect at the next tick."""
         on = Affected(self._autopilot, self._up, self._down, self._halt, self._reboot)
         for at_us, effect in effects(fault, on):
             heappush(self._events, (at_us, next(self._order), effect))
 
     def truth(self) -> Truth:
-        """What really is, as of the last tick."""
+        """Return the true state as of the last tick."""
         vehicle = self._autopilot.vehicle
         body = vehicle.body
         surroundings = self._autopilot.surroundings
@@ -168,8 +142,32 @@ class Simulation:
             self._autopilot.taker,
         )
 
+    def _tick(self, at_us: int) -> None:
+        autopilot, face, down, inbox = self._autopilot, self._face, self._down, self._inbox
+        if inbox is not None and inbox.next_us is not None:
+            self._obey(inbox, at_us - 1)
+        self._ticked_us = at_us
+        if autopilot.surroundings.moving:
+            autopilot.surroundings.step(TICK_US / 1_000_000)
+        if self._events:
+            self._happen(at_us)
+        if self._up.under_way:
+            self._deliver(at_us)
+        if inbox is not None and inbox.next_us is not None:
+            self._obey(inbox, at_us)
+        if not self._halted:
+            autopilot.tick()
+            if autopilot.outbox or autopilot.now_us >= autopilot.streams.next_us:
+                down.send(face.due(), at_us)
+        if autopilot.taker is not None and self._taken_over_us is None:
+            self._taken_over_us = at_us
+        if at_us >= face.radio_due_us:
+            down.send((face.radio(at_us),), at_us)
+        for voice in autopilot.voices:
+            down.send(voice.due(autopilot, self._system, at_us), at_us)
+
     def _halt(self, halted: bool) -> None:
-        """The autopilot's loop halts, or goes on: while it does the autopilot stands still, its clock too."""
+        """Halt or resume the autopilot's loop, including its clock."""
         self._halted = halted
 
     def _reboot(self) -> None:
@@ -179,7 +177,7 @@ class Simulation:
             self._inbox.clear()
 
     def _deliver(self, now_us: int) -> None:
-        """What has come over the link is obeyed at once, or put where the autopilot gets to it."""
+        """Obey arrived frames at once, or queue them in the inbox."""
         if self._halted:
             return
         inbox = self._inbox
@@ -195,10 +193,10 @@ class Simulation:
                     inbox.put(received, now_us)
 
     def _obey(self, inbox: Inbox, until_us: int) -> None:
-        """What the autopilot gets to until then is obeyed."""
+        """Obey the queued frames that are due by `until_us`."""
         if not self._halted:
             for at_us, received in inbox.due(until_us):
-                self._answer(received, max(at_us, self._ticked_us))  # what waited while it was halted comes after
+                self._answer(received, max(at_us, self._ticked_us))  # frames that waited during a halt are late
 
     def _answer(self, received: ReceivedFrame, now_us: int) -> None:
         if self.obeyed is not None:

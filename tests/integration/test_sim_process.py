@@ -211,10 +211,10 @@ def test_busy_port_is_said_plainly() -> None:
         (["--port", "14550", "--speed", "nan"], "`nan` is not a number"),
         (["--port", "14550", "--flavour", "betaflight"], "invalid choice"),
         (["--port", "14550", "--home", "1,2"], "`1,2` is not LAT,LON,AMSL"),
-        (["--port", "14550", "--home=-89,2,3"], "home is between 85 degrees"),
+        (["--port", "14550", "--home=-89,2,3"], "latitude of home must be from -85 to 85 degrees"),
         (["--port", "14550", "--fault", "rain"], "no such fault: `rain`"),
         (["--port", "14550", "--signing-key", "/nowhere"], "cannot read `/nowhere`"),
-        (["--port", "14550", "--signing-key", "/dev/null"], "`/dev/null` holds no key"),
+        (["--port", "14550", "--signing-key", "/dev/null"], "`/dev/null` does not hold a key"),
     ],
 )
 def test_bad_options(options: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -66,7 +66,7 @@ def test_a_file_of_another_kind_is_named(
         ("archive ad x", "no such command: `archive ad`|did you mean `rtshcua archive add`?"),
         ("keys frobnicate", "no such command: `keys frobnicate`|`rtshcua keys --help` lists the commands"),
         ("sim --fault batery,at=3s", "no such fault: `batery`; did you mean `battery`?"),
-        ("sim --fault quantum,at=3s", "no such fault: `quantum`; there are battery, "),
+        ("sim --fault quantum,at=3s", "no such fault: `quantum`; expected one of battery, "),
     ],
 )
 def test_an_unknown_word_is_answered_with_the_nearest(

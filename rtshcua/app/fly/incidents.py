@@ -20,7 +20,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Event
-from rtshcua.simulation.fault_syntax import fault_words
+from rtshcua.simulation.fault_syntax import format_fault
 from rtshcua.virtual.expectations import Met, recorded
 from rtshcua.virtual.scenario import Due, Triggers
 
@@ -104,7 +104,7 @@ class Incidents:
             incident = self.scenario.incidents[number]
             told = f"{at_us / 1_000_000:.2f} s: {incident.text}"
             try:
-                self._simulator.inject(fault_words(replace(incident.fault, at_us=0)))
+                self._simulator.inject(format_fault(replace(incident.fault, at_us=0)))
             except SimulatorError as error:  # the run finds out by itself, as it would of any vehicle that is gone
                 told += f": {error}"
             self.happened.append(told)

@@ -1,1 +1,1 @@
-"""What ArduCopter does its own way. Each file has a twin in `px4`."""
+"""The behaviour that is specific to ArduCopter. Each file has a counterpart in `px4`."""

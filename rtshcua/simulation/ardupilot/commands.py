@@ -13,11 +13,11 @@ from rtshcua.simulation.mission_protocol import AMSL_FRAMES, RELATIVE_FRAMES
 from rtshcua.simulation.place import Point
 
 _RELATIVE_FRAMES = RELATIVE_FRAMES | {None}
-"""None is COMMAND_LONG, which has no frame: its altitudes are relative."""
+"""None stands for COMMAND_LONG, which has no frame: its altitudes are relative."""
 
 
 def above_home(a: Autopilot, frame: int | None, altitude: float) -> float | None:
-    """Metres above home; None for a frame that this vehicle cannot follow (above terrain), or no number."""
+    """Return metres above home; None for an unsupported frame (above terrain) or an altitude that is not finite."""
     if not isfinite(altitude):
         return None
     if frame in AMSL_FRAMES:
@@ -26,7 +26,7 @@ def above_home(a: Autopilot, frame: int | None, altitude: float) -> float | None
 
 
 def _takeoff(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """Needs a relative frame, and to be armed, landed and in GUIDED; in LOITER it is accepted and does nothing."""
+    """Handle NAV_TAKEOFF: requires a relative frame, armed, landed, GUIDED; in LOITER it is accepted without effect."""
     if command.frame not in _RELATIVE_FRAMES:
         return (DENIED,)
     vehicle, up = a.vehicle, command.altitude
@@ -61,9 +61,9 @@ def _reposition(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def _pause(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """DO_PAUSE_CONTINUE, in GUIDED (`ModeGuided::pause`): a target that comes while it stands is kept for later.
+    """Handle DO_PAUSE_CONTINUE in GUIDED (`ModeGuided::pause`): a target that arrives during a pause is kept.
 
-    AUTO, which the real one pauses too, is left out.
+    Pausing AUTO, which ArduCopter supports, is not simulated.
     """
     if a.vehicle.mode is not FlightMode.GUIDED:
         return (FAILED,)
@@ -77,7 +77,7 @@ def _pause(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def _yaw(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """Parameter 4: whether the angle is from north, or from where the nose points; then parameter 3 says which way."""
+    """Handle CONDITION_YAW. Parameter 4: the angle is from north or from the heading, then parameter 3 is the sense."""
     vehicle = a.vehicle
     if vehicle.mode is not FlightMode.GUIDED:
         return (FAILED,)
@@ -95,7 +95,7 @@ def _set_mode(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def enter_number(a: Autopilot, number: int) -> tuple[int, ...]:
-    """Enters the mode with this `custom_mode`, or says why it does not; the result."""
+    """Enter the mode with this `custom_mode`, or send a text with the reason; return the result."""
     mode = a.flavour.modes.mode(number)
     if mode is None:
         a.say(mavlink.MAV_SEVERITY_WARNING, f"No such mode {number}")
@@ -108,7 +108,9 @@ def enter_number(a: Autopilot, number: int) -> tuple[int, ...]:
 
 
 def _mission_start(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
-    """Enters AUTO and lets the mission leave the ground; as recorded, its first item is told twice. It does not arm."""
+    """Handle MISSION_START: enter AUTO and start the mission without arming. As recorded, the first item's text is sent
+    twice.
+    """
     if not a.can_enter(FlightMode.MISSION) or not a.mission.start():
         return (FAILED,)
     if a.vehicle.armed:
@@ -122,7 +124,7 @@ def _set_current(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def _fence_enable(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """DO_FENCE_ENABLE: the same as setting FENCE_ENABLE."""
+    """Handle DO_FENCE_ENABLE like setting FENCE_ENABLE."""
     if whole(command.p1) not in (0, 1):
         return (FAILED,)
     a.send(a.parameters.assign("FENCE_ENABLE", whole(command.p1)))

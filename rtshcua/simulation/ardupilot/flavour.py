@@ -1,7 +1,7 @@
-"""ArduCopter, as recorded from 4.7: its modes, how it comes up, what it refuses, what it does when nobody asks.
+"""ArduCopter as recorded from 4.7: modes, boot sequence, refusals, and behaviour without commands.
 
-It asks for items with the legacy MISSION_REQUEST and takes either form. Slot 0 of a mission is home, whatever was
-uploaded there. Whether a waypoint is outside the fence it asks neither at upload nor at the start.
+It requests items with the legacy MISSION_REQUEST and accepts either form. Slot 0 of a mission is home, whatever was
+uploaded there. It does not check waypoints against the fence, neither at upload nor at the start.
 """
 
 from collections.abc import Callable
@@ -36,25 +36,25 @@ _BASE = (
     | enums.MAV_MODE_FLAG_STABILIZE_ENABLED
     | enums.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 )
-"""In every mode; guided in those that hold a place."""
+"""`base_mode` in every mode; modes that hold a place add the guided bit."""
 _REPOSITION_M_S = 1.25
-"""Half of WPNAV_ACCEL, as `land_run_horizontal_control` takes it."""
+"""Half of WPNAV_ACCEL, as in `land_run_horizontal_control`."""
 
 _UNSIGNED = frozenset({"RADIO_STATUS", "RADIO"})
 _PARAMETERS = frozenset({"PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "PARAM_SET"})
-"""What another thread answers (`GCS_MAVLINK::param_io_timer`)."""
+"""The messages that another thread answers (`GCS_MAVLINK::param_io_timer`)."""
 
 _CEILING, _CIRCLE, _POLYGON, _FLOOR = 1, 2, 4, 8
 """The bits of FENCE_TYPE."""
 _REPORT, _RETURN, _LAND, _BRAKE = 0, 1, 2, 4
-"""FENCE_ACTION; the smart returns (3, 5) are plain ones here."""
+"""FENCE_ACTION; the smart returns (3, 5) are simulated as plain returns."""
 _GIVE_UP_M = 100.0
-"""So far outside, it lands instead of coming back."""
+"""Farther outside than this, it lands instead of returning."""
 _VEL_LIMIT = 2
 
 
 def _limits(value: Callable[[str], float], area: FenceArea) -> FenceLimits | None:
-    """The fence that FENCE_* parameters and the upload make."""
+    """Return the fence of the FENCE_* parameters and the upload."""
     kinds = int(value("FENCE_TYPE"))
     if value("FENCE_ENABLE") < 1:
         return None
@@ -64,7 +64,7 @@ def _limits(value: Callable[[str], float], area: FenceArea) -> FenceLimits | Non
         included = (*included, FenceCircle((0.0, 0.0), value("FENCE_RADIUS")))
     ceiling = value("FENCE_ALT_MAX") if kinds & _CEILING else inf
     floor = value("FENCE_ALT_MIN") if kinds & _FLOOR else -inf
-    # `ModeRTL::compute_return_target` takes a return down to `get_safe_alt_max`
+    # `ModeRTL::compute_return_target` lowers a return to `get_safe_alt_max`
     return FenceLimits(FenceArea(included, excluded, every=True), ceiling, floor, ceiling - value("FENCE_MARGIN"))
 
 
@@ -94,7 +94,7 @@ def _judge(
 
 
 def _may_enter(items: tuple[PlanItem, ...], vehicle: Multirotor) -> bool:
-    """Armed and on the ground, only a mission whose first item that takes time is a takeoff."""
+    """Return whether AUTO may be entered: on the ground and armed, the first navigation item must be a takeoff."""
     on_ground = vehicle.armed and not vehicle.in_air
     return (
         not on_ground
@@ -103,11 +103,11 @@ def _may_enter(items: tuple[PlanItem, ...], vehicle: Multirotor) -> bool:
 
 
 _PLACE, _VELOCITY = 0b111, 0b111_000
-"""Bits of `type_mask` that say that a place, or a velocity, does not count."""
+"""The bits of `type_mask` that disable the place and the velocity."""
 
 
 class ArduCopter(Flavour):
-    """ArduCopter."""
+    """The flavour ArduCopter."""
 
     autopilot = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     modes = ModeTable(
@@ -133,7 +133,7 @@ class ArduCopter(Flavour):
         stands_by=True,
         names=COPTER_NAMES,
     )
-    boot = BootPlan(  # the checks pass long before there is a position
+    boot = BootPlan(  # the checks pass long before the position is valid
         answers_s=2.5,
         standby_s=3.0,
         booting=mavlink.MAV_STATE_BOOT,
@@ -199,7 +199,7 @@ class ArduCopter(Flavour):
     beats_on_mode = reminds = tells_fence = True
     fix = mavlink.GPS_FIX_TYPE_RTK_FIXED
     coast_s = 7.0
-    key_ahead_us = 60_000_000  # recorded; against what was heard before a restart (`load_signing_key`)
+    key_ahead_us = 60_000_000  # recorded; protects against replay of frames from before a restart (`load_signing_key`)
     handling, parameters = HANDLING, PARAMETERS
     names_batteries = False  # recorded: function and type are 0, unknown
     bytewise = False
@@ -225,7 +225,7 @@ class ArduCopter(Flavour):
     fence = FenceRules(limits=_limits, name=_name, every=True, critical=lambda _: False)
 
     def arming(self, a: Autopilot) -> tuple[str, ...]:
-        """What stands against arming. A mode that does without a position can be armed in without one."""
+        """Return the failed arming checks. Modes that need no position can be armed in without one."""
         found = []
         if a.vehicle.crashed:
             found.append("Leaning")
@@ -245,15 +245,15 @@ class ArduCopter(Flavour):
         return tuple(found)
 
     def release(self, *, keyed: bool) -> tuple[int, int]:
-        """What was recorded."""
+        """Return the recorded release."""
         return 4, 7
 
     def obeys_unsigned(self, a: Autopilot, name: str) -> bool:
-        """Anything on the first channel, taken for USB, as recorded; radios elsewhere."""
+        """Return whether the message is obeyed unsigned: any on the first channel (USB, recorded), else radio."""
         return a.usb or name in _UNSIGNED
 
     def home_item(self, home: HomePosition) -> PlanItem | None:
-        """Slot 0 of every mission."""
+        """Return home as slot 0 of every mission."""
         return PlanItem(
             mission_protocol.WAYPOINT,
             mavlink.MAV_FRAME_GLOBAL,
@@ -263,18 +263,18 @@ class ArduCopter(Flavour):
         )
 
     def on_setup_signing(self, a: Autopilot, message: Message) -> None:
-        """Never while armed, as recorded; not even to switch it off."""
+        """Handle SETUP_SIGNING: refused while armed, even to disable signing, as recorded."""
         if a.vehicle.armed:
             a.say(mavlink.MAV_SEVERITY_WARNING, "ERROR: Won't setup signing when armed")
         else:
             a.signing.set_up(message, a.now_us)
 
     def on_set_mode(self, a: Autopilot, number: int) -> tuple[int, ...]:
-        """Acknowledged with the message's own number as the command."""
+        """Handle SET_MODE; acknowledged with the message's own id as the command."""
         return enter_number(a, number)
 
     def on_position_target(self, a: Autopilot, message: Message) -> None:
-        """Flown to in GUIDED and in the air, ignored in silence else; so is a velocity without a place."""
+        """Fly to the target, or at its velocity if it has no place, in GUIDED in the air; otherwise ignore it."""
         self._fly_at(a, message)
         up = above_home(a, message.coordinate_frame, message.alt)
         if a.vehicle.mode is FlightMode.GUIDED and up is not None and not message.type_mask & 0b111:
@@ -283,7 +283,7 @@ class ArduCopter(Flavour):
                 a.vehicle.go_to(target)
 
     def on_local_target(self, a: Autopilot, message: Message) -> None:
-        """The same, from home in metres, north, east and down."""
+        """Fly to a target in metres from home, north, east and down, or at its velocity, under the same conditions."""
         self._fly_at(a, message)
         if message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED and not message.type_mask & 0b111:
             target = Point(message.x, message.y, -message.z)
@@ -292,18 +292,18 @@ class ArduCopter(Flavour):
 
     @staticmethod
     def _fly_at(a: Autopilot, message: Message) -> None:
-        """At a velocity, where it names no place (ArduCopter: `handle_message_set_position_target_local_ned`)."""
+        """Fly at a velocity if the message has no place (`handle_message_set_position_target_local_ned`)."""
         mask = message.type_mask
         if a.vehicle.mode is FlightMode.GUIDED and mask & _PLACE == _PLACE and not mask & _VELOCITY:
             a.vehicle.fly_at(message.vx, message.vy, -message.vz)
 
     def on_data_stream(self, a: Autopilot, stream: int, rate_hz: int) -> None:
-        """Sets every message of the group, whatever SET_MESSAGE_INTERVAL said before."""
+        """Set the interval of every message of the group, overriding SET_MESSAGE_INTERVAL."""
         for number in GROUPS.get(stream, ()):
             a.streams.set(number, 1_000_000 // rate_hz if rate_hz > 0 else -1)
 
     def on_plan(self, a: Autopilot, kind: int) -> None:
-        """Tells that a plan was stored, and how many items it has."""
+        """Report a stored plan and its number of items."""
         if kind == mission_protocol.MISSION:
             a.say(_INFO, "Flight plan received")
         elif kind == mission_protocol.FENCE:
@@ -316,15 +316,15 @@ class ArduCopter(Flavour):
         a.send(a.parameters.assign(name, len(a.plans.items(kind))))
 
     def on_sticks(self, a: Autopilot, for_us: int) -> None:
-        """LAND_REPOSITION: moves it aside while it lands, and in the modes that the sticks fly."""
+        """Shift the vehicle while landing (LAND_REPOSITION) and in LOITER and POSHOLD."""
         vehicle = a.vehicle
         if vehicle.mode in (FlightMode.LOITER, FlightMode.POSITION) or vehicle.descends:
             vehicle.shift_east(_REPOSITION_M_S * for_us / 1_000_000)
 
     def on_breach(self, a: Autopilot, breach: Breach) -> None:
-        """Tells of it, and does what FENCE_ACTION asks for, once.
+        """Report a breach and take FENCE_ACTION, once.
 
-        Whoever changes the mode after that is obeyed for as long as the breach lasts ("Manual recovery"), as recorded.
+        A mode change after that is obeyed for the rest of the breach ("Manual recovery"), as recorded.
         """
         kind = mavlink.FENCE_BREACH_MAXALT if breach.name == "Max Alt" else mavlink.FENCE_BREACH_BOUNDARY
         count = min(a.fence.count, 65_535)
@@ -341,9 +341,9 @@ class ArduCopter(Flavour):
             vehicle.set_mode(FlightMode.RETURN)
 
     def on_mode_in_breach(self, a: Autopilot) -> None:
-        """A new mode while the fence is breached counts as the pilot bringing it back."""
+        """Report manual recovery: a mode change during a breach counts as the pilot's."""
         a.say(_INFO, "Manual recovery started")
 
     def on_breach_cleared(self, a: Autopilot) -> None:
-        """The vehicle is inside again."""
+        """Report the end of a breach."""
         a.say(mavlink.MAV_SEVERITY_NOTICE, "Fence breach cleared")

@@ -1,4 +1,4 @@
-"""ArduCopter's parameters, as far as this vehicle has them, and how it flies."""
+"""ArduCopter's simulated parameters and flight characteristics."""
 
 from rtshcua.simulation.handling import Agility, Handling, Stopping
 from rtshcua.simulation.kinematics import Approach
@@ -43,7 +43,7 @@ PARAMETERS = (
     AutopilotParameter("WPNAV_SPEED_DN", attribute="descent", scale=100),
     AutopilotParameter("WPNAV_SPEED_UP", attribute="climb", scale=100),
 )
-"""In the order of their indices."""
+"""Ordered by index."""
 
 
 def _loiter(speed: float) -> float:
@@ -83,15 +83,15 @@ _AGILITY = Agility(
     land_braking=0.55,
     return_wait_s=5.0,
 )
-"""As measured on recorded flights of ArduCopter 4.7."""
+"""Measured on recorded flights of ArduCopter 4.7."""
 
 
 _FLATTEST = 0.5
-"""RTL_MIN_CONE_SLOPE: a flatter cone is none."""
+"""RTL_MIN_CONE_SLOPE: a flatter cone is ignored."""
 
 
 def _return_height(handling: Handling, away: float, up: float) -> float:
-    """`ModeRTL::compute_return_target` of mode_rtl.cpp, over home, without terrain or rally points."""
+    """Return the return height as `ModeRTL::compute_return_target` (mode_rtl.cpp), without terrain or rally points."""
     least = max(0.3, up + handling.climb_least)
     height = max(handling.return_up, least)
     if handling.cone_slope >= _FLATTEST:
@@ -109,6 +109,6 @@ HANDLING = Handling(
     landed_disarm_s=0.3,
     acceleration=2.5,
     forgets_speed=True,
-    forgets_at_first_target=True,  # `pos_control_start` of mode_guided.cpp takes WPNAV_SPEED again
+    forgets_at_first_target=True,  # `pos_control_start` of mode_guided.cpp resets to WPNAV_SPEED
     crash_disarm_s=2.0,  # CRASH_CHECK_TRIGGER_SEC of crash_check.cpp
 )

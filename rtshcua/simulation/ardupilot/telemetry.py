@@ -1,4 +1,4 @@
-"""What ArduCopter streams: nothing but the heartbeat, and its own TIMESYNC, until it is asked."""
+"""ArduCopter's streams: by default only HEARTBEAT and TIMESYNC."""
 
 from collections.abc import Mapping
 from math import atan2, degrees, hypot
@@ -11,7 +11,7 @@ from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS, autopilot_version, extended_sys_state
 
 _PLACE_ONLY = 0xFDF8
-"""`type_mask`: only the place counts; the last byte's upper half is set as well (`send_position_target_global_int`)."""
+"""`type_mask`: only the place is valid; the upper bits are set too (`send_position_target_global_int`)."""
 
 _POSITION_TARGET_GLOBAL_INT = maker(mavlink.MAVLink_position_target_global_int_message)
 _EKF_STATUS_REPORT = maker(mavlink.MAVLink_ekf_status_report_message)
@@ -20,10 +20,10 @@ _TIMESYNC = maker(mavlink.MAVLink_timesync_message)
 
 
 def _position_target(a: Autopilot) -> Message | None:
-    """POSITION_TARGET_GLOBAL_INT: what `get_wp` of the mode gives, if it gives anything; altitude above the sea.
+    """POSITION_TARGET_GLOBAL_INT: the result of the mode's `get_wp`, if any; altitude above the sea.
 
-    `ModeGuided::get_wp` has one only after a position target: not after entering the mode, nor in the takeoff.
-    `ModeRTL::get_wp` has one until the landing. Other modes have none.
+    `ModeGuided::get_wp` has a target only after a position target, not after the mode change or in the takeoff.
+    `ModeRTL::get_wp` has a target until the landing. Other modes have none.
     """
     vehicle = a.vehicle
     target, mode = vehicle.destination, vehicle.mode
@@ -42,13 +42,13 @@ def _position_target(a: Autopilot) -> Message | None:
 
 
 _FIRST_FLAGS = 0x0A7
-"""As recorded: attitude and height, and held to be at rest."""
+"""Recorded flags: attitude and height valid, vehicle assumed at rest."""
 _GLITCHING = 1 << 15
-"""EKF_GPS_GLITCHING of ArduPilot's EKF_STATUS_FLAGS; the dialect does not have it."""
+"""EKF_GPS_GLITCHING of ArduPilot's EKF_STATUS_FLAGS; not in the pymavlink dialect."""
 
 
 _REJECTED = 1.2
-"""A variance above 1 means that what was measured is refused; FS_EKF_THRESH is 0.8."""
+"""A variance above 1 means that the measurement is rejected; FS_EKF_THRESH is 0.8."""
 
 
 def _ekf_status_report(a: Autopilot) -> Message | None:
@@ -62,7 +62,7 @@ def _ekf_status_report(a: Autopilot) -> Message | None:
     else:
         flags = GOOD_FLAGS if sensors.has_position else LOST_FLAGS
     if sensors.unhealthy:
-        flags = 0  # each flag asks `filterHealthy` (AP_NavEKF3_Outputs.cpp, `updateFilterStatus`)
+        flags = 0  # each flag depends on `filterHealthy` (AP_NavEKF3_Outputs.cpp, `updateFilterStatus`)
     if sensors.glitching:
         flags |= _GLITCHING
     velocity, place = (_REJECTED, _REJECTED) if sensors.unhealthy else (0.008, 0.005)
@@ -73,14 +73,14 @@ def _wind(a: Autopilot) -> Message | None:
     if not a.sensors.locates:
         return None
     wind = a.wind
-    if wind is None:  # as recorded: a copter that estimates none reports none from the south
+    if wind is None:  # as recorded: without an estimate a copter reports wind of 0 from the south
         return _WIND(-180.0, 0.0, 0.0)
-    north, east = wind  # the last one of a flight stays
+    north, east = wind  # the last estimate of a flight stays
     return _WIND(degrees(atan2(-east, -north)), hypot(north, east), 0.0)
 
 
 def _timesync(a: Autopilot) -> Message:
-    """It asks for the other end's time; its own system id is added to its time, by which it knows the answer."""
+    """TIMESYNC request; the system id is added to the time to recognise the answer."""
     return _TIMESYNC(0, a.now_us * 1000 + a.system)
 
 
@@ -97,7 +97,7 @@ DEFAULT: Mapping[int, int] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: 10_000_000,
 }
-"""The streams that run from boot, and their intervals in microseconds."""
+"""The intervals, in microseconds, of the streams that run from boot."""
 
 _GROUPS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
@@ -118,4 +118,4 @@ _GROUPS: dict[int, tuple[int, ...]] = {
 GROUPS: Mapping[int, tuple[int, ...]] = _GROUPS | {
     mavlink.MAV_DATA_STREAM_ALL: tuple(number for group in _GROUPS.values() for number in group)
 }
-"""The messages of each group that REQUEST_DATA_STREAM names. EXTENDED_SYS_STATE is in none, as on the real one."""
+"""The messages of each group of REQUEST_DATA_STREAM. As on ArduCopter, no group has EXTENDED_SYS_STATE."""

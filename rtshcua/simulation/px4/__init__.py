@@ -1,1 +1,1 @@
-"""What PX4 does its own way. Each file has a twin in `ardupilot`."""
+"""The behaviour that is specific to PX4. Each file has a counterpart in `ardupilot`."""

@@ -1,4 +1,4 @@
-"""PX4's commands. Altitudes are above sea level whatever the frame says; an ACK is for the mode, not the effect."""
+"""PX4's commands. Altitudes are above sea level in any frame; an ACK confirms the mode, not the effect."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -21,18 +21,18 @@ from rtshcua.simulation.commands import (
 from rtshcua.simulation.place import Point
 
 _STREAM_US = 500_000
-"""OFFBOARD is entered only while position targets come faster than this (2 Hz)."""
+"""OFFBOARD can be entered only while position targets arrive faster than this (2 Hz)."""
 _AUTO, _ = Px4Mode.HOLD.parameters
 _ORBIT_M = 10.0
-"""The radius of an orbit that names none."""
+"""The default radius of an orbit."""
 _ANSWERS_BY_MODE = 1, 18
-"""The first release that answers a DO_REPOSITION without its flag for what it does."""
+"""The first release that answers a DO_REPOSITION without its flag according to its effect."""
 _KEPT_US = 500_000
-"""How long what it named is good for, for whoever enters Hold (`Loiter::on_activation`)."""
+"""How long its target is kept for entering Hold (`Loiter::on_activation`)."""
 
 
 def _takeoff(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """Accepted while disarmed too: then arming starts the climb. The place is not looked at: it climbs straight up."""
+    """Handle NAV_TAKEOFF. While disarmed, arming then starts the climb. The place is ignored: it climbs straight up."""
     if not a.can_enter(FlightMode.TAKEOFF):
         return (TEMPORARILY_REJECTED,)
     vehicle = a.vehicle
@@ -42,14 +42,14 @@ def _takeoff(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
         a.say(mavlink.MAV_SEVERITY_WARNING, "Already higher than takeoff altitude")
         vehicle.set_mode(FlightMode.LOITER)
     elif vehicle.mode is FlightMode.TAKEOFF:
-        vehicle.climb()  # in takeoff already: to the new height
+        vehicle.climb()  # already taking off: climb to the new height
     else:
         vehicle.set_mode(FlightMode.TAKEOFF)
     return (ACCEPTED,)
 
 
 def _target(a: Autopilot, command: VehicleCommand) -> Point:
-    """The place and the height that it names, each that of the vehicle where it does not."""
+    """Return the commanded place and height; the vehicle's own where the command has none."""
     here, up = a.here, command.altitude - a.home.amsl_mm / 1000
     north, east = here.north, here.east
     if command.latitude is not None and command.longitude is not None:
@@ -58,11 +58,11 @@ def _target(a: Autopilot, command: VehicleCommand) -> Point:
 
 
 def _reposition(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """As `Navigator::run` and `Commander::handle_command` of v1.16 do it. The ACK is for the mode alone.
+    """Handle DO_REPOSITION as `Navigator::run` and `Commander::handle_command` of v1.16. The ACK is for the mode only.
 
-    Without the flag that changes the mode the commander does not know it, but the navigator keeps what it named for
-    half a second, and Hold flies to it (`Loiter::on_active`; recorded: answered 3, target and motion follow). From 1.18
-    it is answered for what it does (PX4-Autopilot pull request 27563).
+    Without the flag that changes the mode the commander answers "unsupported", but the navigator keeps the target for
+    half a second, and Hold flies to it (`Loiter::on_active`; recorded: answer 3, then target and motion follow). From
+    1.18 on the answer matches the effect (PX4-Autopilot pull request 27563).
     """
     vehicle, changes = a.vehicle, bool(whole(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
     if not changes and vehicle.mode is not FlightMode.LOITER:
@@ -82,18 +82,18 @@ def _reposition(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def fly_kept(a: Autopilot) -> None:
-    """In Hold now: to what was named without the flag that changes the mode, if that is not too long ago."""
+    """On entering Hold, fly to the kept target of a DO_REPOSITION, if it is recent enough."""
     kept, a.kept = a.kept, None
     if kept is not None and a.vehicle.mode is FlightMode.LOITER and a.now_us + a.since_us < kept[0]:
         _fly(a, kept[1], a.vehicle.destination, taking_off=False)
 
 
 def _fly(a: Autopilot, command: VehicleCommand, kept: Point | None, *, taking_off: bool) -> None:
-    """Fly to what the command names. Without a place, keep the target it has (`kept`), at the height that is given, or
-    here; without a place, a height and a heading, stop ("pause").
+    """Fly to the commanded target. Without a place, keep the current target (`kept`) at the commanded height; without
+    place, height and heading, stop ("pause").
     """
     vehicle = a.vehicle
-    target = _target(a, command)  # without a place, the fence is asked about its own
+    target = _target(a, command)  # without a place, the vehicle's own place is checked against the fence
     placed, raised = None not in (command.latitude, command.longitude), isfinite(command.altitude)
     if not a.fence.allows(target):
         a.say(mavlink.MAV_SEVERITY_CRITICAL, "Reposition is outside geofence\t")
@@ -101,7 +101,7 @@ def _fly(a: Autopilot, command: VehicleCommand, kept: Point | None, *, taking_of
     if command.p1 > 0:
         vehicle.speed = command.p1
     if not placed and not raised and not isfinite(command.p4):
-        if taking_off:  # it comes back to where it was, without a braking distance
+        if taking_off:  # returns to the place of the command, without a braking distance
             vehicle.go_to(target)
         else:
             vehicle.hold()
@@ -114,7 +114,7 @@ def _fly(a: Autopilot, command: VehicleCommand, kept: Point | None, *, taking_of
 
 
 def _change_altitude(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """On its way it stops, and climbs there, as recorded."""
+    """Handle DO_CHANGE_ALTITUDE: stop on the way and climb there, as recorded."""
     up = command.p1 - a.home.amsl_mm / 1000
     if not isfinite(up) or not a.can_enter(FlightMode.LOITER):
         return (TEMPORARILY_REJECTED,)
@@ -124,7 +124,7 @@ def _change_altitude(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def _orbit(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """Around the place it names, or around where the vehicle is. As recorded, nobody looks at the fence."""
+    """Handle DO_ORBIT around the commanded place or the vehicle. As recorded, the fence is not checked."""
     vehicle = a.vehicle
     if not a.can_enter(FlightMode.ORBIT) or not vehicle.in_air:
         return (TEMPORARILY_REJECTED,)
@@ -136,7 +136,7 @@ def _orbit(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def _set_mode(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """Acknowledged twice: the first ACK is of the message, only the second of the mode; a bogus main mode gets 0, 0."""
+    """Handle DO_SET_MODE. The first ACK is for the message, the second for the mode; an unknown mode gets 0, 0."""
     main, sub = whole(command.p2), whole(command.p3)
     if main not in {number >> 16 & 0xFF for number in a.flavour.modes.numbers.values()}:
         return (ACCEPTED, ACCEPTED)
@@ -145,7 +145,7 @@ def _set_mode(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
 
 
 def enter_number(a: Autopilot, number: int) -> bool:
-    """Enters the mode with this `custom_mode`; whether it may be entered."""
+    """Enter the mode with this `custom_mode`; return False if it cannot be entered."""
     mode = a.flavour.modes.mode(number)
     if mode is None or not a.can_enter(mode):
         return False
@@ -160,7 +160,7 @@ def enter_number(a: Autopilot, number: int) -> bool:
 
 
 def _mission_start(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
-    """Also arms. Denied while the mission was not judged, or judged not to be flyable; there is no reason given."""
+    """Handle MISSION_START, which also arms. Denied, without a text, until the mission has passed its check."""
     if not a.mission.start(whole(command.p1) if command.p1 > 0 else None):
         return (DENIED,)
     if not a.can_enter(FlightMode.MISSION) or not (a.vehicle.armed or a.ready):

@@ -1,7 +1,7 @@
-"""PX4, as recorded from v1.16: its modes, how it comes up, what it refuses, and what it does when nobody asks.
+"""PX4 as recorded from v1.16: modes, boot sequence, refusals, and behaviour without commands.
 
-An upload is acknowledged before the mission is judged, so the ACK says nothing about whether it will fly; until the
-judgement is there the one before stands, and MISSION_START right behind an upload is denied, as recorded.
+An upload is acknowledged before the mission is checked, so the ACK does not mean that the mission can be flown. Until
+the check is done the previous result holds, and MISSION_START right after an upload is denied, as recorded.
 """
 
 from collections.abc import Callable
@@ -47,43 +47,43 @@ _AUTOMATIC = frozenset(
 
 _RECORDED = 1, 16
 _SIGNS_BY_PARAMETER = 1, 17
-"""The first release with signing (https://github.com/PX4/PX4-Autopilot/pull/25284),"""
+"""The first release with signing (https://github.com/PX4/PX4-Autopilot/pull/25284)."""
 _SIGNS_BY_KEY = 1, 18
-"""and the one that did away with MAV_SIGN_CFG (https://github.com/PX4/PX4-Autopilot/pull/26894)."""
+"""The release that removed MAV_SIGN_CFG (https://github.com/PX4/PX4-Autopilot/pull/26894)."""
 _UNSIGNED = frozenset({"RADIO_STATUS", "ADSB_VEHICLE", "COLLISION"})
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
 _BY_RECEIVER = frozenset({mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL})
-"""The commands that the receiver of messages answers itself; the others it hands to the commander (`Mavlink::send`)."""
+"""The commands that the MAVLink receiver answers itself; it passes others to the commander (`Mavlink::send`)."""
 
 _WARN, _HOLD, _RETURN, _TERMINATE, _LAND = 1, 2, 3, 4, 5
-"""GF_ACTION; 0 is nothing."""
+"""GF_ACTION; 0 is no action."""
 _LATE: dict[float, FlightMode] = {_RETURN: FlightMode.RETURN, _LAND: FlightMode.LAND}
 
 
 def _limits(value: Callable[[str], float], area: FenceArea) -> FenceLimits | None:
-    """The fence that GF_* parameters and the upload make."""
+    """Return the fence of the GF_* parameters and the upload."""
     if value("GF_ACTION") == 0:
         return None
     across, high = value("GF_MAX_HOR_DIST"), value("GF_MAX_VER_DIST")
     if area == FenceArea() and not across > 0 and not high > 0:
         return None
-    # all of them count: `Geofence::checkPointAgainstAllGeofences`
+    # all limits apply: `Geofence::checkPointAgainstAllGeofences`
     return FenceLimits(area, high if high > 0 else inf, across=across if across > 0 else inf)
 
 
 def _acts(value: Callable[[str], float]) -> bool:
-    """A breach of which it only warns does not count as a failsafe since 1.15 (PX4-Autopilot pull request 22879)."""
+    """Return whether a breach is a failsafe; since 1.15 a warning is not (PX4-Autopilot pull request 22879)."""
     return value("GF_ACTION") > _WARN
 
 
 FARTHEST_FIRST_M = 10_000.0
-"""MIS_DIST_1WP: farther than this from home the first waypoint may not be."""
+"""MIS_DIST_1WP: the greatest distance of the first waypoint from home."""
 
 
 def _judge(
     items: tuple[PlanItem, ...], _vehicle: Multirotor, home: HomePosition, allows: Callable[[Point], bool]
 ) -> bool:
-    """The feasibility check: every place inside the fence, the first one not too far; else the mission is not flown."""
+    """Return whether the mission is feasible: every place inside the fence, and the first one not too far."""
     first = True
     for item in items:
         if item.command not in NAVIGATION or not item.has_place:
@@ -99,7 +99,7 @@ def _judge(
 
 
 class Px4(Flavour):
-    """PX4."""
+    """The flavour PX4."""
 
     autopilot = mavlink.MAV_AUTOPILOT_PX4
     modes = ModeTable(
@@ -197,7 +197,7 @@ class Px4(Flavour):
     fence = FenceRules(limits=_limits, name=lambda _limits, _point: "Geofence", every=False, critical=_acts)
 
     def arming(self, a: Autopilot) -> tuple[str, ...]:
-        """What stands against arming PX4."""
+        """Return the failed arming checks."""
         found = []
         if a.vehicle.crashed:
             found.append("Attitude failure (roll)")
@@ -214,13 +214,14 @@ class Px4(Flavour):
         return tuple(found)
 
     def release(self, *, keyed: bool) -> tuple[int, int]:
-        """What was recorded; that release takes no key."""
+        """Return the recorded release, or with a key the first one that accepts keys on any link."""
         return _SIGNS_BY_KEY if keyed else _RECORDED
 
     def obeys_unsigned(self, a: Autopilot, name: str) -> bool:
-        """1.17 asks MAV_SIGN_CFG: 0, the default, obeys anyone, 1 on USB alone, 2 nobody. 1.18 obeys nobody.
+        """Return whether the message is obeyed unsigned.
 
-        Some messages count unsigned all the same (`mavlink_sign_control.cpp`, `unsigned_messages`).
+        1.17 depends on MAV_SIGN_CFG: 0 (default) always, 1 on USB only, 2 never. 1.18: never. Some messages are always
+        obeyed unsigned (`mavlink_sign_control.cpp`, `unsigned_messages`).
         """
         if a.release >= _SIGNS_BY_KEY:
             return name in _UNSIGNED or name == "HEARTBEAT"
@@ -228,7 +229,7 @@ class Px4(Flavour):
         return wanted == 0 or (wanted == 1 and a.usb) or name in _UNSIGNED
 
     def on_setup_signing(self, a: Autopilot, message: Message) -> None:
-        """1.16 does not know it. 1.17 takes it over USB alone; from 1.18 any link does, disarmed."""
+        """Handle SETUP_SIGNING: 1.16 ignores it, 1.17 accepts it on USB only, 1.18 on any link while disarmed."""
         if a.release < _SIGNS_BY_PARAMETER:
             return
         if a.release < _SIGNS_BY_KEY:
@@ -240,16 +241,16 @@ class Px4(Flavour):
             a.signing.set_up(message, a.now_us)
 
     def on_entered(self, a: Autopilot) -> None:
-        """Hold flies to what a DO_REPOSITION named within the half second before."""
+        """On entering Hold, fly to the target of a DO_REPOSITION of the last half second."""
         fly_kept(a)
 
     def on_set_mode(self, a: Autopilot, number: int) -> tuple[int, ...]:
-        """Obeyed, if it can be, and never acknowledged."""
+        """Handle SET_MODE; never acknowledged."""
         enter_number(a, number)
         return ()
 
     def on_position_target(self, a: Autopilot, message: Message) -> None:
-        """Kept alive by coming again and again, flown to in OFFBOARD only."""
+        """Handle a position target: it keeps OFFBOARD alive, and is flown to in OFFBOARD only."""
         if message.coordinate_frame in AMSL_FRAMES:
             up = message.alt - a.home.amsl_mm / 1000
         else:
@@ -258,20 +259,20 @@ class Px4(Flavour):
             return
         a.last_target_us = a.now_us
         if a.vehicle.mode is FlightMode.GUIDED:
-            # how far it flies past such a target was not recorded
+            # the overshoot past such a target was not recorded
             a.vehicle.go_to(Point(*a.home.local(message.lat_int, message.lon_int), up), past=False)
 
     def on_sticks(self, a: Autopilot, for_us: int) -> None:
-        """COM_RC_OVERRIDE: sticks leave an automatic mode for Position, or for Altitude without a position."""
+        """Leave an automatic mode for Position, or for Altitude without a position (COM_RC_OVERRIDE)."""
         vehicle = a.vehicle
         if vehicle.armed and vehicle.mode in _AUTOMATIC:
             vehicle.set_mode(FlightMode.POSITION if a.can_enter(FlightMode.POSITION) else FlightMode.ALTITUDE)
 
     def on_breach(self, a: Autopilot, breach: Breach) -> None:
-        """Does what GF_ACTION asks for, once; whoever then commands something else is obeyed, as recorded.
+        """Take GF_ACTION, once; later commands are obeyed, as recorded.
 
-        Holding is at the place where the breach was seen: it comes back to there. It holds for COM_FAIL_ACT_T before it
-        returns or lands, so that somebody may enter another mode (docs.px4.io/v1.15/en/config/safety).
+        It holds at the place where the breach was detected, and flies back to it. Before a return or a landing it holds
+        for COM_FAIL_ACT_T, so that the pilot can enter another mode (docs.px4.io/v1.15/en/config/safety).
         """
         action, vehicle = a.parameters.value("GF_ACTION"), a.vehicle
         waits_s = a.parameters.value("COM_FAIL_ACT_T")

@@ -1,4 +1,4 @@
-"""PX4's parameters, as far as this vehicle has them, and how it flies."""
+"""PX4's simulated parameters and flight characteristics."""
 
 from math import radians, tan
 
@@ -44,16 +44,16 @@ PARAMETERS = (
     AutopilotParameter("RTL_TYPE", INT32),
     AutopilotParameter("SYS_AUTOSTART", INT32, value=4001),
 )
-"""In the order of their indices."""
+"""Ordered by index."""
 
 
 _MPC_ACC_HOR = 3.0
 _SPREAD = 0.6
-"""Seconds: what `computeBrakingDistanceFromVelocity` adds for the jerk, of which it takes 0.6 of MPC_JERK_AUTO."""
+"""Seconds that `computeBrakingDistanceFromVelocity` adds for the jerk limit of 0.6 times MPC_JERK_AUTO."""
 
 
 def _breaking_distance(speed: float) -> float:
-    """`Navigator::calculate_breaking_stop`: how far ahead PX4 says that it will stop."""
+    """Return the stopping distance that PX4 reports (`Navigator::calculate_breaking_stop`)."""
     return speed * (speed / (2 * _MPC_ACC_HOR) + _SPREAD)
 
 
@@ -63,15 +63,14 @@ _STOP = Stopping(
     ahead=lambda speed: speed * (0.207 * speed + 0.778),
     told=_breaking_distance,
 )
-"""Measured from 4.5 m/s: 7.7 m, below 0.4 m/s after 3.6 to 4.6 s. It overshoots the place that it reports."""
+"""Measured from 4.5 m/s: 7.7 m, below 0.4 m/s after 3.6 to 4.6 s. It overshoots the reported place."""
 _OVERSHOOT_S = 0.18
 """Recorded: 0.57 m at 4.2 m/s to 1.38 m at 4.9 m/s, and 1.11 m at 6 m/s; nothing faster.
 
-Beyond that it follows from the cause. The trajectory of `PositionSmoothing` ends at the target, but the integrator of
-the velocity (MPC_XY_VEL_I_ACC, 0.4) still holds what it took against the drag of the simulator (SIH_KDV, 1 N s/m for
-1 kg).
-These equations, with the defaults of 1.16, give 1.2 m at 5 m/s, 1.4 m at 6 m/s, 1.7 m at 8 m/s and 1.9 m at 10 m/s,
-from where it can lean no further. A vehicle with less drag overshoots less.
+Faster speeds are derived from the cause: the trajectory of `PositionSmoothing` ends at the target, but the velocity
+integrator (MPC_XY_VEL_I_ACC, 0.4) still compensates the drag of the simulator (SIH_KDV, 1 N s/m for 1 kg).
+With the defaults of 1.16 the equations give 1.2 m at 5 m/s, 1.4 m at 6 m/s, 1.7 m at 8 m/s and 1.9 m at 10 m/s, where
+the lean angle saturates. A vehicle with less drag overshoots less.
 """
 _AGILITY = Agility(
     acceleration=2.5,
@@ -90,11 +89,11 @@ _AGILITY = Agility(
     home_within=2.0,
     land_braking=0.2,
 )
-"""As measured on recorded flights of PX4 v1.16."""
+"""Measured on recorded flights of PX4 v1.16."""
 
 
 def _return_height(handling: Handling, away: float, _up: float) -> float:
-    """`RTL::calculate_return_alt_from_cone_half_angle` and its caller, of rtl.cpp (1.16)."""
+    """Return the return height as `RTL::calculate_return_alt_from_cone_half_angle` and its caller (rtl.cpp, 1.16)."""
     if not handling.cone_deg:
         return handling.return_up
     if away <= handling.acceptance_m:
@@ -112,7 +111,7 @@ HANDLING = Handling(
     takeoff_climb=1.5,
     land_speed=0.6,
     land_below=5.0,
-    # a failure of attitude is only warned of after the takeoff, unless CBRK_FLIGHTTERM is changed (failsafe.cpp)
+    # after takeoff PX4 only warns of an attitude failure, unless CBRK_FLIGHTTERM is changed (failsafe.cpp)
     crash_disarm_s=None,
     after_takeoff=FlightMode.LOITER,
     after_landing=FlightMode.LOITER,

@@ -1,4 +1,4 @@
-"""What PX4 streams: all of it on by default, at tens of hertz in sum."""
+"""PX4's streams: all run by default, at tens of hertz in total."""
 
 from collections.abc import Mapping
 from math import nan
@@ -23,11 +23,11 @@ _WIND_COV = maker(mavlink.MAVLink_wind_cov_message)
 _TIMESYNC = maker(mavlink.MAVLink_timesync_message)
 
 _NAVIGATED = frozenset({FlightMode.TAKEOFF, FlightMode.LOITER, FlightMode.MISSION, FlightMode.RETURN, FlightMode.LAND})
-"""The modes in which the navigator sets one; a pilot's modes, OFFBOARD and circling have none."""
+"""The modes in which the navigator sets a target; manual modes, OFFBOARD and orbits have none."""
 
 
 def _position_target(a: Autopilot) -> Message | None:
-    """POSITION_TARGET_GLOBAL_INT: the position setpoint, whenever there is one and it steers by position.
+    """POSITION_TARGET_GLOBAL_INT: the position setpoint, if there is one.
 
     As recorded from v1.16: altitude above the sea, and 0 in Land; all fields of the mask are valid.
     """
@@ -44,11 +44,11 @@ def _position_target(a: Autopilot) -> Message | None:
 
 
 _BOOT_FLAGS, _FIRST_FLAGS, _GOOD_FLAGS = 0x480, 0x0E5, 0x3FF
-"""As recorded from PX4 v1.16: at first, when it knows its attitude, and in good health on the ground."""
+"""Flags recorded from PX4 v1.16: at first, with a valid attitude, and healthy on the ground."""
 
 
 _REJECTED, _ASTRAY_M = 1.6, 12.0
-"""Test ratios above 1 mean that what was measured is refused, and `pos_horiz_accuracy` then."""
+"""A test ratio above 1 means that the measurement is rejected; and `pos_horiz_accuracy` in that case."""
 
 
 def _estimator_status(a: Autopilot) -> Message | None:
@@ -72,7 +72,7 @@ def _estimator_status(a: Autopilot) -> Message | None:
 
 
 def _wind_cov(a: Autopilot) -> Message | None:
-    """WIND_COV, whenever the estimator knows the wind: in the air, with drag fusion (EKF2_DRAG_CTRL) alone."""
+    """WIND_COV, if the wind is estimated: in the air and with drag fusion (EKF2_DRAG_CTRL) only."""
     wind = a.wind
     if wind is None or not a.vehicle.in_air:
         return None
@@ -80,7 +80,7 @@ def _wind_cov(a: Autopilot) -> Message | None:
 
 
 def _timesync(a: Autopilot) -> Message:
-    """PX4 asks for the other end's time."""
+    """TIMESYNC request."""
     return _TIMESYNC(0, a.now_us * 1000)
 
 
@@ -97,10 +97,10 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
 }
 
 CONSTANT = frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT})
-"""HEARTBEAT comes at 1 Hz, whatever is asked for (measured: result 4)."""
+"""HEARTBEAT stays at 1 Hz (measured: a request gets result 4)."""
 ONLY_STREAMED = frozenset({CURRENT_MODE, mavlink.MAVLINK_MSG_ID_TIMESYNC})
 LEAST_US: Mapping[int, int] = {CURRENT_MODE: 550_000}
-"""Measured: asked for at 10 Hz, it comes at 1.8 Hz."""
+"""Measured: requested at 10 Hz, it comes at 1.8 Hz."""
 
 DEFAULT: Mapping[int, int] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
@@ -120,4 +120,4 @@ DEFAULT: Mapping[int, int] = {
     mavlink.MAVLINK_MSG_ID_TIMESYNC: 100_000,
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1_000_000,
 }
-"""The streams that run from boot, and their intervals in microseconds."""
+"""The intervals, in microseconds, of the streams that run from boot."""

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rtshcua.campaign.drawing import CampaignTally, FaultSpace, draw
 from rtshcua.model import faults
 from rtshcua.model.faults import FlightMode
-from rtshcua.simulation.fault_syntax import OF_VEHICLE, fault_words, parse_fault
+from rtshcua.simulation.fault_syntax import OF_VEHICLE, format_fault, parse_fault
 from rtshcua.simulation.surroundings import Wind
 from virtual.rows import rows
 
@@ -226,18 +226,18 @@ def test_fault_texts(text: str, expected: faults.Fault) -> None:
     [
         ("", "no such fault"),
         ("rain,at=1s", "no such fault: `rain`"),
-        ("wind,at=1s", "`wind` needs speed"),
-        ("wind,at=1s,speed=12", "a number with its unit"),
-        ("wind,at=1s,speed=12km/h", "a number with its unit"),
-        ("battery,at=1s,level=5m", "a number with its unit"),
-        ("battery,when=1s,level=5%", "has no `when`"),
+        ("wind,at=1s", "`wind` requires speed"),
+        ("wind,at=1s,speed=12", "a number with a unit"),
+        ("wind,at=1s,speed=12km/h", "a number with a unit"),
+        ("battery,at=1s,level=5m", "a number with a unit"),
+        ("battery,when=1s,level=5%", "has no parameter `when`"),
         ("pilot,at=1s,mode=upside-down", "no such mode"),
-        ("battery,at=1s,level", "a number with its unit"),
-        ("link-loss,at=1s,loss=3%,way=left", "no such way: `left`; there are both, up, down"),
-        ("link-silence,at=1s,held=1", "`held` is yes or no"),
+        ("battery,at=1s,level", "a number with a unit"),
+        ("link-loss,at=1s,loss=3%,way=left", "no such way: `left`; expected one of both, up, down"),
+        ("link-silence,at=1s,held=1", "`held` must be yes or no"),
         ("mute,at=1s,message=NOTHING", "no such message: `NOTHING`"),
-        ("stall,at=1s", "`stall` needs for"),
-        ("stall,at=1s,for=1s,shuffle=yes", "the seed of an order"),
+        ("stall,at=1s", "`stall` requires for"),
+        ("stall,at=1s,for=1s,shuffle=yes", "the seed of the shuffled order"),
     ],
 )
 def test_bad_fault_texts(text: str, message: str) -> None:
@@ -321,4 +321,4 @@ def test_a_fault_is_written_as_it_is_read() -> None:
     made = [replace(each.fault, at_us=7) for one in drawn for each in one.scenario.incidents]
     assert {type(each) for each in made} == set(OF_VEHICLE.values())
     for fault in made:
-        assert parse_fault(fault_words(fault)) == fault, fault_words(fault)
+        assert parse_fault(format_fault(fault)) == fault, format_fault(fault)

@@ -69,7 +69,7 @@ def test_it_lands_as_fast_as_its_owner_says(pilot: Callable[..., Any], flavour: 
     p.until(lambda: not p.truth.armed)
     assert not p.truth.crashed
     for wrong in (99, 2_001):
-        with pytest.raises(ValueError, match="a landing is from 100 to 2000 mm/s"):
+        with pytest.raises(ValueError, match="landing speed must be from 100 to 2000 mm/s"):
             SimulationConfig(land_mm_s=wrong)
 
 
